@@ -1,0 +1,148 @@
+"""History: the checked internal energy of one run over time, and how finely it was printed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from d2rpick.errors import HistoryError, RangeError
+
+Samples = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Precision:
+    """How finely the numbers of a column were written.
+
+    ``digits`` significant digits (17 restores every double), or, when ``decimals`` is given, a fixed
+    number of places behind the point.
+    """
+
+    digits: int = 17
+    decimals: int | None = None
+
+    def quantum(self, value: float) -> float:
+        """Distance between neighbouring printable numbers around ``value`` [unit of value].
+
+        Examples
+        --------
+        >>> f"{Precision(digits=6).quantum(0.0640123):g}"
+        '1e-07'
+        >>> f"{Precision(decimals=4).quantum(0.0640123):g}"
+        '0.0001'
+        """
+        if self.decimals is not None:
+            return float(10.0**-self.decimals)
+        if value == 0.0:
+            return 0.0
+        return float(10.0 ** (np.floor(np.log10(abs(value))) - self.digits + 1))
+
+
+EXACT = Precision()
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Internal energy of the parts to be switched, over time, in the run's own consistent units.
+
+    ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.
+    Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
+    in them was taken for the energy.  ``complete`` is False when a file stopped inside a state; ``notes``
+    say in plain sentences what a reader left out or assumed.  ``time_unit`` is given only where the file
+    names it; solver databases do not.
+    """
+
+    time: Samples
+    energy: Samples
+    source: tuple[str, ...]
+    format: str
+    channel: str
+    time_precision: Precision = EXACT
+    energy_precision: Precision = EXACT
+    time_unit: str = ""
+    complete: bool = True
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        time, energy = _frozen(self.time), _frozen(self.energy)
+        where = ", ".join(self.source)
+        if time.ndim != 1 or time.shape != energy.shape:
+            raise HistoryError(
+                f"{where}: time has shape {time.shape}, energy {energy.shape}; one of each per state expected"
+            )
+        for name, values in (("time", time), ("energy", energy)):
+            bad = np.flatnonzero(~np.isfinite(values))
+            if bad.size:
+                raise HistoryError(
+                    f"{where}: {name} of state {bad[0] + 1} is {values[bad[0]]}, a finite number was expected"
+                )
+        if np.any(np.diff(time) <= 0):
+            state = int(np.argmax(np.diff(time) <= 0)) + 1
+            raise HistoryError(f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}")
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "energy", energy)
+
+    @property
+    def step(self) -> float:
+        """Largest output interval [time]: how coarsely the record samples its vibration."""
+        return float(np.max(np.diff(self.time)))
+
+    def energy_at(self, time: float) -> float:
+        """Energy at ``time``, linear between the states; RangeError outside the record."""
+        if not self.time[0] <= time <= self.time[-1]:
+            span = f"{self.time[0]:g} to {self.time[-1]:g}"
+            raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}")
+        return float(np.interp(time, self.time, self.energy))
+
+
+def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Which states of a file count, and what to say of the others.
+
+    A state gives way to any later one at or before its time: of equal printed times the last counts, and
+    where a restarted run steps back its newer leg wins.
+
+    Parameters
+    ----------
+    time : array of shape (n,)
+        Times in the order of the file [unit of the run].
+
+    Returns
+    -------
+    keep : array of bool, shape (n,)
+        ``time[keep]`` increases strictly.
+    notes : tuple of str
+        A sentence for each kind of state left out.
+
+    Raises
+    ------
+    HistoryError
+        If more than one step, and more than a tenth of all, goes back: such a column is no time.
+
+    Examples
+    --------
+    >>> keep, notes = newest_states(np.array([0.0, 1.0, 2.0, 1.5, 2.5, 2.5]))
+    >>> keep.tolist()
+    [True, True, False, True, False, True]
+    """
+    step = np.diff(time)
+    equal, back = int(np.count_nonzero(step == 0)), int(np.count_nonzero(step < 0))
+    if back > 1 and back > 0.1 * step.size:
+        raise HistoryError(
+            f"time steps back at {back} of {step.size} states, increasing times were expected; name the time column"
+        )
+    later = np.minimum.accumulate(time[::-1])[::-1]
+    keep = np.append(time[:-1] < later[1:], np.ones(min(1, time.size), dtype=bool))
+    notes = []
+    if equal:
+        notes.append(f"{equal} states have the same printed time as the next one; of equal times the last counts")
+    if back:
+        notes.append(f"time steps back {back} times (restart); where legs overlap the newer one counts")
+    return keep, tuple(notes)
+
+
+def _frozen(values: ArrayLike) -> Samples:
+    copy = np.array(values, dtype=np.float64)
+    copy.flags.writeable = False
+    return copy
