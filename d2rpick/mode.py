@@ -1,0 +1,154 @@
+"""Mode: the closed form of an internal energy that one vibration mode stores and gives back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from d2rpick.history import Samples
+
+_EPS = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True)
+class Mode:
+    r"""One under-damped vibration and the internal energy it makes.
+
+    .. math::
+        E(t) = E_{pl} + q(t)^2, \quad
+        q(t) = q_0 + e^{-\alpha s/2} (a \cos\omega s + b \sin\omega s), \quad s = t - t_0
+
+    q is the deformation in units of the square root of energy: with spring k and deformation r = y - z of
+    the floating oscillator, q = sqrt(k/2) r, so that q**2 is the elastic energy.  The sign of q as a whole is
+    not observable in E; only products of two values of q have a meaning.
+
+    Parameters
+    ----------
+    omega : float
+        Damped angular rate of the deformation, positive [1/time]; the energy repeats at twice that rate.
+        omega_2 of eq. (4).
+    alpha : float
+        Mass-proportional damping [1/time].
+    cosine, sine : float
+        a and b [sqrt(energy)].
+    origin : float
+        t_0 [time].
+    energy_plastic : float
+        Part of the energy that does not come back [energy].
+    preload : float
+        q_0, deformation about which the mode vibrates [sqrt(energy)].
+
+    Notes
+    -----
+    "Analysis of switched-rigid floating oscillator" (Shock and Vibration), eqs. (1), (4), (7).
+
+    Examples
+    --------
+    >>> mode = Mode(omega=np.pi, alpha=0.0, cosine=0.0, sine=2.0, origin=0.0)
+    >>> float(mode.energy(0.5)), mode.peaks(0.0, 2.0)
+    (4.0, (0.5, 1.5))
+    >>> mode.crossings(2.0 * np.sin(np.pi / 4), 0.0, 2.0)
+    (0.25, 0.75)
+    """
+
+    omega: float
+    alpha: float
+    cosine: float
+    sine: float
+    origin: float
+    energy_plastic: float = 0.0
+    preload: float = 0.0
+
+    @property
+    def omega_0(self) -> float:
+        """Undamped angular rate, omega_0**2 = omega**2 + alpha**2 / 4 [1/time]."""
+        return float(np.hypot(self.omega, self.alpha / 2))
+
+    def deformation(self, t: Samples | float) -> Samples:
+        """Signed deformation q(t) [sqrt(energy)]."""
+        return self.preload + self._swing(t, self.cosine, self.sine)
+
+    def velocity(self, t: Samples | float) -> Samples:
+        """dq/dt [sqrt(energy)/time]."""
+        return self._swing(t, *self._velocity_parts)
+
+    def elastic_energy(self, t: Samples | float) -> Samples:
+        """q(t)**2, the energy that springs back [energy]."""
+        return self.deformation(t) ** 2
+
+    def energy(self, t: Samples | float) -> Samples:
+        """E(t), plastic and elastic [energy]."""
+        return self.energy_plastic + self.elastic_energy(t)
+
+    def kinetic_energy(self, t: Samples | float) -> Samples:
+        """Kinetic energy of the vibration, T = (dq/dt)**2 / omega_0**2 [energy].
+
+        From T = mu r'**2 / 2 with omega_0**2 = k / mu and q**2 = k r**2 / 2.
+        """
+        return (self.velocity(t) / self.omega_0) ** 2
+
+    def vibration_energy(self, t: Samples | float) -> Samples:
+        """Energy of the vibration about the preload, V = (q - q_0)**2 + T; dV/dt = -2 alpha T [energy]."""
+        return self._swing(t, self.cosine, self.sine) ** 2 + self.kinetic_energy(t)
+
+    def extrema(self, start: float, end: float) -> tuple[float, ...]:
+        """Find the times in (start, end), ascending, where the deformation stands still (q' = 0) [time]."""
+        cosine, sine = self._velocity_parts
+        phase = np.arctan2(-cosine, sine)  # cosine cos x + sine sin x = 0 at x = phase + n pi
+        first = np.floor((self.omega * (start - self.origin) - phase) / np.pi)
+        last = np.ceil((self.omega * (end - self.origin) - phase) / np.pi)
+        times = self.origin + (phase + np.pi * np.arange(first, last + 1)) / self.omega
+        return tuple(times[(times > start) & (times < end)].tolist())
+
+    def peaks(self, start: float, end: float) -> tuple[float, ...]:
+        """Find the times in (start, end), ascending, of the local maxima of the energy [time].
+
+        Where q' = 0, q'' = -omega_0**2 (q - q_0), so E'' = 2 q q'' < 0 asks for q (q - q_0) > 0.
+        """
+        times = np.array(self.extrema(start, end))
+        q = self.deformation(times)
+        return tuple(times[q * (q - self.preload) > 0].tolist())
+
+    def crossings(self, level_q: float, start: float, end: float) -> tuple[float, ...]:
+        """Find the times in (start, end), ascending, where q passes ``level_q``, to rounding [time].
+
+        An extremum that only touches the level (to rounding) is no crossing, nor are ``start`` and ``end``.
+        """
+        edges = np.array([start, *self.extrema(start, end), end])
+        above = self.deformation(edges) - level_q
+        scale = abs(level_q) + abs(self.preload) + np.sqrt(self.vibration_energy(edges))
+        above[np.abs(above) <= 8 * _EPS * scale] = 0.0
+        cells = np.flatnonzero(above[:-1] * above[1:] < 0)  # between neighbouring extrema q is monotone
+        return tuple(self._roots(level_q, edges[cells], edges[cells + 1], above[cells]).tolist())
+
+    def _roots(self, level_q: float, low: Samples, high: Samples, above_low: Samples) -> Samples:
+        """Root of q = level_q in each bracket: Newton, and halving where Newton leaves the bracket."""
+        t = (low + high) / 2
+        for _ in range(64):  # halving alone would need no more to reach rounding
+            above = self.deformation(t) - level_q
+            left = above * above_low > 0
+            low, high = np.where(left, t, low), np.where(left, high, t)
+            slope = self.velocity(t)
+            newton = t - above / np.where(slope == 0, np.inf, slope)
+            following = np.where((newton >= low) & (newton <= high), newton, (low + high) / 2)
+            moved = np.abs(following - t)
+            t = following
+            if np.all(moved <= 2 * _EPS * np.abs(t)):
+                break
+        return t
+
+    @property
+    def _velocity_parts(self) -> tuple[float, float]:
+        half = self.alpha / 2
+        return self.omega * self.sine - half * self.cosine, -self.omega * self.cosine - half * self.sine
+
+    def _swing(self, t: Samples | float, cosine: float, sine: float) -> Samples:
+        """exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)) with s = t - origin."""
+        s = np.asarray(t, dtype=np.float64) - self.origin
+        angle = self.omega * s
+        decay = np.exp(-self.alpha / 2 * s)
+        swing: Samples = decay * (cosine * np.cos(angle) + sine * np.sin(angle))
+        return swing

@@ -1,0 +1,199 @@
+"""The floating oscillator: two masses, a spring, no support; free and rigid motion in closed form.
+
+Source: "Analysis of switched-rigid floating oscillator" (Shock and Vibration); equation numbers in this
+module are that paper's.  Frame mass ``m`` with displacement ``z``, suspended mass ``M`` with displacement
+``y``, spring ``k``, damping proportional to mass with rate ``alpha`` on both.  Any consistent units.
+
+The closed forms here take any initial state.  They split the motion into the centre of mass, which damping
+alone slows down, and the spring deformation ``r = y - z`` with ``r'' + alpha r' + omega_0^2 r = 0``.  The
+paper's formulas (7) are the case z = y = y' = 0, z' = V0; its spring-back (18) is the free motion that starts
+from the frozen deformation with both masses at one speed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from d2rpick.errors import RangeError
+
+Values = NDArray[np.float64]
+
+
+class State(NamedTuple):
+    """Displacements ``z`` (frame), ``y`` (suspended mass) and velocities ``vz``, ``vy``; numbers or arrays alike."""
+
+    z: Values
+    y: Values
+    vz: Values
+    vy: Values
+
+    @classmethod
+    def of(cls, z: ArrayLike, y: ArrayLike, vz: ArrayLike, vy: ArrayLike) -> State:
+        """State from anything numpy takes for numbers."""
+        return cls(*(np.asarray(value, dtype=np.float64) for value in (z, y, vz, vy)))
+
+
+@dataclass(frozen=True)
+class Oscillator:
+    """Floating oscillator; RangeError unless stiffness and masses are positive and all numbers finite.
+
+    ``stiffness`` k [force/length], ``mass`` M (suspended) and ``frame_mass`` m [mass], ``alpha`` [1/time].
+    A slightly negative alpha, as a fit to scattered samples may give, makes the motion grow.
+    """
+
+    stiffness: float
+    mass: float
+    frame_mass: float
+    alpha: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "mass", "frame_mass"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise RangeError(f"{name} is {getattr(self, name)}, a positive number was expected")
+        if not np.isfinite(self.alpha):
+            raise RangeError(f"alpha is {self.alpha}, a finite number was expected")
+
+    @property
+    def reduced_mass(self) -> float:
+        """Mu = m M/(m + M), the mass that vibrates against the spring."""
+        return self.frame_mass * self.mass / (self.frame_mass + self.mass)
+
+    @property
+    def omega_0(self) -> float:
+        """Undamped rate of the vibration, sqrt(k/mu) = sqrt(1 + beta) omega_n [1/time]."""
+        return float(np.sqrt(self.stiffness / self.reduced_mass))
+
+    @property
+    def omega_2(self) -> float:
+        """Damped rate of the vibration (4) [1/time]; nan when overdamped.
+
+        Examples
+        --------
+        >>> Oscillator(stiffness=660e3, mass=31.4, frame_mass=15.7, alpha=50).omega_2
+        249.864613022...
+        """
+        square = (self.omega_0 - self.alpha / 2) * (self.omega_0 + self.alpha / 2)
+        return float(np.sqrt(square)) if square >= 0 else float("nan")
+
+    def free(self, start: State, elapsed: ArrayLike) -> State:
+        """State after ``elapsed`` time of free motion from ``start``, any damping (7), (18).
+
+        Parameters
+        ----------
+        start : State
+            Numbers, or arrays that broadcast with ``elapsed``.
+        elapsed : array_like
+            Time since ``start``, not negative [time].
+
+        Returns
+        -------
+        State
+            Arrays of the broadcast shape.
+        """
+        t = np.asarray(elapsed, dtype=np.float64)
+        cosine, sine = self._vibration(t)
+        r, vr = start.y - start.z, start.vy - start.vz
+        deformation = cosine * r + sine * (vr + self.alpha / 2 * r)
+        rate = cosine * vr - sine * (self.omega_0**2 * r + self.alpha / 2 * vr)
+        centre, velocity = self._centre(start)
+        centre, velocity = centre + velocity * _drift(self.alpha, t), velocity * np.exp(-self.alpha * t)
+        frame, suspended = self._share(self.mass), self._share(self.frame_mass)
+        return State(
+            centre - frame * deformation,
+            centre + suspended * deformation,
+            velocity - frame * rate,
+            velocity + suspended * rate,
+        )
+
+    def free_on_grid(self, start: State, step: float, count: int) -> State:
+        """States at ``step * arange(count)`` of free motion from ``start``: what ``free`` gives, several times as fast.
+
+        On an even grid, t = t_row + t_column, every exponential is a product of a factor per row and one per
+        column of a table, so a displacement is a matrix product of rank four.  Agrees with ``free`` to a few
+        units of the last digit.  ``start`` holds numbers.  Falls back to ``free`` unless underdamped.
+        """
+        omega = self.omega_2
+        if not omega > 0:
+            return self.free(start, step * np.arange(count))
+        columns = max(1, int(np.sqrt(count)))
+        row = step * columns * np.arange(-(-count // columns), dtype=np.float64)
+        column = step * np.arange(columns, dtype=np.float64)
+        rate = -self.alpha / 2 + 1j * omega
+        turn, turn_row = np.exp(rate * column), np.exp(rate * row)
+        slow_row, slow = np.exp(-self.alpha * row), np.exp(-self.alpha * column)
+        drift_row, drift = _drift(self.alpha, row), _drift(self.alpha, column)
+        r, vr = start.y - start.z, start.vy - start.vz
+        amplitude = complex(r, -(vr + self.alpha / 2 * r) / omega)
+        centre, velocity = self._centre(start)
+
+        def displacement(share: float) -> Values:
+            swing = share * amplitude * turn_row
+            left = [swing.real, -swing.imag, centre + velocity * drift_row, velocity * slow_row]
+            table = np.stack(left, axis=1) @ np.stack([turn.real, turn.imag, np.ones(columns), drift])
+            return np.asarray(table.ravel()[:count])
+
+        def speed(share: float) -> Values:
+            swing = share * rate * amplitude * turn_row
+            table = np.stack([swing.real, -swing.imag, velocity * slow_row], axis=1)
+            return np.asarray((table @ np.stack([turn.real, turn.imag, slow])).ravel()[:count])
+
+        frame, suspended = -self._share(self.mass), self._share(self.frame_mass)
+        return State(displacement(frame), displacement(suspended), speed(frame), speed(suspended))
+
+    def rigid(self, start: State, elapsed: ArrayLike) -> State:
+        """State after ``elapsed`` time of rigid motion that begins at ``start`` (8)-(12).
+
+        At the switch momentum is kept, the relative velocity is lost and the deformation is frozen, so
+        ``rigid(start, 0)`` is the state right after the switch.  Arguments as in ``free``.
+        """
+        t = np.asarray(elapsed, dtype=np.float64)
+        _, velocity = self._centre(start)
+        way = velocity * _drift(self.alpha, t)
+        common = velocity * np.exp(-self.alpha * t)
+        return State(start.z + way, start.y + way, common, common.copy())
+
+    def internal_energy(self, state: State) -> Values:
+        """Energy of the spring, k r^2/2 [energy]."""
+        return np.asarray(self.stiffness / 2 * (state.y - state.z) ** 2)
+
+    def vibration_energy(self, state: State) -> Values:
+        """Energy of the vibration: of the spring, and mu r'^2/2 of the masses against each other [energy]."""
+        return np.asarray(self.internal_energy(state) + self.reduced_mass / 2 * (state.vy - state.vz) ** 2)
+
+    def kinetic_energy(self, state: State) -> Values:
+        """Kinetic energy of both masses [energy]."""
+        return np.asarray(self.frame_mass / 2 * state.vz**2 + self.mass / 2 * state.vy**2)
+
+    def _share(self, mass: float) -> float:
+        return mass / (self.frame_mass + self.mass)
+
+    def _centre(self, state: State) -> tuple[Values, Values]:
+        """Displacement and velocity of the centre of mass; (8) is the velocity."""
+        frame, suspended = self._share(self.frame_mass), self._share(self.mass)
+        return frame * state.z + suspended * state.y, frame * state.vz + suspended * state.vy
+
+    def _vibration(self, t: Values) -> tuple[Values, Values]:
+        """exp(-alpha t/2) times cos(omega_2 t) and sin(omega_2 t)/omega_2, continued to any damping.
+
+        Overdamped, the sum of two decaying exponentials; their slower rate alpha/2 - kappa is taken from the
+        product of the rates, omega_0^2, because the difference would cancel.
+        """
+        square = (self.omega_0 - self.alpha / 2) * (self.omega_0 + self.alpha / 2)
+        if square >= 0:
+            omega = np.sqrt(square)
+            decay = np.exp(-self.alpha / 2 * t)
+            return decay * np.cos(omega * t), decay * t * np.sinc(omega * t / np.pi)
+        kappa = np.sqrt(-square)
+        slow = np.exp(-(self.omega_0**2) / (self.alpha / 2 + kappa) * t)
+        return slow * (1 + np.exp(-2 * kappa * t)) / 2, slow * -np.expm1(-2 * kappa * t) / (2 * kappa)
+
+
+def _drift(alpha: float, t: Values) -> Values:
+    """s(t) = (1 - exp(-alpha t))/alpha, the way of a damped body of unit speed; t where alpha is 0."""
+    damping = alpha * t
+    # of the smallest products the quotient keeps no digits; there two terms of the series are exact
+    return np.where(np.abs(damping) < 1e-8, t * (1 - damping / 2), -np.expm1(-damping) / (alpha or 1.0))

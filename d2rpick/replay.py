@@ -1,0 +1,111 @@
+"""Replay: the floating oscillator run through tr and td, beside the same oscillator without switching."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.errors import RangeError
+from d2rpick.mode import Mode
+from d2rpick.oscillator import Oscillator, State
+
+if TYPE_CHECKING:
+    from d2rpick.history import Samples
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Motion from ``start`` at time ``origin`` on, rigid from ``tr`` to ``td``; RangeError unless origin <= tr <= td.
+
+    Times in the unit of the run.
+    """
+
+    oscillator: Oscillator
+    start: State
+    origin: float
+    tr: float
+    td: float
+
+    def __post_init__(self) -> None:
+        if not self.origin <= self.tr <= self.td:
+            raise RangeError(
+                f"tr {self.tr:g} and td {self.td:g} must follow each other after the start at {self.origin:g}"
+            )
+
+    def reference(self, time: Samples | float) -> State:
+        """States of the run without switching at ``time`` (7)."""
+        return self.oscillator.free(self.start, np.asarray(time) - self.origin)
+
+    def motion(self, time: Samples | float) -> State:
+        """States of the switched run at ``time``: free (7), rigid (9)-(12), free again (18).
+
+        At tr itself the state after the switch.
+        """
+        time = np.asarray(time, dtype=np.float64)
+        released = self.oscillator.rigid(self.reference(self.tr), self.td - self.tr)
+        phases = (
+            self.reference(np.minimum(time, self.tr)),
+            self.oscillator.rigid(self.reference(self.tr), np.clip(time - self.tr, 0, self.td - self.tr)),
+            self.oscillator.free(released, np.maximum(time - self.td, 0)),
+        )
+        phase = np.where(time < self.tr, 0, np.where(time < self.td, 1, 2))
+        return State(*(np.choose(phase, values) for values in zip(*phases, strict=True)))
+
+    def residual(self) -> float:
+        """Energy norm of what the switched run lacks at td, over that of the reference vibration [-]."""
+        oscillator, reference, switched = self.oscillator, self.reference(self.td), self.motion(self.td)
+        lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
+        return float(np.sqrt(oscillator.vibration_energy(lack) / oscillator.vibration_energy(reference)))
+
+
+def from_mode(mode: Mode, time: float) -> tuple[Oscillator, State]:
+    """Give an oscillator whose deformation is that of ``mode`` about its preload, and its state at ``time``.
+
+    An energy history tells neither masses nor the motion of the whole; they are chosen so that the deformation
+    equals q - q0 (k = 2), with equal masses and the centre of mass at rest.
+    """
+    mass = 4 / mode.omega_0**2
+    q, velocity = mode.deformation(time) - mode.preload, mode.velocity(time)
+    oscillator = Oscillator(stiffness=2.0, mass=mass, frame_mass=mass, alpha=mode.alpha)
+    return oscillator, State(-q / 2, q / 2, -velocity / 2, velocity / 2)
+
+
+def to_mode(oscillator: Oscillator, v0: float) -> Mode:
+    """Give the energy mode of ``oscillator`` struck at time 0: frame velocity ``v0``, all else at rest (7).
+
+    RangeError when it is not underdamped: such a motion has no vibration to lock in.
+    """
+    omega = oscillator.omega_2
+    if not omega > 0:
+        raise RangeError(
+            f"alpha {oscillator.alpha:g} damps the oscillator beyond its rate {oscillator.omega_0:g}, "
+            f"less than {2 * oscillator.omega_0:g} was expected"
+        )
+    sine = -v0 * np.sqrt(oscillator.stiffness / 2) / omega
+    return Mode(omega=omega, alpha=oscillator.alpha, cosine=0.0, sine=float(sine), origin=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Motion on an even grid of ``time`` (n,): ``state`` and both energies, arrays of the same shape."""
+
+    time: Samples
+    state: State
+    internal_energy: Samples
+    kinetic_energy: Samples
+
+
+def trajectory(
+    oscillator: Oscillator, start: State, t_end: float, dt: float, switched: Replay | None = None
+) -> Trajectory:
+    """Compute the motion at 0, dt, 2 dt, ... up to ``t_end``, of ``switched`` where it is given [time].
+
+    Times are rounded to the 14th digit of ``t_end``, so that a multiple of dt meets the switch time that is
+    written the same.
+    """
+    count = int(np.floor(t_end / dt * (1 + 1e-12))) + 1
+    time = np.round(dt * np.arange(count), 13 - int(np.floor(np.log10(t_end))))
+    state = oscillator.free_on_grid(start, dt, count) if switched is None else switched.motion(time)
+    return Trajectory(time, state, oscillator.internal_energy(state), oscillator.kinetic_energy(state))

@@ -1,0 +1,139 @@
+"""Closed forms against independent numbers, scipy's integrator, and what mechanics says must hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from d2rpick.errors import RangeError
+from d2rpick.oscillator import Oscillator, State
+from tests import paper
+
+numbers = st.floats(-2.0, 2.0)
+states = st.builds(State.of, numbers, numbers, numbers, numbers)
+# damping rates from none over the critical one (alpha/2 = omega_0) to far beyond it
+oscillators = st.builds(
+    lambda stiffness, mass, beta, ratio: Oscillator(
+        stiffness, mass, mass / beta, 2 * ratio * np.sqrt(stiffness * (1 + beta) / mass)
+    ),
+    st.floats(0.1, 1e3),
+    st.floats(0.1, 10),
+    st.floats(0.1, 10),
+    st.one_of(st.just(0.0), st.just(1.0), st.floats(0, 3), st.floats(0.999999, 1.000001)),
+)
+
+
+def scale(oscillator: Oscillator, start: State) -> float:
+    """Largest displacement and velocity that the motion can reach, for comparisons relative to it."""
+    return float(np.sum(np.abs(start)) * max(1, oscillator.omega_0, 1 / oscillator.omega_0)) + 1e-30
+
+
+@pytest.mark.parametrize("row", paper.REFERENCE)
+def test_free_motion_has_the_digits_of_an_independent_computation(row: tuple[float, ...]) -> None:
+    state = paper.OSCILLATOR.free(paper.START, row[0])
+    np.testing.assert_allclose([*state, paper.OSCILLATOR.internal_energy(state)], row[1:], rtol=1e-11)
+
+
+def test_rates_of_the_published_example() -> None:
+    assert paper.OSCILLATOR.omega_2 == pytest.approx(paper.OMEGA_2, rel=1e-14)
+    assert paper.OSCILLATOR.alpha / 2 / paper.OSCILLATOR.omega_0 == pytest.approx(0.09955710000605764, rel=1e-14)
+
+
+def test_free_motion_is_the_published_formula() -> None:
+    # (7) with s and e as the paper defines them
+    beta, alpha, v0 = 2.0, 50.0, 6.0
+    t = np.linspace(0, 0.15, 301)
+    s, e = (1 - np.exp(-alpha * t)) / alpha, np.exp(-alpha * t / 2)
+    swing = e * np.sin(paper.OMEGA_2 * t) / paper.OMEGA_2
+    state = paper.OSCILLATOR.free(paper.START, t)
+    np.testing.assert_allclose(state.z, v0 / (1 + beta) * (s + beta * swing), atol=1e-15)
+    np.testing.assert_allclose(state.y, v0 / (1 + beta) * (s - swing), atol=1e-15)
+
+
+@settings(max_examples=40, deadline=None)
+@given(oscillators, states, st.floats(0.1, 3.0))
+def test_free_motion_agrees_with_an_integrator(oscillator: Oscillator, start: State, periods: float) -> None:
+    m, mass, k, alpha = oscillator.frame_mass, oscillator.mass, oscillator.stiffness, oscillator.alpha
+
+    def equations_of_motion(_: float, u: np.ndarray) -> list[float]:  # (1)
+        z, y, vz, vy = u
+        return [vz, vy, k * (y - z) / m - alpha * vz, -k * (y - z) / mass - alpha * vy]
+
+    end = periods * 2 * np.pi / oscillator.omega_0
+    found = solve_ivp(equations_of_motion, (0, end), list(start), method="DOP853", rtol=1e-12, atol=1e-14)
+    assert found.success
+    room = 1e-9 * scale(oscillator, start)
+    np.testing.assert_allclose(np.stack(oscillator.free(start, end)), found.y[:, -1], atol=room, rtol=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(oscillators, states, st.floats(0, 5), st.floats(0, 5))
+def test_two_steps_are_one(oscillator: Oscillator, start: State, first: float, second: float) -> None:
+    whole = oscillator.free(start, first + second)
+    parts = oscillator.free(oscillator.free(start, first), second)
+    np.testing.assert_allclose(np.stack(parts), np.stack(whole), atol=1e-9 * scale(oscillator, start))
+
+
+@settings(max_examples=60, deadline=None)
+@given(oscillators, states, st.floats(0, 5))
+def test_the_centre_of_mass_ignores_the_switch(oscillator: Oscillator, start: State, elapsed: float) -> None:
+    def momentum(state: State) -> float:
+        return float(oscillator.frame_mass * state.vz + oscillator.mass * state.vy)
+
+    free, rigid = oscillator.free(start, elapsed), oscillator.rigid(start, elapsed)
+    assert momentum(rigid) == pytest.approx(momentum(free), abs=1e-10 * scale(oscillator, start) * oscillator.mass)
+    assert momentum(rigid) == pytest.approx(momentum(start) * np.exp(-oscillator.alpha * elapsed), abs=1e-9)
+    assert float(rigid.y - rigid.z) == pytest.approx(float(start.y - start.z), abs=1e-12 * scale(oscillator, start))
+    assert float(rigid.vy) == float(rigid.vz)
+
+
+@settings(max_examples=60, deadline=None)
+@given(states)
+def test_without_damping_energy_is_kept(start: State) -> None:
+    oscillator = Oscillator(stiffness=3.0, mass=2.0, frame_mass=0.7)
+    later = oscillator.free(start, np.linspace(0, 20, 50))
+    total = oscillator.internal_energy(later) + oscillator.kinetic_energy(later)
+    np.testing.assert_allclose(total, oscillator.internal_energy(start) + oscillator.kinetic_energy(start), rtol=1e-10)
+
+
+@settings(max_examples=40, deadline=None)
+@given(states, st.floats(0.2, 3))
+def test_damping_shrinks_to_none(start: State, elapsed: float) -> None:
+    undamped = Oscillator(2.0, 1.0, 0.5).free(start, elapsed)
+    nearly = Oscillator(2.0, 1.0, 0.5, alpha=1e-13).free(start, elapsed)
+    np.testing.assert_allclose(np.stack(nearly), np.stack(undamped), atol=1e-11)
+
+
+@settings(max_examples=40, deadline=None)
+@given(oscillators, states, st.integers(1, 400))
+def test_the_grid_gives_what_single_times_give(oscillator: Oscillator, start: State, count: int) -> None:
+    step = 0.01 / oscillator.omega_0
+    grid = oscillator.free_on_grid(start, step, count)
+    single = oscillator.free(start, step * np.arange(count))
+    assert grid.z.shape == (count,)
+    np.testing.assert_allclose(np.stack(grid), np.stack(single), atol=1e-11 * scale(oscillator, start))
+
+
+def test_the_loss_at_the_switch_is_the_vibration_part_of_the_kinetic_energy() -> None:
+    before = paper.OSCILLATOR.free(paper.START, 0.006)
+    after = paper.OSCILLATOR.rigid(before, 0.0)
+    lost = paper.OSCILLATOR.kinetic_energy(before) - paper.OSCILLATOR.kinetic_energy(after)
+    vibration = paper.OSCILLATOR.vibration_energy(before) - paper.OSCILLATOR.internal_energy(before)
+    assert float(lost) == pytest.approx(float(vibration), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "named"),
+    [
+        ({"stiffness": 0.0}, "stiffness"),
+        ({"mass": -1.0}, "mass"),
+        ({"frame_mass": float("nan")}, "frame_mass"),
+        ({"alpha": float("inf")}, "alpha"),
+    ],
+)
+def test_impossible_parameters_are_named(parameters: dict[str, float], named: str) -> None:
+    with pytest.raises(RangeError, match=rf"^{named} is "):
+        Oscillator(**{"stiffness": 1.0, "mass": 1.0, "frame_mass": 1.0, **parameters})

@@ -1,0 +1,146 @@
+"""Switched motion against independent numbers, and what formulas say against what the motion does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from d2rpick import measures
+from d2rpick.errors import RangeError
+from d2rpick.mode import Mode
+from d2rpick.oscillator import Oscillator, State
+from d2rpick.replay import Replay, from_mode, to_mode, trajectory
+from tests import paper
+
+modes = st.builds(
+    Mode,
+    omega=st.floats(1, 50),
+    alpha=st.floats(0, 2),
+    cosine=st.floats(-2, 2),
+    sine=st.floats(0.1, 2),
+    origin=st.floats(-1, 1),
+    preload=st.one_of(st.just(0.0), st.floats(-1, 1)),
+)
+
+
+@pytest.mark.parametrize(
+    ("tr", "td", "rows"), [(0.006, 0.080, paper.SWITCHED_6_80), (0.013, 0.064, paper.SWITCHED_13_64)]
+)
+def test_switched_motion_has_the_digits_of_an_independent_computation(
+    tr: float, td: float, rows: tuple[tuple[float, ...], ...]
+) -> None:
+    replay = Replay(paper.OSCILLATOR, paper.START, 0.0, tr, td)
+    table = np.array(rows)
+    states = replay.motion(table[:, 0])
+    np.testing.assert_allclose(np.stack(states, axis=1), table[:, 1:5], rtol=1e-11)
+    np.testing.assert_allclose(paper.OSCILLATOR.internal_energy(states), table[:, 5], rtol=1e-10)
+
+
+def test_the_spring_back_is_the_published_formula() -> None:
+    # (18) with beta = 2, from the state at td that (9)-(12) give
+    tr, td, alpha, beta, omega = 0.006, 0.080, 50.0, 2.0, paper.OMEGA_2
+    replay = Replay(paper.OSCILLATOR, paper.START, 0.0, tr, td)
+    at = replay.motion(td)
+    tau = np.linspace(0, 0.07, 200)
+    g = 1 - np.exp(-alpha * tau / 2) * (np.cos(omega * tau) + alpha / (2 * omega) * np.sin(omega * tau))
+    drift = at.vz * (1 - np.exp(-alpha * tau)) / alpha
+    frozen = at.y - at.z
+    later = replay.motion(td + tau)
+    np.testing.assert_allclose(later.z, at.z + drift + beta * frozen / (1 + beta) * g, atol=1e-15)
+    np.testing.assert_allclose(later.y, at.y + drift - frozen / (1 + beta) * g, atol=1e-15)
+
+
+@settings(max_examples=80, deadline=None)
+@given(modes, st.floats(0, 3), st.floats(0, 3))
+def test_measures_by_formula_are_those_of_the_motion(mode: Mode, tr: float, window: float) -> None:
+    td = tr + window
+    oscillator, start = from_mode(mode, tr)
+    replay = Replay(oscillator, start, tr, tr, td)
+    at_td = replay.reference(td)
+    whole = float(oscillator.vibration_energy(at_td))
+    assume(whole > 1e-9)
+    kinetic = measures.kinetic_share(mode, td)
+    lock_in = measures.lock_in_error(mode, tr, td)
+    assert kinetic == pytest.approx(1 - float(oscillator.internal_energy(at_td)) / whole, abs=1e-7)
+    frozen = replay.motion(td)
+    apart = float((frozen.y - frozen.z) - (at_td.y - at_td.z))
+    assert lock_in == pytest.approx(abs(apart) / np.sqrt(whole), abs=1e-6, rel=1e-7)
+    assert replay.residual() == pytest.approx(measures.residual(lock_in, kinetic), abs=1e-6, rel=1e-7)
+
+
+@settings(max_examples=40, deadline=None)
+@given(modes, st.floats(0, 3), st.floats(0.01, 2))
+def test_the_residual_stays_what_it_is_at_td_while_nothing_damps(mode: Mode, tr: float, window: float) -> None:
+    still = Mode(mode.omega, 0.0, mode.cosine, mode.sine, mode.origin)
+    oscillator, start = from_mode(still, tr)
+    replay = Replay(oscillator, start, tr, tr, tr + window)
+    later = tr + window + np.linspace(0, 3, 20)
+    lack = State(*(a - b for a, b in zip(replay.motion(later), replay.reference(later), strict=True)))
+    share = oscillator.vibration_energy(lack) / oscillator.vibration_energy(replay.reference(later))
+    np.testing.assert_allclose(np.sqrt(share), replay.residual(), atol=1e-7)
+
+
+def test_td_on_an_energy_peak_continues_the_reference_exactly() -> None:
+    replay = Replay(paper.OSCILLATOR, paper.START, 0.0, paper.BETTER_TR, paper.BETTER_TD)
+    later = np.linspace(paper.BETTER_TD, 0.15, 100)
+    switched, reference = replay.motion(later), replay.reference(later)
+    np.testing.assert_allclose(switched.y - switched.z, reference.y - reference.z, atol=1e-14)
+    assert replay.residual() < 1e-10
+
+
+def test_the_published_pair_loses_nearly_all_vibration() -> None:
+    mode = to_mode(paper.OSCILLATOR, 6.0)
+    assert measures.kinetic_share(mode, paper.TD) == pytest.approx(paper.KINETIC_SHARE, rel=1e-10)
+    assert measures.residual(measures.lock_in_error(mode, 0.0128852793630525, paper.TD), paper.KINETIC_SHARE) == (
+        pytest.approx(0.957444, abs=1e-6)
+    )
+
+
+def test_a_rigid_phase_of_no_length_loses_the_vibration_velocity_only() -> None:
+    replay = Replay(paper.OSCILLATOR, paper.START, 0.0, 0.01, 0.01)
+    at, before = replay.motion(0.01), replay.reference(0.01)
+    np.testing.assert_allclose([at.z, at.y], [before.z, before.y], rtol=1e-13)
+    assert float(at.vz) == float(at.vy)
+
+
+def test_at_tr_itself_stands_the_state_after_the_switch() -> None:
+    replay = Replay(paper.OSCILLATOR, paper.START, 0.0, 0.006, 0.08)
+    motion = trajectory(paper.OSCILLATOR, paper.START, 0.1, 0.001, replay)
+    assert motion.time[6] == 0.006
+    assert motion.state.vz[6] == motion.state.vy[6] == pytest.approx(1.481636441363, rel=1e-11)
+    assert motion.state.vz[5] != motion.state.vy[5]
+
+
+def test_the_grid_of_a_trajectory_ends_where_it_should() -> None:
+    assert trajectory(paper.OSCILLATOR, paper.START, 0.15, 1e-4).time[-1] == 0.15
+    assert trajectory(paper.OSCILLATOR, paper.START, 0.01, 0.003).time.tolist() == [0.0, 0.003, 0.006, 0.009]
+
+
+def test_an_oscillator_given_as_mode_has_its_energy() -> None:
+    mode, time = to_mode(paper.OSCILLATOR, 6.0), np.linspace(0, 0.15, 400)
+    np.testing.assert_allclose(mode.energy(time), paper.energy(time), atol=1e-12)
+
+
+def test_times_must_follow_each_other() -> None:
+    with pytest.raises(RangeError, match="must follow"):
+        Replay(paper.OSCILLATOR, paper.START, 0.0, 0.08, 0.06)
+
+
+def test_an_overdamped_oscillator_has_no_mode() -> None:
+    with pytest.raises(RangeError, match="damps the oscillator beyond"):
+        to_mode(Oscillator(1.0, 1.0, 1.0, alpha=10.0), 1.0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(modes, st.floats(0, 3), st.floats(0, 3))
+def test_the_timing_tolerance_is_where_the_error_has_grown(mode: Mode, tr: float, window: float) -> None:
+    td = tr + window
+    assume(float(mode.vibration_energy(td)) > 1e-6)
+    tolerance, here = measures.timing_tolerance(mode, tr, td), measures.lock_in_error(mode, tr, td)
+    grown = here + measures.TOLERATED_GROWTH
+    inside = np.linspace(tr - tolerance, tr + tolerance, 501)[1:-1]
+    assert max(measures.lock_in_error(mode, float(t), td) for t in inside) <= grown * (1 + 1e-9) + 1e-9
+    ends = [measures.lock_in_error(mode, tr + side * tolerance, td) for side in (-1, 1)]
+    assert max(ends) == pytest.approx(grown, rel=1e-6) or tolerance == pytest.approx(2 * np.pi / mode.omega)
