@@ -1,0 +1,158 @@
+"""Fit the energy of one vibration mode to samples by least squares, without being given a first guess.
+
+Everything here is scaled: s in [0, 1] over the record, energies in units of the record's range.  A parameter
+vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
+
+    E(s) = energy_plastic + q**2,  q = preload + exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from d2rpick.history import Samples
+
+VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6  # free parameters of the three models
+
+# Of the matrix pencil:
+_ORDERS: Final = (3, 4, 6)  # exponentials in q**2: of a vibration, with plastic work, and with a preload
+_LAGS: Final = 64  # a third of the fewest cells, its optimum against noise
+_MIN_CELLS: Final = 192
+_MAX_CELLS: Final = 8192  # bounds memory at 5 MB; enough for 1000 periods of the energy
+_CELLS_PER_PERIOD: Final = 24  # of the strongest vibration in E, which a preload makes the slower of two
+
+# Of the least squares:
+_COARSE: Final = 400  # samples on which starts are compared and first refined
+_STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
+_CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
+_MAX_STEPS: Final = 40  # a good start needs 4 to 8
+
+
+def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Samples, Samples]:
+    """Return E(s), shape (n,), and its derivatives by the first ``size`` parameters, shape (size, n)."""
+    omega, alpha, cosine, sine, plastic, preload = parameters
+    angle, decay = omega * s, np.exp(-alpha / 2 * s)
+    cos, sin = decay * np.cos(angle), decay * np.sin(angle)
+    swing = cosine * cos + sine * sin
+    q = preload + swing
+    jacobian = np.ones((6, s.size))
+    jacobian[0] = 2 * q * s * (sine * cos - cosine * sin)
+    jacobian[1] = -q * s * swing
+    jacobian[2] = 2 * q * cos
+    jacobian[3] = 2 * q * sin
+    jacobian[5] = 2 * q
+    return plastic + q * q, jacobian[:size]
+
+
+def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) -> Samples:
+    """Return the least-squares parameters with the first ``size`` of them free, the others zero."""
+    stride = -(-s.size // _COARSE)
+    coarse_s, coarse_e = s[::stride], e[::stride]
+    enough = _CERTAIN * float(np.sum((coarse_e - np.mean(coarse_e)) ** 2))
+    best, least = np.zeros(6), np.inf
+    for start in _starts(poles, coarse_s, coarse_e, size):
+        found, cost = _minimise(start, coarse_s, coarse_e, size)
+        if cost < least:
+            best, least = found, cost
+        if least < enough:
+            break
+    if stride > 1:
+        best = _minimise(best, s, e, size)[0]
+    if best[5] < 0:  # q and -q make the same energy; the preload is taken positive
+        best[[2, 3, 5]] *= -1
+    if best[0] < 0:
+        best[[0, 3]] *= -1
+    return best
+
+
+def rates(s: Samples, e: Samples) -> NDArray[np.complex128]:
+    """Read the complex rates p = -damping + i frequency of exp(p s) that E may consist of, frequency > 0.
+
+    Matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 1990): the leading right singular vectors of the
+    Hankel matrix of equidistant values span the exponentials, and shifting them by one cell multiplies
+    each by exp(p h).  Means over cells of an exponential are the same exponential, so cells also serve
+    dense records.
+    """
+    integral = np.concatenate(([0.0], np.cumsum((e[1:] + e[:-1]) / 2 * np.diff(s))))
+    fine = np.diff(np.interp(np.linspace(0, 1, s.size), s, integral))
+    power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
+    periods = int(np.argmax(power * np.arange(power.size)))  # per octave: decay alone must not win
+    count = min(max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS)
+    cells = np.diff(np.interp(np.linspace(0, 1, count + 1), s, integral)) * count
+    hankel = np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
+    vectors = np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1]
+    found = []
+    for order in _ORDERS:
+        v = vectors[:, :order]
+        found.append(np.linalg.eigvals(np.linalg.lstsq(v[:-1], v[1:], rcond=None)[0]))
+    z = np.concatenate(found).astype(np.complex128)
+    z = z[(z.imag > 0) & (np.abs(z) > 0)]
+    poles: NDArray[np.complex128] = np.log(z) * count
+    return poles
+
+
+def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) -> list[Samples]:
+    """Return the best parameter vectors to start from, for a model with ``size`` free parameters.
+
+    A rate p is that of q**2 (alpha = -Re p, omega = Im p / 2) or, with a preload, that of q (alpha = -2 Re p,
+    omega = Im p).  For known rates E is linear in products of the other parameters, and their fit ranks the
+    rates and gives the parameters.
+    """
+    omega, alpha = poles.imag / 2, -poles.real
+    if size == WITH_PRELOAD:
+        omega, alpha = np.concatenate((omega, 2 * omega)), np.concatenate((alpha, 2 * alpha))
+    alpha = np.maximum(alpha, -1.0)  # growth is refused anyway; keep exp from overflowing
+    vibration = np.exp(s * (1j * omega - alpha / 2)[:, None])
+    square = vibration * vibration
+    rows = [np.abs(square), square.real, square.imag, np.ones(square.shape), vibration.real, vibration.imag]
+    basis = np.stack(rows[: {VIBRATION: 3, WITH_PLASTIC: 4, WITH_PRELOAD: 6}[size]], axis=1)
+    norm = np.linalg.norm(basis, axis=2)
+    normal = basis @ basis.transpose(0, 2, 1) / (norm[:, :, None] * norm[:, None, :])
+    right = (basis @ e / norm)[..., None]
+    linear = np.linalg.solve(normal + 1e-10 * np.eye(norm.shape[1]), right)[..., 0] / norm
+    misfit = np.sum((e - (linear[:, None] @ basis)[:, 0]) ** 2, axis=1)
+    linear = np.pad(linear, ((0, 0), (0, 6 - linear.shape[1])))
+    phasor = np.sqrt(2 * (linear[:, 1] + 1j * linear[:, 2]))  # (cosine + i sine)**2 / 2
+    mixed = linear[:, 4] + 1j * linear[:, 5]  # 2 preload (cosine + i sine)
+    preload = (mixed * phasor.conj()).real / (2 * np.abs(phasor) ** 2 + 1e-12)
+    plastic = linear[:, 3] - preload**2
+    table = np.stack((omega, alpha, phasor.real, phasor.imag, plastic, preload), axis=1)
+    best: list[Samples] = []
+    for start in table[np.argsort(misfit)]:
+        # within half a radian over the record two starts lie in the same valley
+        if all(abs(start[0] - other[0]) > 0.5 or abs(start[1] - other[1]) > 0.5 for other in best):
+            best.append(start)
+    return best[:_STARTS]
+
+
+@np.errstate(over="ignore", invalid="ignore")  # a trial step too far; it is rejected
+def _minimise(parameters: Samples, s: Samples, e: Samples, size: int) -> tuple[Samples, float]:
+    """Refine the first ``size`` parameters by Levenberg-Marquardt; return them and the sum of squares."""
+    damping = 1e-4  # of the unit diagonal: starts are close, so steps may be long
+    model, jacobian = energy_and_jacobian(parameters, s, size)
+    rest = e - model
+    cost = float(rest @ rest)
+    for _ in range(_MAX_STEPS):
+        normal, gradient = jacobian @ jacobian.T, jacobian @ rest
+        scale = np.sqrt(np.diag(normal)) + 1e-150
+        normal = normal / (scale * scale[:, None]) + damping * np.eye(size)
+        step = np.zeros(6)
+        step[:size] = np.linalg.solve(normal, gradient / scale) / scale
+        trial = parameters + step
+        model, trial_jacobian = energy_and_jacobian(trial, s, size)
+        rest_trial = e - model
+        trial_cost = float(rest_trial @ rest_trial)
+        expected = float(step[:size] @ gradient)
+        if trial_cost <= cost:
+            parameters, rest, jacobian, cost = trial, rest_trial, trial_jacobian, trial_cost
+            damping = max(damping / 10, 1e-10)
+        else:
+            damping *= 10
+        if expected <= 1e-12 * cost + 1e-31 * s.size:
+            break
+    return parameters, cost

@@ -1,0 +1,280 @@
+"""Identify the one vibration mode behind an internal energy history, or say why there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.fitting import VIBRATION, WITH_PLASTIC, WITH_PRELOAD, energy_and_jacobian, fit, rates
+from d2rpick.mode import Mode
+
+if TYPE_CHECKING:
+    from d2rpick.history import Samples
+
+# Thresholds of acceptance.  White noise may be large; what a true model must not leave over is structure, the
+# part of the misfit that neighbouring samples share.
+MAX_MISFIT: Final = 0.4  # beyond, more than 16 % of the variance is unexplained and can hide another mode
+MAX_STRUCTURE: Final = 0.02  # of std(E): thirty times what one real solver leaves with one mode
+MAX_LOCAL_STRUCTURE: Final = 0.1  # of the fit's energy at that time: a second mode that outlives the first
+MIN_SAMPLES: Final = 24  # four for each parameter of the richest model
+MIN_SAMPLES_PER_PERIOD: Final = 10  # of the energy, pi / omega: below, an aliased fast mode passes for a slow one
+MAX_GROWTH: Final = 0.3  # -alpha x record length: a free vibration only decays, noise hides no more than this
+MIN_PLASTIC: Final = -0.05  # of the energy range: plastic work is positive but for the scatter of its fit
+
+# The energy below which a rest is not held against a mode: a solver errs by 1e-5 of the maximum anywhere.
+_FLOOR: Final = 1e-4  # of the highest vibration energy
+
+# Free parameters of the models, simplest first, and the vibration periods it takes to tell them apart.
+_MODELS: Final = ((VIBRATION, 1.25), (WITH_PLASTIC, 1.5), (WITH_PRELOAD, 2.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """The mode that was fitted to an energy history, and whether it describes it.
+
+    Parameters
+    ----------
+    mode : Mode or None
+        Least-squares fit, also when it was refused; None when nothing could be fitted.
+    describes_record : bool
+        True when the fit was accepted.
+    reason : str or None
+        Why it was refused.
+    misfit : float or None
+        rms(E - fit) / std(E) over the window [-].
+    rms : float
+        rms(E - fit) [energy]; NaN without a mode, as is ``structure``.
+    structure : float
+        The part of ``rms`` that neighbouring samples share and white noise does not leave [energy].
+    start, end : float
+        Window of the fit [time].
+    covariance : array of shape (p, p)
+        Of omega, alpha, cosine, sine and, where the model has them, energy_plastic and preload; for
+        independent errors of the samples.
+    """
+
+    mode: Mode | None
+    describes_record: bool
+    reason: str | None
+    misfit: float | None
+    rms: float
+    structure: float
+    start: float
+    end: float
+    covariance: Samples
+
+    def energy_deviation(self, times: Samples | float) -> Samples:
+        """Return the standard deviation of the fitted energy at ``times`` [energy]; NaN without a mode.
+
+        To first order in the errors of the parameters, the root of the diagonal of J C J^T.
+        """
+        t = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        if self.mode is None:
+            return np.full(t.shape, np.nan)
+        m = self.mode
+        parameters = np.array([m.omega, m.alpha, m.cosine, m.sine, m.energy_plastic, m.preload])
+        jacobian = energy_and_jacobian(parameters, t - m.origin, len(self.covariance))[1]
+        variance: Samples = np.sum(jacobian * (self.covariance @ jacobian), axis=0)
+        return np.sqrt(np.maximum(variance, 0.0))
+
+
+def identify(time: Samples, energy: Samples) -> Identification:
+    """Fit one vibration to E(t), else one over plastic work, else one about a preload, and judge the fit.
+
+    Parameters
+    ----------
+    time : array of shape (n,)
+        Strictly increasing, equidistant or not [time].
+    energy : array of shape (n,)
+        Internal energy; may be zero or negative, as some solvers write it [energy].
+
+    Returns
+    -------
+    Identification
+        With its reason where no model describes the record; nothing is raised.
+
+    Notes
+    -----
+    The energy is that of eqs. (1) and (7) of "Analysis of switched-rigid floating oscillator" (Shock and
+    Vibration), E = k (y - z)**2 / 2, extended by plastic work and a preload.  Overdamped motion shows no rate
+    and cannot be identified.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 3.0, 121)
+    >>> found = identify(t, (np.exp(-0.3 * t) * np.sin(5.0 * t)) ** 2)
+    >>> found.describes_record, f"{found.mode.omega:.9f}", f"{found.mode.alpha:.9f}"
+    (True, '5.000000000', '0.600000000')
+    >>> identify(t, np.ones(121)).reason
+    'the energy is constant, 1: nothing vibrates'
+    """
+    lacking = _lacking(time, energy)
+    if lacking:
+        return _nothing(time, lacking)
+    record = _Record.scaled(time, energy)
+    poles = rates(record.s, record.e)
+    if poles.size == 0:
+        return _nothing(time, "the energy does not oscillate: nothing vibrates, or it is overdamped")
+    refused = []
+    for size, least_periods in _MODELS:
+        attempt, follows = _judged(fit(poles, record.s, record.e, size), size, least_periods, record)
+        if follows:  # a richer model would follow as well, and be no more plausible
+            return attempt
+        refused.append(attempt)
+    return min(refused, key=lambda attempt: attempt.rms)
+
+
+def assess(mode: Mode, time: Samples, energy: Samples) -> Identification:
+    """Hold a mode that is known, not fitted, against a record: it must follow the samples as a fit must.
+
+    Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
+    """
+    lacking = _lacking(time, energy)
+    if lacking:
+        return _nothing(time, lacking)
+    record = _Record.scaled(time, energy)
+    start = record.start
+    cosine = mode.deformation(start) - mode.preload
+    sine = (mode.velocity(start) + mode.alpha / 2 * cosine) / mode.omega
+    parameters = np.array([mode.omega, mode.alpha, cosine, sine, mode.energy_plastic, mode.preload])
+    held, follows = _judged(parameters / record.units, WITH_PRELOAD, 0.0, record)
+    reason = None if follows else held.reason
+    return replace(held, mode=mode, describes_record=follows, reason=reason, covariance=np.zeros((6, 6)))
+
+
+class _Record(NamedTuple):
+    """A record in units of its length and energy range, so that no unit system over- or underflows."""
+
+    s: Samples
+    e: Samples
+    start: float
+    end: float
+    scale: float
+
+    @classmethod
+    def scaled(cls, time: Samples, energy: Samples) -> _Record:
+        start, end, scale = float(time[0]), float(time[-1]), float(np.ptp(energy))
+        return cls((time - start) / (end - start), energy / scale, start, end, scale)
+
+    @property
+    def units(self) -> Samples:
+        """Units of the parameters of a fit in those of the record."""
+        rate, root = 1 / (self.end - self.start), self.scale**0.5
+        return np.array([rate, rate, root, root, self.scale, root])
+
+
+def _lacking(time: Samples, energy: Samples) -> str | None:
+    """Say what a record lacks for any judgement."""
+    if time.size < MIN_SAMPLES:
+        return f"the record has {time.size} samples, fewer than the {MIN_SAMPLES} a fit needs"
+    if float(np.ptp(energy)) <= 1e-12 * float(np.max(np.abs(energy))):  # the rounding of a constant
+        return f"the energy is constant, {energy[0]:g}: nothing vibrates"
+    return None
+
+
+def _judged(parameters: Samples, size: int, least_periods: float, record: _Record) -> tuple[Identification, bool]:
+    """Return a fit with its verdict, and whether it follows the samples."""
+    s, e = record.s, record.e
+    fitted, jacobian = energy_and_jacobian(parameters, s, size)
+    rest = e - fitted
+    rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), _structure(rest)
+    scaled = _mode(parameters, 0.0)
+    vibration = scaled.vibration_energy(s)
+    # where noise exceeds the vibration, a rest says nothing about a second mode
+    local_structure = _structure(rest / np.maximum(vibration, max(rms, _FLOOR * np.max(vibration))))
+    loose = _loose(rms / spread, structure / spread, local_structure)
+    # the interval that a moment of the record lies in, on average: gaps count by their length
+    interval = float(np.sum(np.diff(s) ** 2))
+    reason = loose or _implausible(scaled, interval, least_periods, record.end - record.start)
+    units = record.units[:size]
+    found = Identification(
+        mode=_mode(parameters * record.units, record.start),
+        describes_record=reason is None,
+        reason=reason,
+        misfit=rms / spread,
+        rms=rms * record.scale,
+        structure=structure * record.scale,
+        start=record.start,
+        end=record.end,
+        covariance=_covariance(jacobian, rest) * units * units[:, None],
+    )
+    return found, loose is None
+
+
+def _loose(misfit: float, structure: float, local_structure: float) -> str | None:
+    """Say how the fit fails to follow the samples."""
+    if misfit > MAX_MISFIT:
+        return f"one oscillator misses the energy by {misfit:.2g} of its standard deviation, more than {MAX_MISFIT}"
+    if structure > MAX_STRUCTURE:
+        return (
+            f"one oscillator leaves a systematic rest of {structure:.2g} of the energy's standard deviation, "
+            f"more than {MAX_STRUCTURE}"
+        )
+    if local_structure > MAX_LOCAL_STRUCTURE:
+        return (
+            f"one oscillator leaves a systematic rest of {local_structure:.2g} of the vibration energy "
+            f"at the time, more than {MAX_LOCAL_STRUCTURE}"
+        )
+    return None
+
+
+def _implausible(mode: Mode, interval: float, least_periods: float, span: float) -> str | None:
+    """Say why a scaled fit that follows the samples is still no evidence of one free vibration."""
+    periods = mode.omega / (2 * np.pi)
+    if periods < least_periods:
+        return (
+            f"the record shows {periods:.3g} vibration periods, fewer than the {least_periods} that tell a "
+            "vibration from a drift"
+        )
+    if mode.alpha < -MAX_GROWTH:
+        return (
+            f"the vibration grows, alpha times the record's length is {mode.alpha:.2g}, below {-MAX_GROWTH}: "
+            "something feeds it"
+        )
+    if mode.energy_plastic < MIN_PLASTIC:
+        share = mode.energy_plastic
+        return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
+    density = 1 / (2 * periods * interval)  # the energy has two periods in one of the vibration
+    if density < MIN_SAMPLES_PER_PERIOD:
+        # a tenth finer than the limit, so that rounding to two digits stays on its safe side
+        finer = span / (2 * periods) / (1.1 * MIN_SAMPLES_PER_PERIOD)
+        return (
+            f"the energy has {density:.1f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}, and "
+            f"aliasing may fake this mode: ask for an output interval of {finer:.2g} or less"
+        )
+    return None
+
+
+def _structure(rest: Samples) -> float:
+    """Root of the covariance of neighbours in ``rest`` beyond three standard deviations of white noise's.
+
+    The larger of lags 1 and 2: a vibration sampled four times per period shows at the second only.
+    """
+    excess = 0.0
+    for lag in (1, 2):
+        products = rest[:-lag] * rest[lag:]
+        excess = max(excess, abs(float(np.sum(products))) - 3 * float(np.linalg.norm(products)))
+    return float(np.sqrt(excess / rest.size))
+
+
+def _covariance(jacobian: Samples, rest: Samples) -> Samples:
+    """s**2 (J J^T)^-1, by the pseudo-inverse of the matrix scaled to a unit diagonal."""
+    norm = np.linalg.norm(jacobian, axis=1)
+    norm[norm == 0] = 1.0
+    unit = jacobian / norm[:, None]
+    variance = float(rest @ rest) / (rest.size - norm.size)
+    covariance: Samples = variance * np.linalg.pinv(unit @ unit.T, hermitian=True) / (norm * norm[:, None])
+    return covariance
+
+
+def _mode(parameters: Samples, origin: float) -> Mode:
+    omega, alpha, cosine, sine, plastic, preload = parameters.tolist()
+    return Mode(omega, alpha, cosine, sine, origin, plastic, preload)
+
+
+def _nothing(time: Samples, reason: str) -> Identification:
+    """Refuse a record to which nothing was fitted."""
+    start, end = (float(time[0]), float(time[-1])) if time.size else (np.nan, np.nan)
+    return Identification(None, False, reason, None, np.nan, np.nan, start, end, np.zeros((0, 0)))
