@@ -1,0 +1,261 @@
+"""How a table of numbers is laid out: separator, decimal sign, first row, names and units of the columns."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from d2rpick.errors import FormatError
+from d2rpick.readers.names import is_time, is_unit, listing, unit_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+_COMMENTS = ("#", "$", "%", "//")
+
+# Separator (None: blanks) and decimal sign, in the order they are tried.  Comma and decimal comma together
+# cannot be read for sure.
+_FORMS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (None, "."), (None, ","))
+
+_NUMBER = {
+    "." : re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII),
+    ",": re.compile(r"[+-]?(?:\d+,?\d*|,\d+)(?:[eEdD][+-]?\d+)?", re.ASCII),
+}  # fmt: skip
+_MISSING = frozenset({"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null"})
+_SEP_LINE = re.compile(r"sep=(.)", re.IGNORECASE)
+_DECIMAL_PART = re.compile(r"[+-]?0\d+")
+
+# Rows looked at to find the layout: more than any header has lines.
+_LOOK_AT = 60
+_SHORT = 60
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Form of a table whose rows begin at line index ``start`` and have ``columns`` values each.
+
+    ``names`` and ``units`` are empty where the file has none.  Where there are more names than columns, only
+    the first two may be used.  ``title`` is what the file calls the curve, apart from its column's name.
+    """
+
+    separator: str | None
+    decimal: str
+    start: int
+    columns: int
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    title: str = ""
+
+    @property
+    def trusted(self) -> int:
+        """How many columns, from the first, may be used."""
+        return self.columns if len(self.names) <= self.columns else 2
+
+    def name(self, column: int) -> str:
+        """Name of a column in the file, or its number."""
+        name = self.names[column] if column < len(self.names) else ""
+        return name or f"column {column + 1}"
+
+    def channel(self, column: int) -> str:
+        """Name of a column and, where it has one, of its curve."""
+        return f"{self.name(column)}: {self.title}" if self.title else self.name(column)
+
+    def unit(self, column: int) -> str:
+        """Return the unit of a column as the file names it, or nothing."""
+        if self.units:
+            return self.units[column].strip("()[]")
+        return unit_of(self.names[column]) if self.names else ""
+
+
+def split(line: str, separator: str | None) -> list[str]:
+    """Cells of a line, without blanks and quotes around them; a separator inside quotes does not count.
+
+    Examples
+    --------
+    >>> split('"part 3, left", 1.5 ,', ",")
+    ['part 3, left', '1.5', '']
+    """
+    if '"' not in line:
+        return line.split() if separator is None else [cell.strip() for cell in line.split(separator)]
+    sign = separator or " "
+    cells: list[str] = []
+    inside = False
+    for piece in (line if separator else " ".join(line.split())).split(sign):
+        if inside:
+            cells[-1] += sign + piece
+        else:
+            cells.append(piece)
+        inside ^= piece.count('"') % 2 == 1
+    return [cell.strip().removeprefix('"').removesuffix('"').strip() for cell in cells]
+
+
+def is_skipped(line: str) -> bool:
+    """Whether a line is blank or a comment."""
+    line = line.lstrip()
+    return not line or line.startswith(_COMMENTS)
+
+
+def as_number(cell: str, decimal: str) -> float | None:
+    """Return the number in a cell, or None; words and underscores are none, though Python takes them."""
+    if not _NUMBER[decimal].fullmatch(cell):
+        return None
+    return float(cell.replace(",", ".").replace("D", "E").replace("d", "e"))
+
+
+def find_layout(source: str, lines: Sequence[str], unended: str) -> Layout:
+    """Find the layout of a table.
+
+    Parameters
+    ----------
+    source : str
+        Name for messages.
+    lines : sequence of str
+        The lines that have an end.
+    unended : str
+        The last line when it has none, which is looked at only if there is no other row; else empty.
+
+    Raises
+    ------
+    FormatError
+        If the lines are no table, or one whose columns cannot be told for sure.
+    """
+    if lines and lines[0].startswith("Curveplot"):
+        raise FormatError(f"{source}: an LS-PrePost Curveplot is not read; export the curve as CSV")
+    told = _SEP_LINE.fullmatch(lines[0].strip()) if lines else None
+    first, separator = (1, told[1]) if told else (0, "")
+    bare = _find_rows(lines, first, separator) or _find_rows([*lines, unended], first, separator)
+    if bare is None:
+        number, line = next(((n, line) for n, line in enumerate([*lines, unended], 1) if not is_skipped(line)), (1, ""))
+        raise FormatError(
+            f"{source}:{number}: {_short(line)} and no rows of at least two numbers below; "
+            "expected a table of time and energy; check that this is the right file"
+        )
+    _refuse_odd_rows(source, lines, first, bare)
+    _refuse_decimal_commas(source, lines, bare)
+    return _with_header(source, lines[first : bare.start], bare)
+
+
+def _find_rows(lines: Sequence[str], first: int, separator: str) -> Layout | None:
+    """Take the form in which most lines are rows, with words or without, else any with rows of numbers."""
+    numbered = ((i, line) for i, line in enumerate(lines) if i >= first and not is_skipped(line))
+    sample = list(islice(numbered, _LOOK_AT))
+    for only_numbers in (False, True):
+        best, most = None, 0 if only_numbers else len(sample) // 2
+        for sign, decimal in _FORMS:
+            if separator and sign != separator:
+                continue
+            cells = [(i, split(line, sign)) for i, line in sample]
+            kinds = [(i, row, kind) for i, row in cells if (kind := _kind(row, decimal, only_numbers))]
+            if not kinds:
+                continue
+            common, times = Counter(kind for _, _, kind in kinds).most_common(1)[0]
+            alike = [(i, row) for i, row, kind in kinds if _is_like(kind, common)]
+            closed = not any(row[-1] for _, row in alike)  # every row ends with a separator
+            if len(common) - closed > 1 and times > most:
+                best, most = Layout(sign, decimal, alike[0][0], len(common) - closed), times
+        if best:
+            return best
+    return None
+
+
+def _kind(cells: list[str], decimal: str, only_numbers: bool) -> tuple[bool, ...]:
+    """Which cells of a row are numbers or empty; nothing for what is no row."""
+    numbers = tuple(cell.casefold() in _MISSING or as_number(cell, decimal) is not None for cell in cells)
+    words = [cell for cell, number in zip(cells, numbers, strict=True) if not number]
+    # A word begins with a letter: "5 load 1" is a piece of "0,5 load 1,5", cut at the wrong places.
+    is_row = sum(numbers) > 1 and all(word[0].isalpha() and not only_numbers for word in words)
+    return numbers if is_row else ()
+
+
+def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
+    return len(kind) == len(common) and all(here or not there for here, there in zip(kind, common, strict=True))
+
+
+def _refuse_odd_rows(source: str, lines: Sequence[str], first: int, table: Layout) -> None:
+    """Refuse a line above the rows that begins with a number: a row unlike the others, not a header."""
+    for number, line in enumerate(lines[first : table.start], first + 1):
+        cells = [] if is_skipped(line) else split(line, table.separator)
+        if cells and as_number(cells[0], table.decimal) is not None:
+            raise FormatError(
+                f"{source}:{number}: {_short(line)} is unlike the rows below, "
+                f"{table.columns} values were expected; repair or delete the line"
+            )
+
+
+def _refuse_decimal_commas(source: str, lines: Sequence[str], table: Layout) -> None:
+    """Refuse ``0,05,1,25``: integers throughout, some with leading zeros, are halves of numbers."""
+    if table.separator != ",":
+        return
+    for number, line in enumerate(lines[table.start : table.start + _LOOK_AT], table.start + 1):
+        cells = split(line, ",")
+        if any(map(_DECIMAL_PART.fullmatch, cells)) and not any("." in cell for cell in cells):
+            raise FormatError(
+                f"{source}:{number}: {_short(line)} looks like decimal commas between commas, "
+                "which cannot be told apart; write the file with semicolons or decimal points"
+            )
+
+
+def _with_header(source: str, lines: Sequence[str], table: Layout) -> Layout:
+    """Add names, units and title from the lines above the rows."""
+    rows = list(_header_rows(lines, table))
+    units: tuple[str, ...] = ()
+    if len(rows) > 1 and len(rows[-1]) == table.columns and all(map(is_unit, rows[-1])):
+        units = tuple(rows.pop())
+    if not rows:
+        return replace(table, names=_commented_names(lines, table), units=units)
+    names, title = rows[-1], ""
+    if len(names) > 1 and not names[-1]:
+        names = names[:-1]
+        if len(rows) > 1:  # LS-PrePost: a line of titles, then "Time," or "Time,A8874,"
+            title = next((cell for cell in reversed(rows[-2]) if cell), "")
+    if table.columns == 2 and len(names) == 1 and is_time(names[0]):
+        names, title = [names[0], title], ""
+    if len(names) == 1:
+        return replace(table, units=units, title=names[0])
+    if len(names) < table.columns or (len(names) > table.columns and not is_time(names[0])):
+        raise FormatError(
+            f"{source}:{table.start + 1}: {table.columns} values below a header of {len(names)} names "
+            f"({listing(names)}), expected as many of both; correct the header or delete it"
+        )
+    if table.columns == 2 < len(names):
+        title = " ".join(filter(None, names[2:]))  # 3DEXPERIENCE: the third name is the curve's
+    return replace(table, names=tuple(names), units=units, title=title)
+
+
+def _header_rows(lines: Sequence[str], table: Layout) -> Iterator[list[str]]:
+    """Cells of the header lines; a quoted name may go on over a line end."""
+    pending = ""
+    for line in lines:
+        if not pending and is_skipped(line):
+            continue
+        pending = f"{pending} {line}" if pending else line
+        if pending.count('"') % 2 == 0:
+            yield _header_cells(pending, table)
+            pending = ""
+    if pending:
+        yield _header_cells(pending, table)
+
+
+def _header_cells(line: str, table: Layout) -> list[str]:
+    """Cells of a header line; between blanks names may hold blanks, and what does not fit is one title."""
+    if table.separator is not None:
+        return split(line, table.separator)
+    wide = [cell.strip('"') for cell in re.split(r"\s{2,}|\t", line.strip())]
+    narrow = split(line, None)
+    return next((cells for cells in (wide, narrow) if len(cells) == table.columns), [line.strip()])
+
+
+def _commented_names(lines: Sequence[str], table: Layout) -> tuple[str, ...]:
+    """Names in the last comment line, as numpy.savetxt writes them: one per column, among them a time."""
+    comments = [line.strip().lstrip("#$%/ ") for line in lines if line.strip()]
+    cells = _header_cells(comments[-1], table) if comments else []
+    return tuple(cells) if len(cells) == table.columns and any(map(is_time, cells)) else ()
+
+
+def _short(line: str) -> str:
+    """Quote a line in a message, cut to what is readable."""
+    line = line.strip()
+    return repr(line if len(line) <= _SHORT else line[:_SHORT] + "...")

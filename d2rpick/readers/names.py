@@ -1,0 +1,133 @@
+"""What analysts and programs call the columns of a history, and the units they append."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+TIME_UNITS = frozenset({"s", "sec", "second", "seconds", "ms", "msec", "us", "µs", "μs", "ns", "min", "h"})
+_ENERGY_UNITS = frozenset(
+    {"j", "kj", "mj", "gj", "µj", "μj", "uj", "nj", "joule", "nm", "nmm", "n*m", "n*mm", "n.m", "n.mm", "n·m",
+     "n·mm", "n-mm", "n-m", "knm", "knmm", "kn*mm", "kn.mm", "kn·mm", "kn*m", "erg", "lbf*in", "lbf-in",
+     "lbf·in", "in-lbf", "in*lbf", "ft-lbf", "ft*lbf"}
+)  # fmt: skip
+_UNITS = TIME_UNITS | _ENERGY_UNITS
+
+# Normalised, see `normalised`.
+_TIME_NAMES = frozenset(
+    {
+        "time",
+        "t",
+        "times",
+        "simtime",
+        "simulationtime",
+        "zeit",
+        "temps",
+        "tempo",
+        "tiempo",
+        "時間",
+        "时间",
+        "시간",
+    }
+)
+_INTERNAL_NAMES = frozenset(
+    {"internalenergy", "internal", "ie", "allie", "inten", "eint", "einternal", "intenergy", "internalen",
+     "innereenergie", "innereenergy", "energieinterne", "énergieinterne", "energiainterna", "energíainterna",
+     "内部エネルギー", "内能", "내부에너지"}
+)  # fmt: skip
+
+_BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]\s*$")
+_TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
+
+# An internal energy among others: of a part, a total.
+_SOME_INTERNAL = re.compile(r"(?i:internal|allie|inten)|(?<![A-Z])IE(?![A-Za-z])")
+
+# Words that name another quantity; KE in capitals only, since "make" and "spoke" hold it too.
+_OTHER = re.compile(
+    r"(?i:kinetic|kinen|\ball(?:ke|pd|se|ae|wk|fd|vd|cd|dmd|mw)|etotal|total.?energy|hourglass|hgeng|eroded"
+    r"|dissipat|plastic|damping|sliding|contact|friction|external|work|stonewall|rigidwall"
+    r"|accel|veloc|displac|moment|force|pressure|mass|time.?step)|(?<![A-Z])KE(?![A-Z])"
+)
+
+
+def unit_of(name: str) -> str:
+    """Read the unit a column's name ends with, in brackets or behind ``/``, ``_``, ``,`` or a blank.
+
+    Examples
+    --------
+    >>> [unit_of(name) for name in ("Time (ms)", "t/ms", "time_s", "Internal Energy [J]", "time", "part_3")]
+    ['ms', 'ms', 's', 'J', '', '']
+    """
+    if brackets := _BRACKETS.search(name):
+        return brackets[1]
+    tail = _TAIL.match(name)
+    return tail[2] if tail and tail[2].casefold() in _UNITS else ""
+
+
+def normalised(name: str) -> str:
+    """Reduce a name to its letters and digits, in small letters and without its unit.
+
+    Examples
+    --------
+    >>> [normalised(name) for name in ("Internal_Energy (J)", "t/ms", "IE_J", "E int")]
+    ['internalenergy', 't', 'ie', 'eint']
+    """
+    name = _BRACKETS.sub("", name).strip()
+    tail = _TAIL.match(name)
+    if tail and tail[2].casefold() in _UNITS:
+        name = tail[1]
+    return "".join(letter for letter in name.casefold() if letter.isalnum())
+
+
+def is_time(name: str) -> bool:
+    """Whether a column of this name is a time."""
+    return normalised(name) in _TIME_NAMES
+
+
+def is_internal_energy(name: str) -> bool:
+    """Whether a column of this name is the internal energy, without addition."""
+    return normalised(name) in _INTERNAL_NAMES
+
+
+def is_some_internal_energy(name: str) -> bool:
+    """Whether a name speaks of an internal energy: ``IE_total_J``, ``box IE``, not ``eroded internal``."""
+    return bool(_SOME_INTERNAL.search(name)) and not _OTHER.search(name)
+
+
+def is_unit(cell: str) -> bool:
+    """Whether a cell of a units row may read like this: ``ms``, ``[J]``, ``(-)``, nothing."""
+    return cell.casefold() in _UNITS | {"", "-", "1"} or (bool(cell) and cell[0] + cell[-1] in ("()", "[]"))
+
+
+def quantity_note(channel: str) -> tuple[str, ...]:
+    """Say that a channel's name speaks of something else than internal energy, if it does.
+
+    Examples
+    --------
+    >>> quantity_note("boxIE_J")
+    ()
+    >>> quantity_note("ALLKE for Whole Model")
+    ("'ALLKE for Whole Model' is no internal energy by its name (ALLKE); it was taken as it is",)
+    """
+    word = _OTHER.search(channel)
+    if not word:
+        return ()
+    return (f"{channel!r} is no internal energy by its name ({word[0]}); it was taken as it is",)
+
+
+def near_miss(wanted: str, known: Sequence[str]) -> str:
+    """Ask for the name that was perhaps meant, or say nothing."""
+    import difflib
+
+    folded = {name.casefold(): name for name in known}
+    close = difflib.get_close_matches(wanted.casefold(), folded, n=1)
+    return f" (did you mean {folded[close[0]]!r}?)" if close else ""
+
+
+def listing(names: Sequence[str], most: int = 20) -> str:
+    """Names for a message, cut where it would fill the screen."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

@@ -1,0 +1,109 @@
+"""Recognition by content, where the bytes come from, and the errors of both."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import io
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from d2rpick.errors import FormatError
+from d2rpick.readers import READERS, Selection, read_history, sha256
+
+CSV = b"time,internal_energy\n0.0,1.0\n0.1,2.0\n0.2,1.5\n"
+GLSTAT = (
+    b" title\n                         ls-dyna smp.123264 s           date 01/12/2018\n\n\n"
+    b" dt of cycle       1 is controlled by dt2ms     \n\n"
+    b" time...........................   0.00000E+00\n"
+    b" internal energy................   2.00000E-20\n"
+    b" total energy...................   2.00000E-20\n"
+)
+
+
+Write = Callable[..., str]
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Write:
+    def write(data: bytes, name: str = "history") -> str:
+        path = tmp_path / name
+        path.write_bytes(data)
+        return str(path)
+
+    return write
+
+
+def test_the_order_is_a_signature_first_and_any_text_last() -> None:
+    assert list(READERS) == ["glstat", "csv"]
+
+
+@pytest.mark.parametrize(("data", "name"), [(CSV, "glstat"), (GLSTAT, "energy.csv")])
+def test_content_decides_and_not_the_name(file: Write, data: bytes, name: str) -> None:
+    history = read_history(file(data, name))
+    assert history.format == ("csv" if data is CSV else "glstat")
+    assert history.source == (str(Path(history.source[0]).parent / name),)
+
+
+def test_a_gzipped_file_is_read_and_hashed_as_it_lies_there(file: Write) -> None:
+    packed = gzip.compress(CSV)
+    name = file(packed, "history.gz")
+    assert read_history(name).energy.tolist() == [1.0, 2.0, 1.5]
+    assert sha256(name) == hashlib.sha256(packed).hexdigest()
+
+
+def test_standard_input_is_read_once_and_still_hashed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(CSV)))
+    history = read_history("-")
+    assert history.source == ("-",)
+    assert history.time.tolist() == [0.0, 0.1, 0.2]
+    assert sha256("-") == hashlib.sha256(CSV).hexdigest()
+
+
+def test_a_given_format_is_not_second_guessed(file: Write) -> None:
+    assert read_history(file(CSV), input_format="csv").format == "csv"
+    with pytest.raises(FormatError, match="not one time line"):
+        read_history(file(CSV), input_format="glstat")
+    with pytest.raises(FormatError, match="binary"):
+        read_history(file(b"\x00\x01\x02" * 99), input_format="csv")
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"", "empty"),
+        (b"\n\n", "no rows of at least two numbers"),
+        (bytes(range(256)), "binary data of no known format"),
+        (b"\x89HDF\r\n\x1a\n\x00\x00", "binary data"),
+        (b"Once upon a time\nthere was a beam\n", "no rows of at least two numbers"),
+        (b"metric,value,unit\nmass,12.5,kg\nenergy,88.1,J\n", "no rows of at least two numbers"),
+        (b"Curveplot\ntitle\nTime\nEnergy\nComponent\nA #pts=1\n 0. 1.\nendcurve\n", "Curveplot"),
+        (gzip.compress(CSV, mtime=0)[:30], "gzip"),
+        (gzip.compress(b"", mtime=0), "empty"),
+    ],
+)
+def test_what_is_no_history_is_refused_in_one_line(file: Write, data: bytes, reason: str) -> None:
+    with pytest.raises(FormatError, match=reason) as caught:
+        read_history(file(data))
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(file(data))
+
+
+def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=re.escape(str(tmp_path / "none")) + ": no such file"):
+        read_history(str(tmp_path / "none"))
+    with pytest.raises(FormatError, match="folder"):
+        read_history(str(tmp_path))
+    with pytest.raises(FormatError, match="cannot be read"):
+        read_history("a\0b")
+    with pytest.raises(FormatError, match="cannot be read"):
+        read_history(str(tmp_path / ("x" * 5000)))
+
+
+def test_the_selection_reaches_the_reader(file: Write) -> None:
+    assert read_history(file(CSV), Selection(time="2", energy=("1",))).time.tolist() == [1.0, 1.5]
+    np.testing.assert_array_equal(read_history(file(GLSTAT), Selection(energy=("Internal Energy",))).energy, [2e-20])

@@ -1,0 +1,319 @@
+"""Tables of text: small texts in, expected numbers out; every cut gives an error or a true prefix."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from d2rpick.errors import FormatError
+from d2rpick.history import EXACT, Precision
+from d2rpick.readers import Selection, csv_table
+from d2rpick.readers.source import Source
+
+if TYPE_CHECKING:
+    from d2rpick.history import History
+
+TIMES = [0.0, 0.25, 0.625]
+ENERGIES = [1.5, 2.75, -3.125]
+
+
+def read(text: str | bytes, *energy: str, time: str | None = None) -> History:
+    data = text if isinstance(text, bytes) else text.encode()
+    return csv_table.read(Source("table", data), Selection(time, energy))
+
+
+def table(separator: str = ",", decimal: str = ".", end: str = "\n", tail: str = "") -> str:
+    rows = [f"{t}{separator}{e}".replace(".", decimal) + tail + end for t, e in zip(TIMES, ENERGIES, strict=True)]
+    return "".join(rows)
+
+
+# name: (text, channel, unit of the time); all hold TIMES and ENERGIES
+SCENARIOS: dict[str, tuple[str | bytes, str, str]] = {
+    "plain": ("time,internal_energy\n" + table(), "internal_energy", ""),
+    "blank behind the comma": ("x, y\n" + table(", "), "y", ""),
+    "semicolons": ("Time;IE\n" + table(";"), "IE", ""),
+    "semicolons and decimal commas": ("Zeit;Innere Energie\n" + table(";", ","), "Innere Energie", ""),
+    "tabs and decimal commas": ("t\tE_int\n" + table("\t", ","), "E_int", ""),
+    "blanks": ("time ALLIE\n" + table("   "), "ALLIE", ""),
+    "blanks and names with blanks": ("Time [ms]   Internal Energy\n" + table("   "), "Internal Energy", "ms"),
+    "blanks and decimal commas": ("time IE\n" + table(" ", ","), "IE", ""),
+    "no header": (table(), "column 2", ""),
+    "no header, blanks": (table("  "), "column 2", ""),
+    "UTF-8 with its mark": (b"\xef\xbb\xbf" + ("time,IE\n" + table()).encode(), "IE", ""),
+    "UTF-16 from a spreadsheet": (("time\tIE\r\n" + table("\t", end="\r\n")).encode("utf-16"), "IE", ""),
+    "UTF-16, the other order": (b"\xfe\xff" + ("time;IE\n" + table(";")).encode("utf-16-be"), "IE", ""),
+    "latin-1": (("time,Gehäuse IE\n" + table()).encode("latin-1"), "Gehäuse IE", ""),
+    "other line ends": ("time,IE\r\n" + table(end="\r\n"), "IE", ""),
+    "old line ends": ("time,IE\r" + table(end="\r"), "IE", ""),
+    "separator told": ("sep=;\nTime (ms);IE (J)\n" + table(";", ","), "IE (J)", "ms"),
+    "units in brackets": ("Time [s],Internal Energy [J]\n" + table(), "Internal Energy [J]", "s"),
+    "units behind a slash": ("t/ms,E_int/mJ\n" + table(), "E_int/mJ", "ms"),
+    "units behind a line": ("time_s,IE_J\n" + table(), "IE_J", "s"),
+    "units in a row": ("time,internal energy\nms,J\n" + table(), "internal energy", "ms"),
+    "units in a row, in brackets": (
+        "time,internal energy\n[ms],[kN mm]\n" + table(),
+        "internal energy",
+        "ms",
+    ),
+    "LS-PrePost, unnamed curve": (
+        "Global Data,Internal Energy\nTime,\n" + table(tail=","),
+        "Internal Energy",
+        "",
+    ),
+    "LS-PrePost, named curve": (
+        "Material Data,Internal Energy\nTime,A12,\n" + table(tail=","),
+        "A12: Internal Energy",
+        "",
+    ),
+    "3DEXPERIENCE": (
+        "Time(s),Energy(J),ALLIE_Global/ALLIE\n" + table(tail=","),
+        "Energy(J): ALLIE_Global/ALLIE",
+        "s",
+    ),
+    "comments": ("# a run\n$ more\n% more\n// more\ntime,IE\n" + table() + "# the end\n", "IE", ""),
+    "comments between": ("time,IE\n" + table().replace("\n0.625", "\n# switched\n\n0.625"), "IE", ""),
+    "names in a comment": ("# run 7\n# time internal_energy\n" + table(" "), "internal_energy", ""),
+    "a comment that is no names": ("# box, drop\n" + table(), "column 2", ""),
+    "a title": ("Run seven\n" + table(), "column 2: Run seven", ""),
+    "quotes": ('"time","part 1, IE"\n' + table().replace("2.75", '"2.75"'), "part 1, IE", ""),
+    "a line end inside a name": ('"time","part\nIE"\n' + table(), "part IE", ""),
+    "blank lines at the end": ("time,IE\n" + table() + "\n\n", "IE", ""),
+    "no line end, digits told": ("time,IE\n0.00,1.500\n0.25,2.750\n0.625,-3.125", "IE", ""),
+    "Fortran's exponents": ("time,IE\n0.0D+00,1.5d0\n2.5D-01,.275D1\n625.D-3,-3.125\n", "IE", ""),
+    "decimal commas from the second row on": ("time;IE\n0;1,5\n0,25;2,75\n0,625;-3,125\n", "IE", ""),
+    "decimal commas and words between blanks": (
+        "time phase IE\n0,0 load 1,5\n0,25 flight 2,75\n0,625 flight -3,125\n",
+        "IE",
+        "",
+    ),
+    "signs": ("time,IE\n+0,+1.5\n+.25,2.75e+0\n0.625,-3.125E0\n", "IE", ""),
+    "the energy first": ("IE,time\n1.5,0.0\n2.75,0.25\n-3.125,0.625\n", "IE", ""),
+    "an index first": (",time,IE\n0,0,1.5\n1,.25,2.75\n2,.625,-3.125\n", "IE", ""),
+    "words in an unused column": (
+        "time,phase,IE\n0,load,1.5\n.25,flight,2.75\n.625,flight,-3.125\n",
+        "IE",
+        "",
+    ),
+    "gaps in an unused column": ("time,KE,IE\n0,,1.5\n.25,nan,2.75\n.625,7,-3.125\n", "IE", ""),
+    "gaps in an unused last column": ("time,IE,KE\n0,1.5,\n.25,2.75,3\n.625,-3.125,\n", "IE", ""),
+    "more names than values, th_to_csv": (
+        '"time","INTERNAL ENERGY","KINETIC ENERGY","X","Y"\n0,1.5,9,8\n.25,2.75,9,8\n.625,-3.125,9,8\n',
+        "INTERNAL ENERGY",
+        "",
+    ),
+    "an internal energy among others": (
+        "time,boxIE_J,boxKE_J\n0,1.5,9\n.25,2.75,9\n.625,-3.125,9\n",
+        "boxIE_J",
+        "",
+    ),
+    "equal times, the last counts": ("time,IE\n0,1.5\n.25,9\n.25,2.75\n.625,-3.125\n", "IE", ""),
+    "restart, the newer leg counts": ("time,IE\n0,1.5\n.25,9\n.5,9\n.25,2.75\n.625,-3.125\n", "IE", ""),
+}
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_scenario(name: str) -> None:
+    text, channel, unit = SCENARIOS[name]
+    history = read(text)
+    assert history.time.tolist() == TIMES
+    assert history.energy.tolist() == ENERGIES
+    assert (history.channel, history.time_unit, history.format) == (channel, unit, "csv")
+    assert history.complete
+
+
+FOUR = "time_s,boxIE_J,stepIE_J,KE\n0,1,10,5\n1,2,20,6\n2,4,40,7\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "asked", "channel", "energy"),
+    [
+        (FOUR, ["boxIE_J"], "boxIE_J", [1, 2, 4]),
+        (FOUR, ["boxie"], "boxIE_J", [1, 2, 4]),
+        (FOUR, [" BOXIE_J "], "boxIE_J", [1, 2, 4]),
+        (FOUR, ["3"], "stepIE_J", [10, 20, 40]),
+        (FOUR, ["boxIE_J", "3"], "boxIE_J + stepIE_J", [11, 22, 44]),
+        ("time,101,102\n0,1,10\n1,2,20\n", ["101"], "101", [1, 2]),
+        ("time,m,M\n0,1,10\n1,2,20\n", ["M"], "M", [10, 20]),
+        ("0,1,10\n1,2,20\n", ["3"], "column 3", [10, 20]),
+        ("0 1 10\n1 2 20\n", ["2"], "column 2", [1, 2]),
+        ("Nodal,IE\nTime,A1,B2,\n0,1,10,\n1,2,20,\n", ["b2"], "B2: IE", [10, 20]),
+    ],
+)
+def test_columns_by_name_and_number(text: str, asked: list[str], channel: str, energy: list[float]) -> None:
+    history = read(text, *asked)
+    assert history.channel == channel
+    assert history.energy.tolist() == energy
+
+
+def test_the_time_by_name_and_number() -> None:
+    assert read("a,b,IE\n5,0,1\n4,1,2\n", time="b").time.tolist() == [0, 1]
+    assert read("Time,Y1,Time,Y2\n0,1,5,2\n1,3,6,4\n", "Y2", time="3").time.tolist() == [5, 6]
+
+
+@pytest.mark.parametrize(
+    ("text", "asked", "reason"),
+    [
+        (FOUR, [], "2 columns are named like an internal energy.*--energy: 2 'boxIE_J', 3 'stepIE_J'"),
+        ("time,a,b\n0,1,2\n1,2,3\n", [], "no column is named like an internal energy.*2 'a', 3 'b'"),
+        ("0,1,2\n1,2,3\n", [], "2 'column 2', 3 'column 3'"),
+        (FOUR, ["boxIEJ2"], r"no column 'boxIEJ2' \(did you mean 'boxIE_J'\?\); there are: 1 'time_s', 2"),
+        (FOUR, ["5"], "no column '5'"),
+        (FOUR, ["0"], "no column '0'"),
+        (FOUR, ["KE", "ke"], "asked for twice"),
+        (FOUR, ["1"], "asked for twice"),
+        ("time,IE,ie\n0,1,2\n1,2,3\n", ["Ie"], "'Ie' may be any of these columns: 2 'IE', 3 'ie'"),
+        ("time,IE,IE\n0,1,2\n1,2,3\n", [], "2 columns are named"),
+        ("time,3,2\n0,1,2\n1,2,3\n", ["2"], "may be any of these"),
+        ("Time,Y1,Time,Y2\n0,1,5,2\n1,3,6,4\n", ["Y1"], "choose with --time: 1 'Time', 3 'Time'"),
+        (
+            '"time","INTERNAL ENERGY",A,B\n0,1,2\n1,2,3\n',
+            ["A"],
+            "4 names for 3 values .th_to_csv.*2 'INTERNAL ENERGY'",
+        ),
+        ('"time","INTERNAL ENERGY",A,B\n0,1,2\n1,2,3\n', ["3"], "only these may be used"),
+        ('"time",A,"INTERNAL ENERGY",B\n0,1,2\n1,2,3\n', [], "no column is named like an internal energy"),
+        ("index,time,IE,KE\n0,1,2\n1,2,3\n", [], "3 values below a header of 4 names"),
+        ("time,IE\n0,5,1\n1,2,3\n", [], "3 values below a header of 2 names"),
+        ("time,IE\n0,05,1,25\n1,05,2,35\n", [], "decimal commas between commas"),
+        ("0,00,1,25\n0,05,1,35\n", ["2"], "table:1: '0,00,1,25' looks like decimal commas"),
+    ],
+)
+def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -> None:
+    with pytest.raises(FormatError, match=reason):
+        read(text, *asked)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("time,IE\n0,1\n1,nan\n2,3\n", "table:3: 'IE' is 'nan', a number was expected"),
+        ("time,IE,KE\n0,1,2\n1,,2\n2,3,4\n", "table:3: 'IE' is ''"),
+        ("time,IE\n0,1\n1,1e999\n2,3\n", "table:3: 'IE' is '1e999'"),
+        ("time,IE\n0,1\n1,1_0\n2,3\n", "table:3: 'IE' is '1_0'"),
+        ("time,IE\n0,1\n\n1,*****\n2,3\n", r"table:4: 'IE' is '\*\*\*\*\*'"),
+        ("time,IE\n0,1\n1\n2,3\n", "table:3: 1 values, 2 were expected"),
+        ("time,IE\n0,1\n1,2,3\n2,3\n", "table:3: 3 values, 2 were expected"),
+        ("time,IE\n0,1\n1,2\nend\n", "table:4: 1 values"),
+        ("time,IE\n0\n1,2\n2,3\n", "table:2: '0' is unlike the rows below"),
+        ("time,IE\n0,-\n1,2\n2,3\n", "table:2: '0,-' is unlike the rows below"),
+        ("time;IE\n0,5;1.5\n0,6;1,5\n", "table:2: 'IE' is '1.5'|table:2: '0,5;1.5' is unlike"),
+        ("time,IE\n0,1\n1,2\n\n0,3\n1,4\n", "table:5: the time starts again behind a gap"),
+        ("time,IE\n5,1\n3,2\n4,3\n1,4\n2,5\n", "table: time steps back"),
+        ("run,IE\na1,1\na2,2\n", "no rows of at least two numbers"),
+        ("run,IE,KE\na1,1,2\na2,2,3\n", "table:2: 'run' is 'a1'"),
+        ("time,IE\n", "table:1: 'time,IE' and no rows"),
+        ("time,IE\n0.0,1.5", "no states"),
+    ],
+)
+def test_refused(text: str, reason: str) -> None:
+    with pytest.raises(FormatError, match=reason):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "note"),
+    [
+        ("x,y\n0,1\n1,2\n", "no column is named like a time; 'x', the first, was taken for it"),
+        ("time,ALLKE\n0,1\n1,2\n", "'ALLKE' is no internal energy by its name"),
+        (
+            "Nodal History,Z-acceleration\nTime,A8,\n0,1,\n1,2,\n",
+            "'A8: Z-acceleration' is no internal energy",
+        ),
+        ("time,IE\n0,1\n0,2\n", "same printed time"),
+        ("time,IE\n0,1\n1,2\n2,3", "the last line has no line end and may be cut"),
+    ],
+)
+def test_notes_say_what_was_assumed(text: str, note: str) -> None:
+    assert note in read(text).notes[0]
+
+
+@pytest.mark.parametrize(
+    ("rows", "time", "energy"),
+    [
+        ("0.001,1.25\n0.0025,1.5\n0.0041,2\n", Precision(digits=3), Precision(digits=3)),
+        ("0,1.00000e+00\n1.03,1.25000e+00\n3,1.5\n", Precision(digits=6), Precision(digits=6)),
+        ("0.00,1.234567\n0.13,1.5\n0.25,1\n", Precision(digits=7, decimals=2), Precision(digits=7)),
+        ("0.00,1.234567\n0.10,1.5\n0.20,1\n", Precision(digits=7), Precision(digits=7)),
+        ("0,1.250\n0.13,12.125\n0.2,1.000\n", Precision(digits=5), Precision(digits=5, decimals=3)),
+        ("0,0.333333333333333315\n0.13,12.125\n0.2,1.000\n", EXACT, EXACT),
+    ],
+)
+def test_precision_is_read_off_the_text(rows: str, time: Precision, energy: Precision) -> None:
+    history = read(rows)
+    assert (history.time_precision, history.energy_precision) == (time, energy)
+
+
+finite = st.floats(-1e300, 1e300, allow_subnormal=False)
+FORMS = [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("  ", "."), (" , ", ".")]
+
+
+@given(
+    st.lists(st.tuples(finite, finite), min_size=1, max_size=8),
+    st.sampled_from(FORMS),
+    st.sampled_from(["%r", "%.17g", "%.16e", "%.3f", "%+.5E", "%g"]),
+    st.sampled_from(["\n", "\r\n"]),
+    st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "latin-1"]),
+)
+def test_what_is_written_is_read_back_bit_for_bit(
+    values: list[tuple[float, float]], form: tuple[str, str], style: str, end: str, encoding: str
+) -> None:
+    separator, decimal = form
+    rows = [(float(i), style % a, style % b) for i, (a, b) in enumerate(values)]
+    lines = [separator.join(["time", "A", "B"])]
+    lines += [separator.join([repr(t), a, b]).replace(".", decimal) for t, a, b in rows]
+    history = read((end.join(lines) + end).encode(encoding), "B")
+    assert history.time.tolist() == [t for t, _, _ in rows]
+    assert history.energy.tolist() == [float(b) for _, _, b in rows]
+
+
+@settings(deadline=None, max_examples=50)
+@given(
+    st.lists(st.floats(-1e20, 1e20), min_size=1, max_size=5),
+    st.sampled_from(["%r", "%.17g", "%.5e", "%.3f", "%g", "%d"]),
+    st.sampled_from(["time,IE\n", "", "a,b\nTime,IE,\n", "time,IE,more\n"]),
+    st.sampled_from(["", ",", ",7"]),
+)
+def test_a_table_cut_anywhere_never_yields_a_wrong_number(
+    energies: list[float], style: str, header: str, tail: str
+) -> None:
+    rows = [(float(i), style % energy) for i, energy in enumerate(energies)]
+    whole = header + "".join(f"{t},{energy}{tail}\n" for t, energy in rows)
+    expected = [(t, float(energy)) for t, energy in rows]
+    for cut in range(len(whole)):
+        try:
+            history = read(whole[:cut])
+        except FormatError:
+            continue
+        found = list(zip(history.time.tolist(), history.energy.tolist(), strict=True))
+        assert found == expected[: len(found)]
+
+
+@pytest.mark.parametrize(
+    ("rows", "states"),
+    [
+        ("0,1.00\n1,2.50\n2,3.75", 3),  # two decimals, as always
+        ("0,1.00\n1,2.50\n2,3.7", 2),
+        ("0,1.25\n1,2.75\n2,3.75", 2),  # may be %g, and the value 3.751
+        ("0,1.00e+00\n1,2.50e+00\n2,3.75e-01", 3),
+        ("0,1.00e+00\n1,2.50e+00\n2,3.75e-1", 2),
+        ("0,1.00e+00\n1,2.50e+00\n2,3.75e-10", 2),  # may be e-100
+        ("0,1\n1,2\n2,3", 2),
+        ("0,1,\n1,2,\n2,3,", 3),
+        ("time,IE,KE\n0,1,9\n1,2,9\n2,3,", 3),
+        ("time,IE,KE\n0,1,9\n1,2,9\n2,3", 2),
+    ],
+)
+def test_a_last_line_without_end_counts_when_it_is_whole_for_sure(rows: str, states: int) -> None:
+    history = read(rows)
+    assert history.time.size == states
+    assert history.complete is (states == 3)
+
+
+@given(st.text(alphabet='01.,;eE+- \t\n"#ntimeI', max_size=120))
+def test_no_text_raises_anything_else(text: str) -> None:
+    with contextlib.suppress(FormatError):
+        read(text)

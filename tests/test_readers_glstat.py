@@ -1,0 +1,268 @@
+"""glstat: small texts in, expected numbers out; every cut gives an error or a true prefix."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.errors import FormatError
+from d2rpick.history import History, Precision
+from d2rpick.readers import Selection, glstat
+from d2rpick.readers.source import Source
+
+HEAD = """\
+ Internal energy of a time box, 1.0E+00
+                    ls-dyna smp d R16 R16.1_180_d50332d date 07/09/2025
+
+
+"""
+CONTROLLERS = (
+    "dt2ms     ",
+    "load curve",
+    "sph   1002285",
+    "rigid node",
+    "shell             11 of part         1",
+    "DE sphere         24 of part        10",
+)
+
+
+def line(label: str, value: object, suffix: str = "") -> str:
+    text = value if isinstance(value, str) else f"{value:.5E}"
+    return f" {label:.<31}{text:>14}{suffix}\n"
+
+
+def block(time: object, internal: object, *, controller: str = CONTROLLERS[0], gap: str = "\n") -> str:
+    return (
+        f" dt of cycle      24 is controlled by {controller}\n"
+        + gap
+        + line("time", time)
+        + line("time step", 2.7e-7)
+        + line("kinetic energy", 9.93442e-6)
+        + ("" if internal is None else line("internal energy", internal))
+        + line("stonewall energy", -1.0, " wall# 1")
+        + line("stonewall energy", -2.0, " wall#    2")
+        + line("hourglass energy ", 0.0)
+        + line("eroded internal energy", 77.0)
+        + line("dissipated internal energy", 78.0)
+        + line("total energy / initial energy", 1.0)
+        + line("energy ratio w/o eroded energy", 1.0)
+        + line("time per zone cycle.(nanosec)", "4663")
+        + "\n\n number of shell elements that  \n reached the minimum time step..    0\n\n\n"
+        + line("added mass", "0.28468E-03")
+        + "\n"
+    )
+
+
+STATES = ((0.0, 2e-20), (1.5e-3, 1.36945e-5), (2.75e-3, -8.05e2))
+WHOLE = HEAD + "".join(block(*state, controller=c) for state, c in zip(STATES, CONTROLLERS, strict=False))
+
+
+def read(text: str | bytes, *energy: str, time: str | None = None) -> History:
+    data = text if isinstance(text, bytes) else text.encode("latin-1")
+    return glstat.read(Source("glstat", data), Selection(time, energy))
+
+
+def states(history: History) -> list[tuple[float, float]]:
+    return list(zip(history.time.tolist(), history.energy.tolist(), strict=True))
+
+
+SCENARIOS = {
+    "as written": (WHOLE, STATES),
+    "one state": (HEAD + block(0.0, 4.5), [(0.0, 4.5)]),
+    "line ends of another system": (WHOLE.replace("\n", "\r\n"), STATES),
+    "no blank line behind the controller": (
+        HEAD + block(0.0, 1.0, gap="") + block(1.0, 2.0, gap=""),
+        [(0, 1), (1, 2)],
+    ),
+    "blocks without blank lines between": (re.sub("\n+", "\n", WHOLE), STATES),
+    "title in latin-1": (WHOLE.replace("box", "Stoßfänger"), STATES),
+    "every controller": (
+        HEAD + "".join(block(float(i), float(i), controller=c) for i, c in enumerate(CONTROLLERS)),
+        [(float(i), float(i)) for i in range(len(CONTROLLERS))],
+    ),
+    "Fortran's exponents": (
+        HEAD + block("1.00000D-03", "1.23457-100") + block("2.00000D-03", "-4.94066-300") + block(".3E+00", "+1.0E+00"),
+        [(1e-3, 1.23457e-100), (2e-3, -4.94066e-300), (0.3, 1.0)],
+    ),
+    "values before the first time line": (WHOLE[WHOLE.index(" time step") :], STATES[1:]),
+    "equal times, the last counts": (
+        HEAD + block(0.0, 1.0) + block(0.0, 2.0) + block(1.0, 3.0),
+        [(0, 2), (1, 3)],
+    ),
+    "restart, the newer leg counts": (
+        HEAD + "".join(block(float(t), e) for t, e in ((0, 1.0), (1, 2.0), (2, 3.0), (1, 5.0), (2, 6.0))),
+        [(0, 1), (1, 5), (2, 6)],
+    ),
+    "mass properties between": (
+        WHOLE.replace(
+            "\n\n\n added",
+            "\n m a s s   p r o p e r t i e s   o f   b o d y\n      total mass of body  = 0.1E+01\n added",
+        ),
+        STATES,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_scenario(name: str) -> None:
+    text, expected = SCENARIOS[name]
+    history = read(text)
+    assert states(history) == [tuple(map(float, state)) for state in expected]
+    assert history.channel == "internal energy"
+    assert history.format == "glstat"
+    assert history.complete
+    assert history.time_precision == history.energy_precision == Precision(digits=6)
+
+
+def test_notes_say_what_was_left_out() -> None:
+    assert read(WHOLE).notes == ()
+    assert "begins inside a state" in read(WHOLE[WHOLE.index(" time step") :]).notes[0]
+    assert "same printed time" in read(HEAD + block(0.0, 1.0) + block(0.0, 2.0)).notes[0]
+    assert "kinetic" in read(WHOLE, "kinetic energy").notes[0]
+
+
+@pytest.mark.parametrize(
+    ("asked", "channel", "expected"),
+    [
+        (("Kinetic Energy",), "kinetic energy", 9.93442e-6),
+        (("hourglass energy",), "hourglass energy", 0.0),
+        (("energy ratio w/o eroded energy",), "energy ratio w/o eroded energy", 1.0),
+        (
+            ("dissipated internal energy", "eroded internal energy"),
+            "dissipated internal energy + eroded internal energy",
+            155.0,
+        ),
+    ],
+)
+def test_other_labels(asked: list[str], channel: str, expected: float) -> None:
+    history = read(WHOLE, *asked)
+    assert history.channel == channel
+    assert history.energy.tolist() == [expected] * 3
+
+
+WIDE = WHOLE.replace(line("internal energy", 1.36945e-5), line("internal energy", "1.36945E-05")[:-1] + "1\n")
+REFUSED = {
+    "no state": (HEAD, "no states"),
+    "no state, one controller": (HEAD + " dt of cycle       1 is controlled by dt2ms\n", "no states"),
+    "overflow": (
+        HEAD + block(0.0, 1.0) + block(1.0, "*" * 14) + block(2.0, 1.0),
+        r"glstat:\d+: 'internal energy' is '\*",
+    ),
+    "no number": (HEAD + block(0.0, "NaN") + block(1.0, 1.0), r"glstat:10: 'internal energy' is 'NaN'"),
+    "infinite": (HEAD + block(0.0, 1.0) + block("Infinity", 1.0), r"'time' is 'Infinity'"),
+    "old Windows": (HEAD + block(0.0, "-1.#IND0E+00") + block(1.0, 1.0), "a number in columns 33-46"),
+    "underscore": (HEAD + block(0.0, "1.0_000E+00") + block(1.0, 1.0), "a number in columns 33-46"),
+    "wider than its column": (WIDE, "a number in columns 33-46"),
+    "shifted": (
+        WHOLE.replace("energy................   1.36", "energy................  1.36"),
+        "columns 33-46",
+    ),
+    "a state without the label": (
+        HEAD + block(0.0, 1.0) + block(1.0, None) + block(2.0, 1.0),
+        r"glstat:\d+: 'time' where",
+    ),
+    "a state without its time": (
+        HEAD + block(0.0, 1.0) + block(1.0, 2.0).replace(line("time", 1.0), "") + block(2.0, 3.0),
+        r"glstat:\d+: 'internal energy' where 'time' was expected",
+    ),
+    "no such line at all": (HEAD + block(0.0, None) + block(1.0, None), "no whole line 'internal energy'"),
+    "time at random": (
+        HEAD + "".join(block(float(t), 1.0) for t in (5, 1, 4, 2, 3)),
+        "glstat: time steps back",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refused(name: str) -> None:
+    text, reason = REFUSED[name]
+    with pytest.raises(FormatError, match=reason):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    ("asked", "reason"),
+    [
+        (
+            ("kinetik energy",),
+            "did you mean 'kinetic energy'.*there are: time step, kinetic energy, internal energy",
+        ),
+        (("stonewall energy",), "'stonewall energy' where 'time' was expected"),
+        (("internal energy", "Internal Energy"), "asked for twice"),
+        (("time",), "no whole line 'time'"),
+    ],
+)
+def test_labels_that_cannot_be_taken(asked: list[str], reason: str) -> None:
+    with pytest.raises(FormatError, match=reason):
+        read(WHOLE, *asked)
+
+
+def test_the_time_is_the_time() -> None:
+    assert states(read(WHOLE, time="Time")) == list(STATES)
+    with pytest.raises(FormatError, match="leave --time out"):
+        read(WHOLE, time="cycle")
+
+
+@pytest.mark.parametrize("energy", ["internal energy", "kinetic energy", "added mass"])
+def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
+    whole = WHOLE.encode()
+    expected = states(read(whole, energy))
+    outcomes: set[str | int] = set()
+    for cut in range(len(whole) + 1):
+        try:
+            history = read(whole[:cut], energy)
+        except FormatError:
+            outcomes.add("error")
+            continue
+        found = states(history)
+        assert found == expected[: len(found)]
+        outcomes.add(len(found))
+        # All that lies between two whole lines is told from a whole file by nothing but the missing lines.
+        assert not history.complete or whole[:cut].endswith(b"\n")
+    assert outcomes == {"error", 1, 2, 3}
+
+
+@pytest.mark.parametrize("damage", ["", " ", "0", "_", "*", "\n", "time"])
+def test_a_byte_lost_or_put_between_the_columns_is_seen(damage: str) -> None:
+    start = WHOLE.index(" internal energy", len(HEAD) + 1000)
+    for place in range(start, start + 34):
+        removed = WHOLE[:place] + damage + WHOLE[place + 1 :]
+        try:
+            found = states(read(removed))
+        except FormatError:
+            continue
+        assert found == list(STATES)
+
+
+@given(st.lists(st.floats(-1e99, 1e99), min_size=1, max_size=5), st.sampled_from(CONTROLLERS), st.booleans())
+def test_values_equal_those_of_python(energies: list[float], controller: str, windows: bool) -> None:
+    text = HEAD + "".join(block(float(i), e, controller=controller) for i, e in enumerate(energies))
+    history = read(text.replace("\n", "\r\n") if windows else text)
+    assert history.energy.tolist() == [float(f"{e:.5E}") for e in energies]
+
+
+@given(st.binary(max_size=400))
+def test_no_bytes_raise_anything_else(data: bytes) -> None:
+    glstat.recognises(data)
+    try:
+        read(HEAD.encode() + data + block(0.0, 1.0).encode() + data)
+    except FormatError:
+        return
+
+
+@pytest.mark.parametrize(
+    ("head", "expected"),
+    [
+        (HEAD, True),
+        (WHOLE[:300], True),
+        (block(0.0, 1.0), True),
+        (HEAD + "{BEGIN LEGEND}\n Entity #        Title\n", False),
+        (" ls-dyna time\n0,1\n", False),
+        ("", False),
+    ],
+)
+def test_recognised_by_content(head: str, expected: bool) -> None:
+    assert glstat.recognises(head.encode()) is expected
