@@ -1,0 +1,60 @@
+"""What a user should be aware of in a situation: stable codes for scripts, sentences for people."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.situation import Situation
+
+# Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.
+POOR_KINETIC_SHARE = 0.5
+# An E_plastic above this share of the vibration is worth a word: energy alone cannot tell it from a preload.
+_NOTABLE_PLASTIC = 0.05
+
+
+@dataclass(frozen=True)
+class Caution:
+    """Something the user should know: a stable ``code`` for scripts, and a sentence."""
+
+    code: str
+    message: str
+
+
+def cautions_of(situation: Situation) -> Iterator[Caution]:
+    """Everything to be aware of in a situation, the input first."""
+    if not situation.history.complete:
+        yield Caution("truncated-input", "the input stops inside a state; only whole states were used")
+    yield from _of_energy(situation)
+    yield from _of_flight(situation)
+
+
+def _of_energy(situation: Situation) -> Iterator[Caution]:
+    td, mode, share = situation.td, situation.mode, situation.kinetic_share
+    if situation.energy_td <= 0:
+        found = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
+        yield Caution("no-energy", f"{found}; a level to lock in needs a positive energy")
+    if situation.no_mode:
+        yield Caution("energy-only", f"{situation.no_mode}; candidates are judged by their energy level alone")
+    if share is not None and share > POOR_KINETIC_SHARE:
+        lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g}"
+        yield Caution("poor-td", f"{lost} and cannot be kept by any tr")
+    if mode and (mode.preload or abs(mode.energy_plastic) > _NOTABLE_PLASTIC * float(mode.vibration_energy(td))):
+        found = f"plastic work {mode.energy_plastic:.4g} and a preload energy of {mode.preload**2:.4g} fit the record"
+        yield Caution("plastic-or-preload", f"{found}; energy alone cannot tell them from each other with certainty")
+
+
+def _of_flight(situation: Situation) -> Iterator[Caution]:
+    flight, td, earliest = situation.flight, situation.td, situation.earliest_tr
+    if flight.source == "energy":
+        found = f"the end of the load, {flight.start:.6g}, was read off the energy alone"
+        yield Caution("flight-from-energy", f"{found}; give it with --after where it is known")
+    if earliest is None:
+        yield Caution("no-flight", "nothing in the record shows when the load is over; give that time with --after")
+    elif td <= earliest:
+        yield Caution("td-in-load", f"td = {td:.6g} lies before the end of the load, {earliest:.6g}")
+    if td > situation.latest_td:
+        yield Caution("td-after-contact", f"td = {td:.6g} lies after the end of the flight, {situation.latest_td:.6g}")

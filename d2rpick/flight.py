@@ -1,0 +1,141 @@
+"""When the load is over: the window around td in which the parts fly freely."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.crossings import find_crossings
+from d2rpick.identify import Identification, identify
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.history import History
+
+# Tails of the record before td that are tried for an oscillator, as shares of what comes before td.  Below an
+# eighth a record has hardly the periods an oscillator needs, and what fits so little of it proves nothing.
+_TAILS = (0.6, 0.36, 0.22, 0.13)
+# The record leaves the fitted oscillator where the mean error over a twenty-fifth of a period (three samples at
+# least) exceeds this share of the vibration energy, or this many standard errors of such a mean, whichever is more.
+# Of a million means of white noise one does by chance.
+_SHARE_OFF, _ERRORS_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 25
+# Fits of the growing window until it stays; two are usual.
+_MOST_REFITS = 8
+# Widening of the band of energies before td, against wiggles of a vibration that the band has not seen.
+_BAND_RESERVE = 0.25
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Window of free flight [time]; ``start`` None when unknown, ``end`` None when no next contact was seen.
+
+    ``source`` tells how the start was found: "given", "oscillator", "energy", or None.
+    """
+
+    start: float | None
+    end: float | None
+    source: str | None
+
+
+def described_flight(history: History, td: float, first: float) -> tuple[Flight | None, Identification]:
+    """Find the longest window around td that one oscillator describes.
+
+    First a part of the record that one oscillator describes is looked for: all of it, up to td, then ever
+    shorter tails.  From there the window grows both ways while the samples stay with the fit, is fitted anew,
+    and so on until it stays.
+
+    Parameters
+    ----------
+    history : History
+    td, first : float
+        Time to look around, and where the search begins [time].
+
+    Returns
+    -------
+    flight : Flight or None
+        None when no oscillator describes the record around td.
+    fit : Identification
+        Of that window; when there is none, of the part up to td, with the reason of its refusal.
+    """
+    refused = []
+    for start, end in _windows(first, td, float(history.time[-1])):
+        fit = identify_within(history, start, end)
+        if fit.describes_record:
+            flight, fit = _grow(history, td, fit, first)
+            if flight:
+                return flight, fit
+        refused.append(fit)
+    return None, refused[1]
+
+
+def span_of(history: History, td: float, fit: Identification, first: float) -> Flight | None:
+    """Find the window around td, from ``first`` on, in which the record stays with ``fit``.
+
+    It ends where the energy drifts off the fit.  Its end is None where it reaches the end of the record, and it is
+    None itself where the record is off the fit at td.
+    """
+    assert fit.mode is not None
+    begin = int(np.searchsorted(history.time, first))
+    time, energy = history.time[begin:], history.energy[begin:]
+    period = 2 * np.pi / fit.mode.omega
+    width = max(3, round(period / _MEANS_PER_PERIOD / float(np.median(np.diff(time)))))
+    with np.errstate(over="ignore", invalid="ignore"):  # far off, a damped fit grows beyond all numbers
+        room = np.maximum(_SHARE_OFF * fit.mode.vibration_energy(time), _ERRORS_OFF * fit.rms / np.sqrt(width))
+        error = np.convolve(energy - fit.mode.energy(time), np.ones(width) / width, mode="same")
+        gone = ~(np.abs(error) <= room)
+    middle = int(np.searchsorted(time, td))
+    before, after = np.flatnonzero(gone[:middle]), np.flatnonzero(gone[middle:])
+    left = int(before[-1]) + 1 if before.size else 0
+    right = middle + int(after[0]) - 1 if after.size else time.size - 1
+    if left >= right:
+        return None
+    return Flight(float(time[left]), float(time[right]) if right < time.size - 1 else None, "oscillator")
+
+
+def energy_flight(history: History, td: float) -> Flight:
+    """Take the load to be over when the energy falls into its band before td for the last time.
+
+    The band is that of the last quarter of the record before td, widened by a quarter of its width.  Where the
+    energy never was above the band, nothing shows that a load has ended: start and source are None.
+    """
+    before = history.time <= td
+    quarter = before & (history.time >= td - (td - history.time[0]) / 4)
+    values = np.append(history.energy[quarter], history.energy_at(td))
+    level = float(values.max() + _BAND_RESERVE * np.ptp(values))
+    falling = [c.time for c in find_crossings(history.time[before], history.energy[before], level) if not c.rising]
+    return Flight(falling[-1], None, "energy") if falling else Flight(None, None, None)
+
+
+def _windows(first: float, td: float, last: float) -> Iterator[tuple[float, float]]:
+    """Windows to try: the whole, up to td, then for ever shorter tails up to td, as much beyond, to the end."""
+    yield first, last
+    yield first, td
+    for share in _TAILS:
+        length = share * (td - first)
+        for end in dict.fromkeys((td, min(td + length, last), last)):
+            yield td - length, end
+
+
+def identify_within(history: History, start: float, end: float) -> Identification:
+    """Identify the oscillator from the samples in [start, end]."""
+    inside = slice(*np.searchsorted(history.time, [start, np.nextafter(end, np.inf)]))
+    return identify(history.time[inside], history.energy[inside])
+
+
+def _grow(history: History, td: float, fit: Identification, first: float) -> tuple[Flight | None, Identification]:
+    """Extend the fitted window while the record stays with the fit, refit, repeat."""
+    flight = span_of(history, td, fit, first)
+    for _ in range(_MOST_REFITS):
+        if flight is None or flight.start is None:
+            break
+        end = history.time[-1] if flight.end is None else flight.end
+        if (flight.start, end) == (fit.start, fit.end):
+            break
+        refit = identify_within(history, flight.start, float(end))
+        if not refit.describes_record:
+            break
+        fit, flight = refit, span_of(history, td, refit, first)
+    return flight, fit

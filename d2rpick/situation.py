@@ -1,0 +1,163 @@
+"""What the record tells about a td, before any tr is looked at: flight, oscillator, level, kinetic share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick import measures
+from d2rpick.errors import RangeError
+from d2rpick.flight import Flight, described_flight, energy_flight, identify_within, span_of
+from d2rpick.identify import Identification, assess
+
+if TYPE_CHECKING:
+    from d2rpick.history import History
+    from d2rpick.mode import Mode
+
+# Where the scatter of the last period exceeds this share of the vibration energy at td, the vibration has sunk
+# into it: its sign is no longer certain.
+_DROWNED = 0.2
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the analyst asks for; times in the unit of the history.
+
+    ``after``: the load ends here (None: found from the record).  ``margin``: kept clear after the load and before
+    the next contact.  ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
+    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
+    given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
+    the energy level alone.
+    """
+
+    after: float | None = None
+    margin: float = 0.0
+    tolerance: float = 0.2
+    max_kinetic_share: float | None = None
+    max_residual: float | None = None
+    oscillator: Mode | None = None
+    fit_window: tuple[float, float] | None = None
+    replay: bool = True
+
+
+@dataclass(frozen=True)
+class Situation:
+    """A history seen from one td [time].
+
+    ``fit`` is None only where no oscillator was looked for; ``mode`` is its mode where it can be relied on at td,
+    else None, and then ``no_mode`` says why.
+    """
+
+    history: History
+    td: float
+    settings: Settings
+    flight: Flight
+    fit: Identification | None
+    mode: Mode | None
+    no_mode: str | None
+
+    @property
+    def basis(self) -> str:
+        """What a choice rests on: "oscillator" or "energy"."""
+        return "oscillator" if self.mode else "energy"
+
+    @property
+    def energy_td(self) -> float:
+        """Energy level at td, from the oscillator where one describes the record [energy]."""
+        return self.energy_at(self.td)
+
+    @property
+    def kinetic_share(self) -> float | None:
+        """K, or None on basis "energy" [-]."""
+        return measures.kinetic_share(self.mode, self.td) if self.mode else None
+
+    @property
+    def earliest_tr(self) -> float | None:
+        """Start of the flight with the margin, or None when unknown [time]."""
+        return None if self.flight.start is None else self.flight.start + self.settings.margin
+
+    @property
+    def latest_td(self) -> float:
+        """End of the flight with the margin; infinite when no contact was seen [time]."""
+        return float("inf") if self.flight.end is None else self.flight.end - self.settings.margin
+
+    def energy_at(self, time: float) -> float:
+        """Energy at ``time``: of the oscillator inside the flight, of the samples elsewhere [energy]."""
+        if self.mode and self.flight.start is not None and time >= self.flight.start:
+            return float(self.mode.energy(time))
+        return self.history.energy_at(time)
+
+    def at(self, td: float) -> Situation:
+        """Give the same record, flight and oscillator seen from another ``td``."""
+        return replace(self, td=td)
+
+
+def examine(history: History, td: float, settings: Settings) -> Situation:
+    """Find the flight around ``td`` and the oscillator in it.
+
+    RangeError when td, --after or the fit window lie outside the record, or it has fewer than 3 states.
+    """
+    if history.time.size < 3:
+        raise RangeError(
+            f"{', '.join(history.source)}: {history.time.size} states were found, choosing needs at least 3"
+        )
+    history.energy_at(td)
+    flight, fit = _flight_and_fit(history, td, settings)
+    mode, no_mode = _reliable_mode(history, td, fit)
+    return Situation(history, td, settings, flight, fit, mode, no_mode)
+
+
+def _flight_and_fit(history: History, td: float, settings: Settings) -> tuple[Flight, Identification | None]:
+    first, flight = float(history.time[0]), None
+    if settings.after is not None:
+        _inside(history, settings.after, "--after")
+        first = min(settings.after, td)
+    fit = _given_fit(history, settings, first)
+    if fit and fit.describes_record:
+        flight = span_of(history, td, fit, first)
+    elif settings.replay and not fit:
+        flight, fit = described_flight(history, td, first)
+    if settings.after is not None:
+        return Flight(settings.after, flight.end if flight else None, "given"), fit
+    return flight or energy_flight(history, td), fit
+
+
+def _given_fit(history: History, settings: Settings, first: float) -> Identification | None:
+    """Give the fit that the user prescribed, by an oscillator or by a window; None when it is to be searched."""
+    if settings.oscillator:
+        inside = history.time >= first
+
+        return assess(settings.oscillator, history.time[inside], history.energy[inside])
+    if settings.fit_window:
+        for bound in settings.fit_window:
+            _inside(history, bound, "--fit-window")
+        return identify_within(history, *settings.fit_window)
+    return None
+
+
+def _inside(history: History, time: float, option: str) -> None:
+    if not history.time[0] <= time <= history.time[-1]:
+        raise RangeError(
+            f"{', '.join(history.source)}: {option} {time:g} lies outside the record, "
+            f"{history.time[0]:g} to {history.time[-1]:g}"
+        )
+
+
+def _reliable_mode(history: History, td: float, fit: Identification | None) -> tuple[Mode | None, str | None]:
+    """Give the mode of ``fit`` if it can be relied on at td, else None and why not."""
+    if fit is None:
+        return None, "no oscillator was looked for (--no-verify)"
+    if not fit.describes_record or fit.mode is None:
+        return None, f"no single oscillator describes the record: {fit.reason}"
+    period = 2 * np.pi / fit.mode.omega
+    last = (history.time > max(td - period, fit.start)) & (history.time <= td)
+    scatter = float(np.sqrt(np.mean((history.energy[last] - fit.mode.energy(history.time[last])) ** 2)))
+    vibration = float(fit.mode.vibration_energy(td))
+    if scatter > _DROWNED * vibration:
+        return None, (
+            f"at td the vibration energy {vibration:.3g} has sunk into the scatter of the record, {scatter:.3g}: "
+            "the sign of the deformation cannot be told"
+        )
+    return fit.mode, None

@@ -1,0 +1,113 @@
+"""Crossings and extrema of sampled energies: conventions, exactness, and what shifting and scaling must not change."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from d2rpick.crossings import find_crossings, find_extrema
+
+# small integers hit every coincidence: samples on the level, plateaus, touching
+levels = st.integers(-3, 3)
+energies = st.lists(levels, min_size=1, max_size=12)
+CONVENTIONS = {
+    "between two samples": ([0, 4], 1, [(0.25, True)]),
+    "on a sample": ([2, 1, 0], 1, [(1.0, False)]),
+    "a plateau counts once, at its first sample": ([0, 1, 1, 1, 2], 1, [(1.0, True)]),
+    "touching from below": ([0, 1, 0], 1, []),
+    "touching from above, on a plateau": ([2, 1, 1, 2], 1, []),
+    "the record begins on the level": ([1, 2, 3], 1, [(0.0, True)]),
+    "the record begins with a plateau on the level": ([1, 1, 0], 1, [(0.0, False)]),
+    "the record ends on the level": ([3, 2, 1], 1, [(2.0, False)]),
+    "the record ends with a plateau on the level": ([0, 1, 1], 1, [(1.0, True)]),
+    "always on the level": ([1, 1, 1], 1, []),
+    "never on the level": ([2, 3, 2], 1, []),
+    "one sample": ([1], 1, []),
+    "up and down": ([0, 2, 0], 1, [(0.5, True), (1.5, False)]),
+}
+
+
+def crossings(energy: list[int], level: float) -> list[tuple[float, bool]]:
+    time = np.arange(len(energy), dtype=float)
+    return [(c.time, c.rising) for c in find_crossings(time, np.array(energy, dtype=float), level)]
+
+
+@pytest.mark.parametrize("name", CONVENTIONS)
+def test_conventions(name: str) -> None:
+    energy, level, expected = CONVENTIONS[name]
+    assert crossings(energy, level) == expected
+
+
+def walk(energy: list[int], level: int) -> list[tuple[Fraction, bool]]:
+    """Crossings by a walk in rational arithmetic: the same conventions, another way."""
+    found: list[tuple[Fraction, bool]] = []
+    side, arrived = 0, Fraction(0)
+    for i, value in enumerate(energy):
+        now = (value > level) - (value < level)
+        if now == 0:
+            if i == 0 or energy[i - 1] != level:
+                arrived = Fraction(i)
+            continue
+        if i and energy[i - 1] == level:
+            if side != now:
+                found.append((arrived, now > 0))
+        elif side and side != now:
+            before = energy[i - 1]
+            found.append((i - 1 + Fraction(level - before, value - before), now > 0))
+        side = now
+    if side and energy[-1] == level:
+        found.append((arrived, side < 0))
+    return found
+
+
+@given(energies, levels)
+def test_exact_on_piecewise_linear_data(energy: list[int], level: int) -> None:
+    found, expected = crossings(energy, level), walk(energy, level)
+    assert [rising for _, rising in found] == [rising for _, rising in expected]
+    assert [time for time, _ in found] == pytest.approx([float(time) for time, _ in expected], rel=1e-15, abs=0)
+
+
+@given(energies, levels, st.integers(-5, 5), st.sampled_from([0.25, 2.0, 1024.0]), st.sampled_from([0.5, 4.0]))
+def test_shifting_and_scaling_shift_and_scale_the_answer(
+    energy: list[int], level: int, shift: int, stretch: float, gain: float
+) -> None:
+    time, values = np.arange(len(energy), dtype=float), np.array(energy, dtype=float)
+    plain = find_crossings(time, values, level)
+    moved = find_crossings(stretch * (time + shift), gain * (values + shift), gain * (level + shift))
+    assert [c.rising for c in moved] == [c.rising for c in plain]
+    assert [c.time for c in moved] == pytest.approx([stretch * (c.time + shift) for c in plain], rel=1e-14, abs=1e-14)
+
+
+@given(energies, levels)
+def test_crossings_alternate_and_mirror(energy: list[int], level: int) -> None:
+    found = crossings(energy, level)
+    assert all(a[1] != b[1] for a, b in pairwise(found))
+    assert [(t, not up) for t, up in crossings([-e for e in energy], -level)] == found
+
+
+@given(energies)
+def test_extrema_are_where_the_slope_changes_sign(energy: list[int]) -> None:
+    values = np.array(energy, dtype=float)
+    found = find_extrema(np.arange(len(energy), dtype=float), values)
+    for one in found:
+        i = int(one.time)
+        assert one.energy == values[i]
+        before = next((v for v in values[:i][::-1] if v != values[i]), values[i])
+        after = next((v for v in values[i:] if v != values[i]), values[i])
+        assert (before < values[i] > after) if one.peak else (before > values[i] < after)
+    assert all(a.peak != b.peak for a, b in pairwise(found))
+    monotone = np.all(np.diff(values) >= 0) or np.all(np.diff(values) <= 0)
+    assert (not found) == bool(monotone)
+
+
+@settings(max_examples=30)
+@given(st.floats(1e-3, 1e3), st.floats(-1e3, 1e3))
+def test_a_straight_line_is_crossed_where_it_is(slope: float, offset: float) -> None:
+    time = np.linspace(0, 1, 11)
+    (one,) = find_crossings(time, offset + slope * time, offset + 0.437 * slope)
+    assert one.time == pytest.approx(0.437, abs=1e-12 + 1e-15 * abs(offset) / slope * 4)

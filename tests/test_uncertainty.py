@@ -1,0 +1,102 @@
+"""Intervals of tr must hold the true crossing, and be no wider than they need."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.crossings import find_crossings
+from d2rpick.history import History, Precision
+from d2rpick.identify import identify
+from d2rpick.mode import Mode
+from d2rpick.uncertainty import curvature, fitted_reach, reach, sampled_reach
+
+
+def rounded(values: np.ndarray, digits: int) -> np.ndarray:
+    return np.array([float(f"{value:.{digits - 1}e}") for value in values])
+
+
+def random_mode(rng: np.random.Generator) -> Mode:
+    return Mode(
+        omega=2 * np.pi, alpha=rng.uniform(0, 0.5), cosine=rng.normal(), sine=rng.normal(), origin=0.0
+    )  # period 1
+
+
+def covered(samples_per_period: int, digits: int, *, jitter: float, runs: int) -> tuple[float, float]:
+    """Share of the crossings that the samples show whose interval holds the true one; median half width over step."""
+    rng = np.random.default_rng(20261)
+    inside, widths = [], []
+    for _ in range(runs):
+        mode, step = random_mode(rng), 1 / samples_per_period
+        time = step * (np.arange(6 * samples_per_period) + jitter * rng.uniform(-0.5, 0.5, 6 * samples_per_period))
+        td = float(rng.uniform(4, 5))
+        true = [t for level in (1, -1) for t in mode.crossings(level * float(mode.deformation(td)), time[0], td - step)]
+        printed = Precision(digits=digits)
+        history = History(
+            rounded(time, digits), rounded(mode.energy(time), digits), source=("test",), format="csv", channel="E",
+            time_precision=printed, energy_precision=printed,
+        )  # fmt: skip
+        found = [c for c in find_crossings(history.time, history.energy, history.energy_at(td)) if c.time < td - step]
+        if not found:
+            continue
+        times = np.array([c.time for c in found])
+        rising = np.array([float(mode.deformation(t) * mode.velocity(t)) > 0 for t in true])
+        half = sampled_reach(history, times, td)
+        for one, width in zip(found, half, strict=True):
+            same = np.array(true)[rising == one.rising]
+            distance = np.abs(same - one.time).min()
+            if distance < 0.25 / 2:  # a true crossing that the samples show
+                inside.append(distance <= width)
+        widths += (half / step).tolist()
+    return float(np.mean(inside)), float(np.median(widths))
+
+
+@pytest.mark.parametrize(
+    ("samples_per_period", "digits", "widest"),
+    [(12, 6, 1.2), (20, 6, 0.66), (20, 5, 0.66), (50, 6, 0.2), (200, 6, 0.042)],
+)
+def test_intervals_from_samples_hold_the_true_crossing(samples_per_period: int, digits: int, widest: float) -> None:
+    share, width = covered(samples_per_period, digits, jitter=0.4, runs=150)
+    assert share >= 0.99
+    assert width <= widest
+
+
+def test_intervals_of_a_fit_hold_the_true_crossing() -> None:
+    rng = np.random.default_rng(7)
+    inside = []
+    for _ in range(60):
+        mode = random_mode(rng)
+        time = np.arange(0, 6, 1 / 40)
+        noise = 0.01 * float(np.max(mode.energy(time))) * rng.normal(size=time.size)
+        history = History(time, mode.energy(time) + noise, source=("test",), format="csv", channel="E")
+        fit = identify(history.time, history.energy)
+        if not fit.describes_record or fit.mode is None:
+            continue
+        td = 3.3
+        for sign in (1, -1):
+            true = mode.crossings(sign * float(mode.deformation(td)), 0.5, 3.0)
+            times = np.array(fit.mode.crossings(sign * float(fit.mode.deformation(td)), 0.45, 3.05))
+            if times.size:
+                half = fitted_reach(history, fit, fit.mode, times, td)
+                inside += [bool(np.any(np.abs(times - t) <= half)) for t in true]
+    assert len(inside) > 200
+    assert np.mean(inside) >= 0.99
+
+
+# zero, or of a size whose squares still are numbers
+sizes = st.one_of(st.just(0.0), st.floats(1e-100, 1e3))
+
+
+@given(sizes, sizes, sizes)
+def test_reach_uses_up_the_error(slope: float, bend: float, error: float) -> None:
+    x = float(reach(slope, bend, error))
+    assert x >= 0
+    if np.isfinite(x):
+        assert slope * x + bend * x**2 / 2 >= error * (1 - 1e-9)
+
+
+def test_curvature_of_a_parabola_is_exact_on_uneven_times() -> None:
+    time = np.array([0.0, 0.1, 0.35, 0.4, 0.8, 1.0])
+    np.testing.assert_allclose(curvature(time, 3 * time**2, np.array([0.0, 0.5, 1.0])), 6.0, rtol=1e-12)
