@@ -18,8 +18,6 @@ from d2rpick.uncertainty import fitted_reach, sampled_reach
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from numpy.typing import NDArray
-
     from d2rpick.history import History, Samples
 
 # Candidates whose error is within this of the smallest count as equally good: then the longer rigid window wins.
@@ -178,7 +176,7 @@ def _from_samples(situation: Situation) -> list[Found]:
     before = history.time < td
     time = np.append(history.time[before], td)
     energy = np.append(history.energy[before], situation.energy_td)
-    end = situation.flight.start if situation.mode and situation.flight.start is not None else td
+    end = situation.span.start if situation.mode and situation.span else td
     crossings = find_crossings(time, energy, situation.energy_td)
     found: list[Found] = [(c.time, "crossing", c.rising) for c in crossings if c.time < end]
     if not situation.mode:
@@ -188,9 +186,10 @@ def _from_samples(situation: Situation) -> list[Found]:
 
 def _from_mode(situation: Situation) -> list[Found]:
     """Exact crossings and standstills of the oscillator between the end of the load and td."""
-    mode, start, td = situation.mode, situation.flight.start, situation.td
-    if not mode or start is None:
+    mode, td = situation.mode, situation.td
+    if not mode or not situation.span:
         return []
+    start = situation.span.start
     level = float(mode.deformation(td))
     times = sorted({t for q in (level, -level) for t in mode.crossings(q, start, td)})
     rising = [bool(mode.deformation(t) * mode.velocity(t) > 0) for t in times]
@@ -213,13 +212,9 @@ def _interval(situation: Situation, times: Samples) -> tuple[Samples, Samples]:
     history, td, fit, mode = situation.history, situation.td, situation.fit, situation.mode
     reach = sampled_reach(history, times, td)
     if mode and fit:
-        reach = np.where(_flying(situation, times), fitted_reach(history, fit, mode, times, td), reach)
+        described = np.array([situation.described(float(t)) for t in times])
+        reach = np.where(described, fitted_reach(history, fit, mode, times, td), reach)
     return times - reach, times + reach
-
-
-def _flying(situation: Situation, times: Samples | float) -> NDArray[np.bool_]:
-    start = situation.flight.start
-    return np.asarray(times) >= (np.inf if start is None else start)
 
 
 def _candidate(
@@ -229,7 +224,7 @@ def _candidate(
     energy, energy_td = situation.energy_at(tr), situation.energy_td
     level_error = measures.level_error(energy, energy_td)
     sign_match = lock_in = residual = tolerance = None
-    if mode and _flying(situation, tr):
+    if mode and situation.described(tr):
         sign_match = bool(mode.deformation(tr) * mode.deformation(td) >= 0)
         lock_in = measures.lock_in_error(mode, tr, td)
         residual = Replay(*from_mode(mode, tr), origin=tr, tr=tr, td=td).residual()
@@ -254,7 +249,7 @@ def _candidate(
         tr_high=high,
         acceptable=not objections,
         recommended=False,
-        notes=objections + tuple(_remarks(situation, tr, (high - low) / 2, tolerance)),
+        notes=objections + tuple(_remarks(situation, (high - low) / 2, tolerance)),
     )
 
 
@@ -267,7 +262,9 @@ def _objections(situation: Situation, tr: float, sign_match: bool | None, error:
         yield f"before the end of the load at {earliest:.6g}"
     if situation.td > situation.latest_td:
         yield f"td after the end of the flight at {situation.latest_td:.6g}"
-    if sign_match is False:
+    if situation.mode and sign_match is None:
+        yield "not described by the oscillator"
+    elif sign_match is False:
         yield "opposite sign of the deformation"
     elif error is None:
         yield "no positive energy to compare"
@@ -275,12 +272,12 @@ def _objections(situation: Situation, tr: float, sign_match: bool | None, error:
         yield f"error {error:.3g} above the tolerance {situation.settings.tolerance:g}"
 
 
-def _remarks(situation: Situation, tr: float, reach: float, tolerance: float | None) -> Iterator[str]:
+def _remarks(situation: Situation, reach: float, tolerance: float | None) -> Iterator[str]:
     """What to know of this tr beside its acceptance."""
     if situation.mode is None and situation.no_mode:
         yield f"sign, lock-in error and residual unknown: {situation.no_mode}"
-    elif not _flying(situation, tr):
-        yield "sign, lock-in error and residual unknown outside the flight"
+    elif tolerance is None:
+        yield "sign, lock-in error and residual unknown where the oscillator does not describe the record"
     if tolerance is not None and reach > tolerance:
         yield f"tr is known to ±{reach:.2g} only, its timing tolerance is {tolerance:.2g}"
     if tolerance is None and reach >= situation.history.step:
@@ -321,8 +318,10 @@ def _peaks(situation: Situation) -> list[float]:
     start, history = situation.earliest_tr, situation.history
     if start is None:
         return []
-    if situation.mode:
-        return list(situation.mode.peaks(start, min(situation.latest_td, float(history.time[-1]))))
+    if situation.mode and situation.span:
+        return list(
+            situation.mode.peaks(max(start, situation.span.start), min(situation.latest_td, situation.span.end))
+        )
     extrema = find_extrema(history.time, history.energy)
     return [e.time for e in extrema if e.peak and start < e.time <= min(situation.latest_td, situation.td)]
 

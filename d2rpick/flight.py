@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -40,7 +40,14 @@ class Flight:
     source: str | None
 
 
-def described_flight(history: History, td: float, first: float) -> tuple[Flight | None, Identification]:
+class Span(NamedTuple):
+    """Window of the record that an oscillator describes, from its first to its last sample [time]."""
+
+    start: float
+    end: float
+
+
+def described_span(history: History, td: float, first: float) -> tuple[Span | None, Identification]:
     """Find the longest window around td that one oscillator describes.
 
     First a part of the record that one oscillator describes is looked for: all of it, up to td, then ever
@@ -55,7 +62,7 @@ def described_flight(history: History, td: float, first: float) -> tuple[Flight 
 
     Returns
     -------
-    flight : Flight or None
+    span : Span or None
         None when no oscillator describes the record around td.
     fit : Identification
         Of that window; when there is none, of the part up to td, with the reason of its refusal.
@@ -64,18 +71,17 @@ def described_flight(history: History, td: float, first: float) -> tuple[Flight 
     for start, end in _windows(first, td, float(history.time[-1])):
         fit = identify_within(history, start, end)
         if fit.describes_record:
-            flight, fit = _grow(history, td, fit, first)
-            if flight:
-                return flight, fit
+            span, fit = _grow(history, td, fit, first)
+            if span:
+                return span, fit
         refused.append(fit)
     return None, refused[1]
 
 
-def span_of(history: History, td: float, fit: Identification, first: float) -> Flight | None:
+def span_of(history: History, td: float, fit: Identification, first: float) -> Span | None:
     """Find the window around td, from ``first`` on, in which the record stays with ``fit``.
 
-    It ends where the energy drifts off the fit.  Its end is None where it reaches the end of the record, and it is
-    None itself where the record is off the fit at td.
+    It ends where the energy drifts off the fit; None when it is off at td itself.
     """
     assert fit.mode is not None
     begin = int(np.searchsorted(history.time, first))
@@ -90,9 +96,7 @@ def span_of(history: History, td: float, fit: Identification, first: float) -> F
     before, after = np.flatnonzero(gone[:middle]), np.flatnonzero(gone[middle:])
     left = int(before[-1]) + 1 if before.size else 0
     right = middle + int(after[0]) - 1 if after.size else time.size - 1
-    if left >= right:
-        return None
-    return Flight(float(time[left]), float(time[right]) if right < time.size - 1 else None, "oscillator")
+    return Span(float(time[left]), float(time[right])) if left < right else None
 
 
 def energy_flight(history: History, td: float) -> Flight:
@@ -125,17 +129,14 @@ def identify_within(history: History, start: float, end: float) -> Identificatio
     return identify(history.time[inside], history.energy[inside])
 
 
-def _grow(history: History, td: float, fit: Identification, first: float) -> tuple[Flight | None, Identification]:
+def _grow(history: History, td: float, fit: Identification, first: float) -> tuple[Span | None, Identification]:
     """Extend the fitted window while the record stays with the fit, refit, repeat."""
-    flight = span_of(history, td, fit, first)
+    span = span_of(history, td, fit, first)
     for _ in range(_MOST_REFITS):
-        if flight is None or flight.start is None:
+        if span is None or span == (fit.start, fit.end):
             break
-        end = history.time[-1] if flight.end is None else flight.end
-        if (flight.start, end) == (fit.start, fit.end):
-            break
-        refit = identify_within(history, flight.start, float(end))
+        refit = identify_within(history, *span)
         if not refit.describes_record:
             break
-        fit, flight = refit, span_of(history, td, refit, first)
-    return flight, fit
+        fit, span = refit, span_of(history, td, refit, first)
+    return span, fit

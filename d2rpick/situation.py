@@ -9,7 +9,7 @@ import numpy as np
 
 from d2rpick import measures
 from d2rpick.errors import RangeError
-from d2rpick.flight import Flight, described_flight, energy_flight, identify_within, span_of
+from d2rpick.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
 from d2rpick.identify import Identification, assess
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Situation:
     """A history seen from one td [time].
 
     ``fit`` is None only where no oscillator was looked for; ``mode`` is its mode where it can be relied on at td,
-    else None, and then ``no_mode`` says why.
+    else None, and then ``no_mode`` says why.  ``span`` is the window in which it describes the record.
     """
 
     history: History
@@ -56,6 +56,7 @@ class Situation:
     flight: Flight
     fit: Identification | None
     mode: Mode | None
+    span: Span | None
     no_mode: str | None
 
     @property
@@ -83,9 +84,13 @@ class Situation:
         """End of the flight with the margin; infinite when no contact was seen [time]."""
         return float("inf") if self.flight.end is None else self.flight.end - self.settings.margin
 
+    def described(self, time: float) -> bool:
+        """Whether the oscillator describes the record at ``time``."""
+        return self.mode is not None and self.span is not None and self.span.start <= time <= self.span.end
+
     def energy_at(self, time: float) -> float:
-        """Energy at ``time``: of the oscillator inside the flight, of the samples elsewhere [energy]."""
-        if self.mode and self.flight.start is not None and time >= self.flight.start:
+        """Energy at ``time``: of the oscillator where it describes the record, of the samples elsewhere [energy]."""
+        if self.mode and self.described(time):
             return float(self.mode.energy(time))
         return self.history.energy_at(time)
 
@@ -104,31 +109,40 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
             f"{', '.join(history.source)}: {history.time.size} states were found, choosing needs at least 3"
         )
     history.energy_at(td)
-    flight, fit = _flight_and_fit(history, td, settings)
-    mode, no_mode = _reliable_mode(history, td, fit)
-    return Situation(history, td, settings, flight, fit, mode, no_mode)
-
-
-def _flight_and_fit(history: History, td: float, settings: Settings) -> tuple[Flight, Identification | None]:
-    first, flight = float(history.time[0]), None
     if settings.after is not None:
         _inside(history, settings.after, "--after")
-        first = min(settings.after, td)
+    fit, span = _oscillator(history, td, settings)
+    mode, no_mode = _reliable_mode(history, td, fit, span)
+    return Situation(history, td, settings, _flight(history, td, settings.after, span), fit, mode, span, no_mode)
+
+
+def _oscillator(history: History, td: float, settings: Settings) -> tuple[Identification | None, Span | None]:
+    """Find the oscillator, given or identified, and the window around td that it describes."""
+    first = float(history.time[0]) if settings.after is None else min(settings.after, td)
+    if not settings.replay:
+        return None, None
     fit = _given_fit(history, settings, first)
-    if fit and fit.describes_record:
-        flight = span_of(history, td, fit, first)
-    elif settings.replay and not fit:
-        flight, fit = described_flight(history, td, first)
-    if settings.after is not None:
-        return Flight(settings.after, flight.end if flight else None, "given"), fit
-    return flight or energy_flight(history, td), fit
+    if fit is None:
+        span, fit = described_span(history, td, first)
+        return fit, span
+    return fit, span_of(history, td, fit, first) if fit.describes_record else None
+
+
+def _flight(history: History, td: float, after: float | None, span: Span | None) -> Flight:
+    """Choose the best answer to when the load is over: given, by the oscillator, by the energy."""
+    if after is None and span is None:
+        return energy_flight(history, td)
+    end = span.end if span and span.end < history.time[-1] else None
+    if after is not None:
+        return Flight(after, end, "given")
+    assert span is not None
+    return Flight(span.start, end, "oscillator")
 
 
 def _given_fit(history: History, settings: Settings, first: float) -> Identification | None:
     """Give the fit that the user prescribed, by an oscillator or by a window; None when it is to be searched."""
     if settings.oscillator:
         inside = history.time >= first
-
         return assess(settings.oscillator, history.time[inside], history.energy[inside])
     if settings.fit_window:
         for bound in settings.fit_window:
@@ -145,14 +159,18 @@ def _inside(history: History, time: float, option: str) -> None:
         )
 
 
-def _reliable_mode(history: History, td: float, fit: Identification | None) -> tuple[Mode | None, str | None]:
+def _reliable_mode(
+    history: History, td: float, fit: Identification | None, span: Span | None
+) -> tuple[Mode | None, str | None]:
     """Give the mode of ``fit`` if it can be relied on at td, else None and why not."""
     if fit is None:
         return None, "no oscillator was looked for (--no-verify)"
     if not fit.describes_record or fit.mode is None:
         return None, f"no single oscillator describes the record: {fit.reason}"
+    if span is None:
+        return None, "the oscillator does not describe the record at td"
     period = 2 * np.pi / fit.mode.omega
-    last = (history.time > max(td - period, fit.start)) & (history.time <= td)
+    last = (history.time >= max(td - period, span.start)) & (history.time <= max(td, span.start))
     scatter = float(np.sqrt(np.mean((history.energy[last] - fit.mode.energy(history.time[last])) ** 2)))
     vibration = float(fit.mode.vibration_energy(td))
     if scatter > _DROWNED * vibration:

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 _BEND_RESERVE = 1.25
 # Three standard deviations: 99.7 % of normal errors.
 _DEVIATIONS = 3.0
+# However well a fit follows the samples, it is a model of what happens between them: this share of the output
+# interval is kept in reserve.
+_BETWEEN_SAMPLES = 1e-3
 
 
 def sampled_reach(history: History, times: Samples, td: float) -> Samples:
@@ -61,7 +64,7 @@ def fitted_reach(history: History, fit: Identification, mode: Mode, times: Sampl
     q, velocity = mode.deformation(times), mode.velocity(times)
     acceleration = -mode.alpha * velocity - mode.omega_0**2 * (q - mode.preload)
     distance = reach(np.abs(2 * q * velocity), np.abs(2 * (velocity**2 + q * acceleration)), error)
-    return np.minimum(distance, 2 * history.step) + _time_quanta(history, times, td)
+    return np.minimum(distance, 2 * history.step) + _BETWEEN_SAMPLES * history.step + _time_quanta(history, times, td)
 
 
 def _half_quantum(history: History, column: str, values: Samples) -> Samples:

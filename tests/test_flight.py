@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from d2rpick.flight import Flight, described_flight, energy_flight
+from d2rpick.flight import Flight, Span, described_span, energy_flight
 from d2rpick.history import History
 from d2rpick.situation import Settings, examine
 from tests import paper
@@ -71,8 +71,9 @@ def test_the_next_contact_ends_the_flight(td: float) -> None:
 
 
 def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown_end() -> None:
-    flight, fit = described_flight(paper.history(), paper.TD, 0.0)
-    assert flight == Flight(0.0, None, "oscillator")
+    span, fit = described_span(paper.history(), paper.TD, 0.0)
+    assert span == Span(0.0, 0.15)
+    assert examine(paper.history(), paper.TD, Settings()).flight == Flight(0.0, None, "oscillator")
     assert fit.mode is not None
     assert fit.mode.omega == pytest.approx(paper.OMEGA_2, rel=1e-10)
 
@@ -105,6 +106,22 @@ def test_a_start_that_is_given_replaces_the_start_only() -> None:
     assert (situation.flight.start, situation.flight.source) == (0.03, "given")
     assert situation.flight.end == pytest.approx(0.09, abs=PERIOD / 10)
     assert situation.basis == "oscillator"
+
+
+def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
+    situation = examine(loaded(), 0.064, Settings(after=0.005))
+    assert situation.flight.start == 0.005
+    assert situation.span is not None
+    assert situation.span.start == pytest.approx(0.020, abs=PERIOD / 10)
+    assert situation.energy_at(0.01) == pytest.approx(loaded().energy_at(0.01))
+
+
+def test_a_fit_window_away_from_td_says_nothing_of_td() -> None:
+    history = loaded(alpha=5.0, contact=0.09)
+    situation = examine(history, 0.12, Settings(fit_window=(0.03, 0.085)))
+    assert situation.basis == "energy"
+    assert situation.no_mode is not None
+    assert "does not describe the record at td" in situation.no_mode
 
 
 def test_a_fit_window_is_where_the_oscillator_comes_from() -> None:
