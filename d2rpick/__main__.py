@@ -1,0 +1,19 @@
+"""The command line as a program: ``d2rpick`` and ``python -m d2rpick``."""
+
+import os
+
+
+def main() -> None:
+    """Run the command line.
+
+    One thread for linear algebra, unless the environment says otherwise: the systems solved here are small, and
+    starting the others costs a quarter of numpy's import.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from d2rpick.cli import d2rpick
+
+    d2rpick()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,111 @@
+"""The command line: a thin shell around the library, and the only place that prints or exits.
+
+Commands are imported when they are called, and what they compute with inside of them: ``--help`` stays quick.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import os
+import sys
+from typing import TYPE_CHECKING, Any, Final, NoReturn
+
+import click
+
+from d2rpick import __version__
+from d2rpick.errors import D2RPickError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+COMMANDS: Final = ("suggest", "verify", "replay")
+COULD_NOT_RUN: Final = 2
+BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended
+EXAMPLES: Final = """\b
+Examples:
+  d2rpick suggest --td 0.064 sample_data/energy.csv
+  d2rpick verify --tr 0.013 --td 0.064 sample_data/energy.csv
+  d2rpick replay --help
+"""
+
+
+class _PipeClosed(Exception):  # noqa: N818  not an error: the reader of the pipe has seen enough
+    """Carries BrokenPipeError past click, which would exit with 1: an objection."""
+
+
+class _Group(click.Group):
+    """Loads commands on demand; the one place where errors become messages and exit codes."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  click's signature
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
+        if name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"d2rpick.cli.{name}").command
+        return command
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        if args[0] not in COMMANDS and not args[0].startswith("-"):
+            close = difflib.get_close_matches(args[0], COMMANDS, n=1)
+            hint = f"Did you mean {close[0]!r}?" if close else f"There are {', '.join(COMMANDS)}."
+            raise click.UsageError(f"No such command {args[0]!r}. {hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if not args:
+            click.echo(ctx.get_help(), err=True)
+            ctx.exit(COULD_NOT_RUN)
+        ctx.meta["d2rpick.command"] = tuple(args)  # click consumes the list
+        return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError as error:
+            raise _PipeClosed from error
+        except (D2RPickError, OSError) as error:
+            if ctx.meta.get("d2rpick.debug"):
+                import traceback
+
+                click.echo(traceback.format_exc(), err=True, nl=False)
+            raise click.ClickException(_one_line(error)) from error
+
+    def main(self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any) -> NoReturn:  # type: ignore[override]
+        extra["standalone_mode"] = False
+        try:
+            code = super().main(args, prog_name or "d2rpick", **extra)
+        except click.UsageError as error:
+            where = f" (see '{error.ctx.command_path} --help')" if error.ctx else ""
+            _fail(error.format_message().rstrip(".") + where)
+        except click.ClickException as error:
+            _fail(error.format_message())
+        except click.Abort:
+            _fail("interrupted")
+        except _PipeClosed:
+            # python must not complain when it closes the stream at exit
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(BROKEN_PIPE)
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+def _fail(message: str) -> NoReturn:
+    click.echo(f"d2rpick: {message}", err=True)
+    sys.exit(COULD_NOT_RUN)
+
+
+def _one_line(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or 'standard output'}: {error.strerror}"
+    return str(error)
+
+
+@click.group(
+    cls=_Group,
+    epilog=EXAMPLES,
+    context_settings={"auto_envvar_prefix": "D2RPICK", "help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(__version__, prog_name="d2rpick")
+def d2rpick() -> None:
+    """Choose the times of deformable-to-rigid switching from the internal energy of one reference run."""

@@ -1,0 +1,195 @@
+"""Options that several commands share: defined once, same name and help everywhere."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from d2rpick.history import History
+    from d2rpick.oscillator import Oscillator
+    from d2rpick.situation import Settings
+
+Decorated = Any  # a command function; click's decorators do not say more
+
+
+class Number(click.ParamType[float]):
+    """A finite number with a point, not below ``low`` (or above it, when ``above``)."""
+
+    name = "number"
+
+    def __init__(self, low: float = -math.inf, *, above: bool = False) -> None:
+        self.low, self.above = low, above
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Read a number or fail with what was found and what was expected."""
+        try:
+            number = float(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a number", param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number", param, ctx)
+        if number < self.low or (self.above and number == self.low):
+            self.fail(
+                f"{value} was found, a number {'above' if self.above else 'of at least'} {self.low:g} was expected",
+                param,
+                ctx,
+            )
+        return number
+
+
+TIME = Number()
+POSITIVE = Number(0.0, above=True)
+NOT_NEGATIVE = Number(0.0)
+
+
+def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
+    def apply(function: Decorated) -> Decorated:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return apply
+
+
+def history_options(function: Decorated) -> Decorated:
+    """HISTORY and how to read it; passed on as ``history``, ``input_format``, ``time``, ``energy``."""
+    return _stack(
+        click.argument("history", metavar="HISTORY"),
+        click.option(
+            "-F", "--input-format", type=click.Choice(["auto", "csv", "glstat"]), default="auto", show_default=True,
+            help="Format of HISTORY; auto goes by its content.",
+        ),
+        click.option("--time", metavar="NAME|NUMBER", help="Time column, by its name or number."),
+        click.option(
+            "--energy", metavar="NAME|NUMBER", multiple=True,
+            help="Energy column or label; given several times, their sum.",
+        ),
+    )(function)  # fmt: skip
+
+
+def output_options(*formats: str) -> Callable[[Decorated], Decorated]:
+    """Where the result goes, and in which of ``formats``, the first by default."""
+
+    def apply(function: Decorated) -> Decorated:
+        return _stack(
+            click.option(
+                "-f", "--output-format", type=click.Choice(formats), default=formats[0], show_default=True,
+                help="Form of the result.",
+            ),
+            click.option("--exit-zero", is_flag=True, help="Exit with 0 where the answer is an objection (1)."),
+        )(file_options(function))  # fmt: skip
+
+    return apply
+
+
+def file_options(function: Decorated) -> Decorated:
+    """Where the result goes."""
+    return _stack(
+        click.option("-o", "--output-file", metavar="FILE", help="Write the result to FILE, whole or not at all."),
+        click.option("--overwrite", is_flag=True, help="Replace files that exist."),
+        click.option("-q", "--quiet", is_flag=True, help="No notes and warnings on stderr."),
+        click.option(
+            "--debug", is_flag=True, expose_value=False, callback=_remember_debug,
+            help="Show the traceback of an error.",
+        ),
+    )(function)  # fmt: skip
+
+
+def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
+    """Parameters of the floating oscillator."""
+    return _stack(
+        click.option("--stiffness", type=POSITIVE, required=required, help="Spring k."),
+        click.option("--mass", type=POSITIVE, required=required, help="Suspended mass M."),
+        click.option("--frame-mass", type=POSITIVE, help="Frame mass m; or --beta."),
+        click.option("--beta", type=POSITIVE, help="M/m, instead of --frame-mass."),
+        click.option(
+            "--alpha", type=NOT_NEGATIVE, default=0.0 if required else None, show_default=required,
+            help="Damping rate, proportional to mass.",
+        ),
+        click.option("--v0", type=TIME, required=required, help="Velocity of the frame at time 0; all else at rest."),
+    )  # fmt: skip
+
+
+def choosing_options(function: Decorated) -> Decorated:
+    """Options of ``suggest`` and ``verify``; collected by ``settings``."""
+    return _stack(
+        click.option("--after", type=TIME, metavar="T", help="The load ends here.  [default: found from the record]"),
+        click.option(
+            "--margin", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="T",
+            help="Time kept clear after the load and before the next contact.",
+        ),
+        click.option(
+            "--tolerance", type=NOT_NEGATIVE, default=0.2, show_default=True, metavar="L",
+            help="On the lock-in error, or on the level error where no oscillator is known.",
+        ),
+        click.option(
+            "--max-kinetic-share", type=NOT_NEGATIVE, metavar="K", help="Object to a td with a larger kinetic share.",
+        ),
+        click.option("--max-residual", type=NOT_NEGATIVE, metavar="R", help="Object to a pair with a larger residual."),
+        oscillator_options(required=False),
+        click.option("--fit-window", type=(TIME, TIME), metavar="LO HI", help="Identify the oscillator here only."),
+        click.option("--no-verify", is_flag=True, help="Judge by the energy level alone, without an oscillator."),
+        click.option("--plot", metavar="FILE", help="Draw energy and motion to FILE (png, svg, pdf)."),
+    )(function)  # fmt: skip
+
+
+def read(options: dict[str, Any]) -> History:
+    """Read the history that the options of ``history_options`` name."""
+    from d2rpick.readers import Selection, read_history
+
+    selection = Selection(time=options["time"], energy=options["energy"])
+    return read_history(options["history"], selection, options["input_format"])
+
+
+def oscillator(options: dict[str, Any]) -> Oscillator | None:
+    """Build the oscillator that the options give, None when they give none; UsageError when they give half of one."""
+    from d2rpick.oscillator import Oscillator
+
+    names = ("stiffness", "mass", "alpha", "v0")
+    given = [name for name in (*names, "frame_mass", "beta") if options[name] is not None]
+    if not given:
+        return None
+    missing = [name for name in names if options[name] is None]
+    if missing:
+        raise click.UsageError(f"--{_dashed(given[0])} needs --{_dashed(missing[0])} too: an oscillator is given whole")
+    if (options["frame_mass"] is None) == (options["beta"] is None):
+        raise click.UsageError("the oscillator needs either --frame-mass or --beta")
+    mass, frame_mass = options["mass"], options["frame_mass"]
+    return Oscillator(options["stiffness"], mass, frame_mass or mass / options["beta"], options["alpha"])
+
+
+def settings(options: dict[str, Any]) -> Settings:
+    """Collect the options of ``choosing_options``; UsageError where they contradict each other."""
+    from d2rpick.replay import to_mode
+    from d2rpick.situation import Settings
+
+    given, window = oscillator(options), options["fit_window"]
+    ways = {"an oscillator": given, "--fit-window": window, "--no-verify": options["no_verify"]}
+    chosen = [name for name, value in ways.items() if value]
+    if len(chosen) > 1:
+        raise click.UsageError(f"{chosen[0]} and {chosen[1]} exclude each other")
+    if window and not window[0] < window[1]:
+        raise click.UsageError(f"--fit-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
+    return Settings(
+        after=options["after"],
+        margin=options["margin"],
+        tolerance=options["tolerance"],
+        max_kinetic_share=options["max_kinetic_share"],
+        max_residual=options["max_residual"],
+        oscillator=to_mode(given, options["v0"]) if given else None,
+        fit_window=window,
+        replay=not options["no_verify"],
+    )
+
+
+def _dashed(name: str) -> str:
+    return name.replace("_", "-")
+
+
+def _remember_debug(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    ctx.meta["d2rpick.debug"] = value

@@ -1,0 +1,115 @@
+"""Where a command's results, notes and files go."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from d2rpick.errors import D2RPickError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from d2rpick.cautions import Caution
+
+OBJECTION = 1
+
+
+@dataclass(frozen=True)
+class Output:
+    """Results to stdout or ``file``, everything else to stderr unless ``quiet``; ``inputs`` are never written to."""
+
+    file: str | None
+    overwrite: bool
+    quiet: bool
+    inputs: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, options: dict[str, Any], *inputs: str) -> Output:
+        """Take the options of ``file_options``; D2RPickError when a file to be written may not be."""
+        output = cls(options["output_file"], options["overwrite"], options["quiet"], inputs)
+        plot = options.get("plot")
+        if plot is not None:
+            from d2rpick import plots
+
+            plots.format_of(plot)
+        names = [name for name in (options["output_file"], plot) if name is not None]
+        for name in names:
+            output.claim(name)
+        if len({Path(name).resolve() for name in names}) < len(names):
+            raise D2RPickError(f"{plot}: --plot and --output-file name the same file; name two")
+        return output
+
+    def claim(self, name: str) -> None:
+        """Raise D2RPickError when ``name`` cannot be written, is an input, or exists and was not to be replaced."""
+        path = Path(name)
+        if path.is_dir():
+            raise D2RPickError(f"{name or repr(name)}: this is a folder; name a file in it")
+        if not path.parent.is_dir():
+            raise D2RPickError(f"{name}: there is no folder {str(path.parent)!r}; create it or name another one")
+        if not path.exists():
+            return
+        if any(Path(source).exists() and path.samefile(source) for source in self.inputs):
+            raise D2RPickError(f"{name}: this is an input; name another file for the output")
+        if path.is_file() and not self.overwrite:
+            raise D2RPickError(f"{name}: the file exists; name another one or give --overwrite")
+
+    def result(self, text: str) -> None:
+        """Give out the result; on a terminal the line of the recommended candidate stands out."""
+        if self.file is not None:
+            self.write(self.file, f"{text}\n".encode())
+            return
+        colour = False if os.environ.get("NO_COLOR") else True if os.environ.get("FORCE_COLOR") else None
+        lines = (click.style(line, bold=True) if line.startswith("*") else line for line in text.split("\n"))
+        click.echo("\n".join(lines), color=colour)
+
+    def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
+        """Say what a reader left out, and what the user should know."""
+        if self.quiet:
+            return
+        for note in notes:
+            click.echo(f"note: {note}", err=True)
+        for caution in cautions:
+            click.echo(f"warning: {caution.code}: {caution.message}", err=True)
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file whole or not at all: into a temporary file beside it, which then takes its name.
+
+        A link stays, and the file it points to is replaced; a device or a named pipe is written to.
+        """
+        path = Path(name)
+        try:
+            if path.exists() and not path.is_file():
+                path.write_bytes(content)
+            else:
+                _replace(path.resolve(), content)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise D2RPickError(f"{name}: cannot be written ({error.strerror}); name another file") from error
+
+
+def _replace(path: Path, content: bytes) -> None:
+    import tempfile
+
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(temporary).chmod(0o666 & ~mask)  # mkstemp gives the owner alone access
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def finish(ctx: click.Context, *, objection: bool, exit_zero: bool) -> None:
+    """Exit with 1 when the answer is an objection, unless told otherwise."""
+    if objection and not exit_zero:
+        ctx.exit(OBJECTION)

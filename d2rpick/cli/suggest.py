@@ -1,0 +1,60 @@
+"""The command ``suggest``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from d2rpick.cli import options as shared
+from d2rpick.cli.output import Output, finish
+
+EXAMPLES = """\b
+Examples:
+  d2rpick suggest --td 0.064 sample_data/energy.csv
+  d2rpick suggest --td 0.37 --energy boxIE_J sample_data/rollover.csv
+  d2rpick suggest --td 0.064 -f json sample_data/energy.glstat
+"""
+
+
+@click.command("suggest", epilog=EXAMPLES)
+@click.option("--td", type=shared.TIME, required=True, metavar="T", help="Switch back to deformable at this time.")
+@click.option(
+    "--limit",
+    type=click.IntRange(min=1),
+    default=10,
+    show_default=True,
+    help="Rows of the table; json and csv hold all.",
+)
+@shared.history_options
+@shared.choosing_options
+@shared.output_options("table", "json", "csv", "markdown", "value")
+@click.pass_context
+def command(ctx: click.Context, /, td: float, limit: int, output_format: str, exit_zero: bool, **options: Any) -> None:
+    """Rank the times tr at which the parts of HISTORY can be made rigid until td.
+
+    A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
+    replaying the floating oscillator behind the record; the best one, and a better td, are named.
+    """
+    from d2rpick.choice import suggest
+    from d2rpick.report import suggestion as report
+
+    output = Output.of(options, options["history"])
+    history = shared.read(options)
+    answer = suggest(history, td, shared.settings(options))
+    output.notes(history.notes, answer.cautions)
+    if options["plot"]:
+        from d2rpick import plots
+
+        output.write(options["plot"], plots.render(plots.draw_suggestion(answer), options["plot"]))
+    texts = {
+        "table": lambda: report.as_table(answer, limit),
+        "markdown": lambda: report.as_markdown(answer, limit),
+        "csv": lambda: report.as_csv(answer),
+        "json": lambda: report.as_json(answer, ctx.meta["d2rpick.command"]),
+        "value": lambda: report.as_value(answer),
+    }
+    text = texts[output_format]()
+    if text:
+        output.result(text)
+    finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)

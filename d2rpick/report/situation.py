@@ -1,0 +1,96 @@
+"""What suggest and verify have in common in their output: history, flight, oscillator, warnings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from d2rpick import __version__
+from d2rpick.report.tables import measure
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from d2rpick.cautions import Caution
+    from d2rpick.situation import Situation
+
+
+def heading(situation: Situation) -> list[str]:
+    """Lines above the table of a result: what was read, and what the choice rests on."""
+    history, flight = situation.history, situation.flight
+    unit = f" {history.time_unit}" if history.time_unit else ""
+    what = f"{', '.join(history.source)}: {history.format}, {history.channel}"
+    share = measure(situation.kinetic_share)
+    lines = [
+        f"history  {what}, {history.time.size} states, {history.time[0]:.6g} to {history.time[-1]:.6g}{unit}",
+        f"td       {situation.td:.6g}: energy {situation.energy_td:.6g}, kinetic share {share}",
+    ]
+    fit, mode = situation.fit, situation.mode
+    if mode and fit:
+        parts = [f"omega {mode.omega:.6g}", f"alpha {mode.alpha:.4g}"]
+        parts += [f"{name} {value:.4g}" for name, value in _offsets(situation) if value]
+        misfit = "misfit below 1e-9" if fit.misfit is None or fit.misfit < 1e-9 else f"misfit {fit.misfit:.1e}"
+        source = "given" if situation.settings.oscillator else "identified"
+        lines.append(f"basis    oscillator, {source}: {', '.join(parts)}, {misfit}; tr and energies are its")
+    else:
+        lines.append("basis    energy")
+    if flight.start is None:
+        lines.append("flight   unknown")
+    else:
+        end = "no next contact seen" if flight.end is None else f"to {flight.end:.6g}"
+        lines.append(f"flight   from {flight.start:.6g} ({flight.source}), {end}")
+    return lines
+
+
+def frame(situation: Situation, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
+    """Keys that every JSON result begins with, and the history it rests on."""
+    from d2rpick.readers.source import sha256
+
+    history = situation.history
+    return {
+        "schema": schema,
+        "tool_version": __version__,
+        "command": list(command),
+        "warnings": [{"code": c.code, "message": c.message} for c in cautions],
+        "history": {
+            "source": list(history.source),
+            "sha256": [sha256(name) for name in history.source],
+            "format": history.format,
+            "channel": history.channel,
+            "parts": None,
+            "states": int(history.time.size),
+            "time_start": float(history.time[0]),
+            "time_end": float(history.time[-1]),
+            "complete": history.complete,
+            "notes": list(history.notes),
+        },
+    }
+
+
+def mechanics(situation: Situation) -> dict[str, Any]:
+    """Keys of JSON results that describe the situation at td."""
+    flight, fit = situation.flight, situation.fit
+    mode = fit.mode if fit else None
+    oscillator = None
+    if fit:
+        oscillator = {
+            "omega": mode.omega if mode else None,
+            "alpha": mode.alpha if mode else None,
+            "energy_plastic": mode.energy_plastic if mode else None,
+            "preload": mode.preload if mode else None,
+            "misfit": fit.misfit,
+            "source": "given" if situation.settings.oscillator else "identified",
+            "describes_record": fit.describes_record,
+            "reason": fit.reason,
+        }
+    return {
+        "energy_td": situation.energy_td,
+        "kinetic_share": situation.kinetic_share,
+        "basis": situation.basis,
+        "flight": {"start": flight.start, "end": flight.end, "source": flight.source, "parts": None},
+        "oscillator": oscillator,
+    }
+
+
+def _offsets(situation: Situation) -> list[tuple[str, float]]:
+    assert situation.mode is not None
+    return [("energy_plastic", situation.mode.energy_plastic), ("preload", situation.mode.preload)]

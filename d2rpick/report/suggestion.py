@@ -1,0 +1,88 @@
+"""The answer of ``suggest`` as table, JSON, CSV, Markdown and bare value."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING
+
+from d2rpick.choice import Candidate
+from d2rpick.report import tables
+from d2rpick.report.situation import frame, heading, mechanics
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.choice import Pair, Suggestion
+
+SCHEMA = "d2rpick/suggest/1"
+_HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")
+
+
+def as_table(answer: Suggestion, limit: int) -> str:
+    """Heading, the first ``limit`` candidates, the recommended and the better pair; the recommended row has a star."""
+    lines = [*heading(answer.situation), "", tables.as_text(_HEAD, _rows(answer, limit))]
+    left = len(answer.candidates) - limit
+    if left > 0:
+        lines.append(f"... and {left} more (--limit)")
+    lines += ["", f"recommended  {_pair(answer.recommended)}", f"better pair  {_pair(answer.better_td)}"]
+    return "\n".join(lines)
+
+
+def as_markdown(answer: Suggestion, limit: int) -> str:
+    """The candidates as a Markdown table, and the two pairs below it."""
+    table = tables.as_markdown(_HEAD, _rows(answer, limit))
+    return f"{table}\n\nrecommended: {_pair(answer.recommended)}\n\nbetter pair: {_pair(answer.better_td)}"
+
+
+def as_csv(answer: Suggestion) -> str:
+    """All candidates, a column for each key of the JSON output."""
+    names = [field.name for field in fields(Candidate)]
+    rows = ([getattr(c, n) for n in names[:-1]] + ["; ".join(c.notes)] for c in answer.candidates)
+    return tables.as_csv(names, rows).rstrip("\n")
+
+
+def as_json(answer: Suggestion, command: Sequence[str]) -> str:
+    """The whole answer by schema d2rpick/suggest/1."""
+    better, recommended = answer.better_td, answer.recommended
+    return tables.as_json(
+        {
+            **frame(answer.situation, SCHEMA, command, answer.cautions),
+            "td": answer.situation.td,
+            **mechanics(answer.situation),
+            "candidates": [asdict(candidate) for candidate in answer.candidates],
+            "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
+            "better_td": {"td": better.td, "tr": better.tr, "residual": better.residual} if better else None,
+        }
+    )
+
+
+def as_value(answer: Suggestion) -> str:
+    """The recommended tr in the shortest digits that read back to it; empty when there is none."""
+    return repr(answer.recommended.tr) if answer.recommended else ""
+
+
+def _rows(answer: Suggestion, limit: int) -> list[list[tables.Cell]]:
+    return [
+        [
+            "*" if c.recommended else " ",
+            c.rank,
+            c.tr,
+            None if c.tr_low is None or c.tr_high is None else f"{(c.tr_high - c.tr_low) / 2:.1e}",
+            c.kind,
+            c.energy_ratio,
+            None if c.sign_match is None else "same" if c.sign_match else "opposite",
+            tables.measure(c.lock_in_error),
+            tables.measure(c.residual),
+            None if c.timing_tolerance is None else f"{c.timing_tolerance:.1e}",
+            c.rigid_time,
+            "recommended" if c.recommended else "acceptable" if c.acceptable else c.notes[0],
+        ]
+        for c in answer.candidates[:limit]
+    ]
+
+
+def _pair(pair: Pair | None) -> str:
+    if pair is None:
+        return "none"
+    residual = "" if pair.residual is None else f", residual {tables.measure(pair.residual)}"
+    return f"tr = {pair.tr:.6g}, td = {pair.td:.6g}{residual}"

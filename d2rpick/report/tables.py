@@ -1,0 +1,94 @@
+"""One table, four ways to write it down: for reading, as Markdown, as CSV, and numbers as people read them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+Cell = str | float | int | bool | None
+Rows = "Iterable[Sequence[Cell]]"
+
+
+def short(value: Cell) -> str:
+    """Write a cell for people: six significant digits, a dash for what is not known.
+
+    Examples
+    --------
+    >>> short(0.0128852793630525), short(None), short(True)
+    ('0.0128853', '-', 'yes')
+    """
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def measure(value: float | None) -> str:
+    """Write a share or an error, for which three decimals say all: 0.957, 0.000, or a dash.
+
+    Examples
+    --------
+    >>> measure(0.95744), measure(3e-16)
+    ('0.957', '0.000')
+    """
+    return "-" if value is None else f"{value:.3f}"
+
+
+def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+    """Columns in line, numbers to the right of their column, two blanks between.
+
+    Examples
+    --------
+    >>> print(as_text(["tr", "kind"], [[0.5, "crossing"], [10.25, "extremum"]]))
+       tr  kind
+      0.5  crossing
+    10.25  extremum
+    """
+    body = list(rows)
+    texts = [list(head), *([short(cell) for cell in row] for row in body)]
+    widths = [max(len(row[i]) for row in texts) for i in range(len(head))]
+    right = [all(row[i] is None or isinstance(row[i], (int, float)) for row in body) for i in range(len(head))]
+    lines = (
+        "  ".join(t.rjust(w) if r else t.ljust(w) for t, w, r in zip(row, widths, right, strict=True)) for row in texts
+    )
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def as_markdown(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+    """Give a Markdown table; bars in cells are escaped.
+
+    Examples
+    --------
+    >>> print(as_markdown(["tr", "kind"], [[0.5, "crossing"]]))
+    | tr | kind |
+    | --- | --- |
+    | 0.5 | crossing |
+    """
+    lines = [list(head), ["---"] * len(head), *([short(c).replace("|", r"\|") for c in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+    r"""Comma-separated at full precision, empty cells for what is not known, lines ending in a line feed.
+
+    Examples
+    --------
+    >>> as_csv(["tr", "sign_match", "residual"], [[0.1, True, None]])
+    'tr,sign_match,residual\n0.1,true,\n'
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows([str(c).lower() if isinstance(c, bool) else c for c in row] for row in rows)
+    return text.getvalue()
+
+
+def as_json(result: dict[str, Any]) -> str:
+    """Write a result as JSON: full precision, null for what is not known; a NaN would be a fault and raises."""
+    return json.dumps(result, indent=2, allow_nan=False, ensure_ascii=False)

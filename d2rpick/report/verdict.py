@@ -1,0 +1,69 @@
+"""The answer of ``verify`` as table, JSON, CSV and Markdown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from d2rpick.report import tables
+from d2rpick.report.situation import frame, heading, mechanics
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.choice import Verdict
+
+SCHEMA = "d2rpick/verify/1"
+
+
+def as_table(answer: Verdict) -> str:
+    """Heading, the measures of the pair, the verdict and its reasons."""
+    width = max(len(name) for name in _measures(answer))
+    lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in _measures(answer).items()]
+    verdict = "verified" if answer.verified else "unknown" if answer.tr_ok is None else "not verified"
+    reasons = [f"  {reason}" for reason in answer.reasons]
+    return "\n".join([*heading(answer.situation), "", *lines, "", f"verdict  {verdict}", *reasons])
+
+
+def as_markdown(answer: Verdict) -> str:
+    """The measures as a Markdown table of two columns."""
+    return tables.as_markdown(("measure", "value"), list(_measures(answer).items()))
+
+
+def as_csv(answer: Verdict) -> str:
+    """One row, a column for each measure."""
+    measures = _measures(answer)
+    return tables.as_csv(list(measures), [list(measures.values())]).rstrip("\n")
+
+
+def as_json(answer: Verdict, command: Sequence[str]) -> str:
+    """The whole answer by schema d2rpick/verify/1."""
+    situation = answer.situation
+    return tables.as_json(
+        {
+            **frame(situation, SCHEMA, command, answer.cautions),
+            **mechanics(situation),
+            **_measures(answer),
+            "reasons": list(answer.reasons),
+        }
+    )
+
+
+def _measures(answer: Verdict) -> dict[str, Any]:
+    c = answer.candidate
+    return {
+        "tr": c.tr,
+        "td": answer.situation.td,
+        "energy": c.energy,
+        "energy_ratio": c.energy_ratio,
+        "level_error": c.level_error,
+        "sign_match": c.sign_match,
+        "lock_in_error": c.lock_in_error,
+        "residual": c.residual,
+        "part_mismatch": c.part_mismatch,
+        "timing_tolerance": c.timing_tolerance,
+        "rigid_time": c.rigid_time,
+        "rigid_fraction": c.rigid_fraction,
+        "tr_ok": answer.tr_ok,
+        "td_ok": answer.td_ok,
+        "verified": answer.verified,
+    }
