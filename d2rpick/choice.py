@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from d2rpick.history import History, Samples
+    from d2rpick.switched import Comparison
 
 # Candidates whose error is within this of the smallest count as equally good: then the longer rigid window wins.
 EQUALLY_GOOD = 0.02
@@ -100,6 +101,7 @@ class Verdict:
     verified: bool
     reasons: tuple[str, ...]
     cautions: tuple[Caution, ...]
+    switched: Comparison | None = None
 
 
 def suggest(history: History, td: float, settings: Settings) -> Suggestion:
@@ -140,6 +142,16 @@ def verify(history: History, tr: float, td: float, settings: Settings) -> Verdic
         verified=candidate.acceptable and not over,
         reasons=reasons,
         cautions=tuple(cautions_of(situation)),
+    )
+
+
+def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:
+    """Add what a finished switched run shows; a wrong motion of it overrules the verdict."""
+    return replace(
+        verdict,
+        switched=comparison,
+        verified=verdict.verified and not comparison.objections,
+        reasons=verdict.reasons + comparison.objections,
     )
 
 

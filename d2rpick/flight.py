@@ -13,15 +13,15 @@ from d2rpick.identify import Identification, identify
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.history import History
+    from d2rpick.history import History, Part
 
 # Tails of the record before td that are tried for an oscillator, as shares of what comes before td.  Below an
 # eighth a record has hardly the periods an oscillator needs, and what fits so little of it proves nothing.
 _TAILS = (0.6, 0.36, 0.22, 0.13)
 # The record leaves the fitted oscillator where the mean error over a twenty-fifth of a period (three samples at
-# least) exceeds this share of the vibration energy, or this many standard errors of such a mean, whichever is more.
-# Of a million means of white noise one does by chance.
-_SHARE_OFF, _ERRORS_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 25
+# least) exceeds this share of the vibration energy, this many standard errors of such a mean, or this many times the
+# systematic rest that the fit leaves anyway, whichever is most.  Of a million means of white noise one does by chance.
+_SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
 # Fits of the growing window until it stays; two are usual.
 _MOST_REFITS = 8
 # Widening of the band of energies before td, against wiggles of a vibration that the band has not seen.
@@ -32,12 +32,14 @@ _BAND_RESERVE = 0.25
 class Flight:
     """Window of free flight [time]; ``start`` None when unknown, ``end`` None when no next contact was seen.
 
-    ``source`` tells how the start was found: "given", "oscillator", "energy", or None.
+    ``source`` tells how the start was found: "given", "momentum", "oscillator", "energy", or None.  ``parts`` are
+    those that were seen to fly together, None where the momentum did not tell, or told it of the whole model.
     """
 
     start: float | None
     end: float | None
     source: str | None
+    parts: tuple[Part, ...] | None = None
 
 
 class Span(NamedTuple):
@@ -47,7 +49,7 @@ class Span(NamedTuple):
     end: float
 
 
-def described_span(history: History, td: float, first: float) -> tuple[Span | None, Identification]:
+def described_span(history: History, td: float, first: float, last: float) -> tuple[Span | None, Identification]:
     """Find the longest window around td that one oscillator describes.
 
     First a part of the record that one oscillator describes is looked for: all of it, up to td, then ever
@@ -57,8 +59,8 @@ def described_span(history: History, td: float, first: float) -> tuple[Span | No
     Parameters
     ----------
     history : History
-    td, first : float
-        Time to look around, and where the search begins [time].
+    td, first, last : float
+        Time to look around, and where the search begins and ends [time].
 
     Returns
     -------
@@ -68,28 +70,29 @@ def described_span(history: History, td: float, first: float) -> tuple[Span | No
         Of that window; when there is none, of the part up to td, with the reason of its refusal.
     """
     refused = []
-    for start, end in _windows(first, td, float(history.time[-1])):
+    for start, end in _windows(first, td, last):
         fit = identify_within(history, start, end)
         if fit.describes_record:
-            span, fit = _grow(history, td, fit, first)
+            span, fit = _grow(history, td, fit, first, last)
             if span:
                 return span, fit
         refused.append(fit)
     return None, refused[1]
 
 
-def span_of(history: History, td: float, fit: Identification, first: float) -> Span | None:
-    """Find the window around td, from ``first`` on, in which the record stays with ``fit``.
+def span_of(history: History, td: float, fit: Identification, first: float, last: float) -> Span | None:
+    """Find the window around td, from ``first`` to ``last`` at most, in which the record stays with ``fit``.
 
     It ends where the energy drifts off the fit; None when it is off at td itself.
     """
     assert fit.mode is not None
-    begin = int(np.searchsorted(history.time, first))
-    time, energy = history.time[begin:], history.energy[begin:]
+    inside = slice(*np.searchsorted(history.time, [first, np.nextafter(last, np.inf)]))
+    time, energy = history.time[inside], history.energy[inside]
     period = 2 * np.pi / fit.mode.omega
     width = max(3, round(period / _MEANS_PER_PERIOD / float(np.median(np.diff(time)))))
     with np.errstate(over="ignore", invalid="ignore"):  # far off, a damped fit grows beyond all numbers
-        room = np.maximum(_SHARE_OFF * fit.mode.vibration_energy(time), _ERRORS_OFF * fit.rms / np.sqrt(width))
+        least = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
+        room = np.maximum(_SHARE_OFF * fit.mode.vibration_energy(time), least)
         error = np.convolve(energy - fit.mode.energy(time), np.ones(width) / width, mode="same")
         gone = ~(np.abs(error) <= room)
     middle = int(np.searchsorted(time, td))
@@ -129,14 +132,16 @@ def identify_within(history: History, start: float, end: float) -> Identificatio
     return identify(history.time[inside], history.energy[inside])
 
 
-def _grow(history: History, td: float, fit: Identification, first: float) -> tuple[Span | None, Identification]:
+def _grow(
+    history: History, td: float, fit: Identification, first: float, last: float
+) -> tuple[Span | None, Identification]:
     """Extend the fitted window while the record stays with the fit, refit, repeat."""
-    span = span_of(history, td, fit, first)
+    span = span_of(history, td, fit, first, last)
     for _ in range(_MOST_REFITS):
         if span is None or span == (fit.start, fit.end):
             break
         refit = identify_within(history, *span)
         if not refit.describes_record:
             break
-        fit, span = refit, span_of(history, td, refit, first)
+        fit, span = refit, span_of(history, td, refit, first, last)
     return span, fit

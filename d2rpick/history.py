@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from d2rpick.errors import HistoryError, RangeError
+
+if TYPE_CHECKING:
+    from d2rpick.momentum import Momenta
 
 Samples = NDArray[np.float64]
 
@@ -43,15 +47,24 @@ class Precision:
 EXACT = Precision()
 
 
+@dataclass(frozen=True)
+class Part:
+    """A part of the model, by the number and the title that the solver gives it."""
+
+    id: int
+    title: str
+
+
 @dataclass(frozen=True, eq=False)
 class History:
     """Internal energy of the parts to be switched, over time, in the run's own consistent units.
 
     ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.
     Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
-    in them was taken for the energy.  ``complete`` is False when a file stopped inside a state; ``notes``
-    say in plain sentences what a reader left out or assumed.  ``time_unit`` is given only where the file
-    names it; solver databases do not.
+    in them was taken for the energy, ``parts`` whose energy it is, None for the whole model.  ``complete``
+    is False when a file stopped inside a state; ``notes`` say in plain sentences what was left out or assumed.
+    ``time_unit`` is given only where the file names it; solver databases do not.  ``momenta`` tell when parts fly
+    freely, where the files have them: of the parts, then of the whole model.
     """
 
     time: Samples
@@ -59,9 +72,11 @@ class History:
     source: tuple[str, ...]
     format: str
     channel: str
+    parts: tuple[Part, ...] | None = None
     time_precision: Precision = EXACT
     energy_precision: Precision = EXACT
     time_unit: str = ""
+    momenta: tuple[Momenta, ...] = ()
     complete: bool = True
     notes: tuple[str, ...] = ()
 
@@ -115,11 +130,6 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     notes : tuple of str
         A sentence for each kind of state left out.
 
-    Raises
-    ------
-    HistoryError
-        If more than one step, and more than a tenth of all, goes back: such a column is no time.
-
     Examples
     --------
     >>> keep, notes = newest_states(np.array([0.0, 1.0, 2.0, 1.5, 2.5, 2.5]))
@@ -128,10 +138,6 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """
     step = np.diff(time)
     equal, back = int(np.count_nonzero(step == 0)), int(np.count_nonzero(step < 0))
-    if back > 1 and back > 0.1 * step.size:
-        raise HistoryError(
-            f"time steps back at {back} of {step.size} states, increasing times were expected; name the time column"
-        )
     later = np.minimum.accumulate(time[::-1])[::-1]
     keep = np.append(time[:-1] < later[1:], np.ones(min(1, time.size), dtype=bool))
     notes = []

@@ -11,6 +11,7 @@ from d2rpick import measures
 from d2rpick.errors import RangeError
 from d2rpick.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
 from d2rpick.identify import Identification, assess
+from d2rpick.momentum import FreeFlight, flight_around
 
 if TYPE_CHECKING:
     from d2rpick.history import History
@@ -111,32 +112,39 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
     history.energy_at(td)
     if settings.after is not None:
         _inside(history, settings.after, "--after")
-    fit, span = _oscillator(history, td, settings)
+    seen = next(filter(None, (flight_around(momenta, td) for momenta in history.momenta)), None)
+    fit, span = _oscillator(history, td, settings, seen)
     mode, no_mode = _reliable_mode(history, td, fit, span)
-    return Situation(history, td, settings, _flight(history, td, settings.after, span), fit, mode, span, no_mode)
+    flight = _flight(history, td, settings.after, seen, span)
+    return Situation(history, td, settings, flight, fit, mode, span, no_mode)
 
 
-def _oscillator(history: History, td: float, settings: Settings) -> tuple[Identification | None, Span | None]:
+def _oscillator(
+    history: History, td: float, settings: Settings, seen: FreeFlight | None
+) -> tuple[Identification | None, Span | None]:
     """Find the oscillator, given or identified, and the window around td that it describes."""
-    first = float(history.time[0]) if settings.after is None else min(settings.after, td)
     if not settings.replay:
         return None, None
+    first, last = (seen.start, seen.end) if seen else (float(history.time[0]), float(history.time[-1]))
+    if settings.after is not None:
+        first = min(settings.after, td)
     fit = _given_fit(history, settings, first)
     if fit is None:
-        span, fit = described_span(history, td, first)
+        span, fit = described_span(history, td, first, last)
         return fit, span
-    return fit, span_of(history, td, fit, first) if fit.describes_record else None
+    return fit, span_of(history, td, fit, first, last) if fit.describes_record else None
 
 
-def _flight(history: History, td: float, after: float | None, span: Span | None) -> Flight:
-    """Choose the best answer to when the load is over: given, by the oscillator, by the energy."""
-    if after is None and span is None:
-        return energy_flight(history, td)
+def _flight(history: History, td: float, after: float | None, seen: FreeFlight | None, span: Span | None) -> Flight:
+    """Choose the best answer to when the load is over: given, by the momentum, by the oscillator, by the energy."""
+    if seen:
+        end = seen.end if seen.end_seen else None
+        start, source = (seen.start, "momentum") if after is None else (after, "given")
+        return Flight(start, end, source, seen.parts)
     end = span.end if span and span.end < history.time[-1] else None
     if after is not None:
         return Flight(after, end, "given")
-    assert span is not None
-    return Flight(span.start, end, "oscillator")
+    return Flight(span.start, end, "oscillator") if span else energy_flight(history, td)
 
 
 def _given_fit(history: History, settings: Settings, first: float) -> Identification | None:

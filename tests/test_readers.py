@@ -44,7 +44,7 @@ def test_the_order_is_a_signature_first_and_any_text_last() -> None:
 
 @pytest.mark.parametrize(("data", "name"), [(CSV, "glstat"), (GLSTAT, "energy.csv")])
 def test_content_decides_and_not_the_name(file: Write, data: bytes, name: str) -> None:
-    history = read_history(file(data, name))
+    history = read_history([file(data, name)])
     assert history.format == ("csv" if data is CSV else "glstat")
     assert history.source == (str(Path(history.source[0]).parent / name),)
 
@@ -52,24 +52,24 @@ def test_content_decides_and_not_the_name(file: Write, data: bytes, name: str) -
 def test_a_gzipped_file_is_read_and_hashed_as_it_lies_there(file: Write) -> None:
     packed = gzip.compress(CSV)
     name = file(packed, "history.gz")
-    assert read_history(name).energy.tolist() == [1.0, 2.0, 1.5]
+    assert read_history([name]).energy.tolist() == [1.0, 2.0, 1.5]
     assert sha256(name) == hashlib.sha256(packed).hexdigest()
 
 
 def test_standard_input_is_read_once_and_still_hashed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(CSV)))
-    history = read_history("-")
+    history = read_history(["-"])
     assert history.source == ("-",)
     assert history.time.tolist() == [0.0, 0.1, 0.2]
     assert sha256("-") == hashlib.sha256(CSV).hexdigest()
 
 
 def test_a_given_format_is_not_second_guessed(file: Write) -> None:
-    assert read_history(file(CSV), input_format="csv").format == "csv"
+    assert read_history([file(CSV)], input_format="csv").format == "csv"
     with pytest.raises(FormatError, match="not one time line"):
-        read_history(file(CSV), input_format="glstat")
+        read_history([file(CSV)], input_format="glstat")
     with pytest.raises(FormatError, match="binary"):
-        read_history(file(b"\x00\x01\x02" * 99), input_format="csv")
+        read_history([file(b"\x00\x01\x02" * 99)], input_format="csv")
 
 
 @pytest.mark.parametrize(
@@ -88,22 +88,22 @@ def test_a_given_format_is_not_second_guessed(file: Write) -> None:
 )
 def test_what_is_no_history_is_refused_in_one_line(file: Write, data: bytes, reason: str) -> None:
     with pytest.raises(FormatError, match=reason) as caught:
-        read_history(file(data))
+        read_history([file(data)])
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith(file(data))
 
 
 def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=re.escape(str(tmp_path / "none")) + ": no such file"):
-        read_history(str(tmp_path / "none"))
+        read_history([str(tmp_path / "none")])
     with pytest.raises(FormatError, match="folder"):
-        read_history(str(tmp_path))
+        read_history([str(tmp_path)])
     with pytest.raises(FormatError, match="cannot be read"):
-        read_history("a\0b")
+        read_history(["a\0b"])
     with pytest.raises(FormatError, match="cannot be read"):
-        read_history(str(tmp_path / ("x" * 5000)))
+        read_history([str(tmp_path / ("x" * 5000))])
 
 
 def test_the_selection_reaches_the_reader(file: Write) -> None:
-    assert read_history(file(CSV), Selection(time="2", energy=("1",))).time.tolist() == [1.0, 1.5]
-    np.testing.assert_array_equal(read_history(file(GLSTAT), Selection(energy=("Internal Energy",))).energy, [2e-20])
+    assert read_history([file(CSV)], Selection(time="2", energy=("1",))).time.tolist() == [1.0, 1.5]
+    np.testing.assert_array_equal(read_history([file(GLSTAT)], Selection(energy=("Internal Energy",))).energy, [2e-20])

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
 from d2rpick.history import EXACT, Precision
-from d2rpick.readers import Selection, csv_table
+from d2rpick.readers import Run, Selection, csv_table
+from d2rpick.readers.database import Legs
 from d2rpick.readers.source import Source
 
 if TYPE_CHECKING:
@@ -23,7 +24,8 @@ ENERGIES = [1.5, 2.75, -3.125]
 
 def read(text: str | bytes, *energy: str, time: str | None = None) -> History:
     data = text if isinstance(text, bytes) else text.encode()
-    return csv_table.read(Source("table", data), Selection(time, energy))
+    selection = Selection(time, energy)
+    return Run(("table",), (Legs(csv_table.open_legs([Source("table", data)], selection)),)).history(selection)
 
 
 def table(separator: str = ",", decimal: str = ".", end: str = "\n", tail: str = "") -> str:

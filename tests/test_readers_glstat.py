@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
 from d2rpick.history import History, Precision
-from d2rpick.readers import Selection, glstat
+from d2rpick.readers import Run, Selection, glstat
+from d2rpick.readers.database import Legs
 from d2rpick.readers.source import Source
 
 HEAD = """\
@@ -62,7 +63,8 @@ WHOLE = HEAD + "".join(block(*state, controller=c) for state, c in zip(STATES, C
 
 def read(text: str | bytes, *energy: str, time: str | None = None) -> History:
     data = text if isinstance(text, bytes) else text.encode("latin-1")
-    return glstat.read(Source("glstat", data), Selection(time, energy))
+    selection = Selection(time, energy)
+    return Run(("glstat",), (Legs(glstat.open_legs([Source("glstat", data)], selection)),)).history(selection)
 
 
 def states(history: History) -> list[tuple[float, float]]:

@@ -269,7 +269,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("expected", READABLE, ids=lambda expected: expected.file)
 def test_read(expected: Readable) -> None:
-    history = read_history(str(FOLDER / expected.file))
+    history = read_history([str(FOLDER / expected.file)])
     assert (history.channel, history.time.size) == (expected.channel, expected.states)
     states = list(zip(history.time.tolist(), history.energy.tolist(), strict=True))
     assert (states[0], states[len(states) // 2], states[-1]) == expected.first_middle_last
@@ -281,7 +281,7 @@ def test_read(expected: Readable) -> None:
 @pytest.mark.parametrize("file", REFUSED)
 def test_refused(file: str) -> None:
     with pytest.raises(FormatError, match=REFUSED[file]):
-        read_history(str(FOLDER / file))
+        read_history([str(FOLDER / file)])
 
 
 def test_no_file_is_left_out() -> None:

@@ -10,8 +10,8 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from d2rpick.history import History
     from d2rpick.oscillator import Oscillator
+    from d2rpick.readers import Run, Selection
     from d2rpick.situation import Settings
 
 Decorated = Any  # a command function; click's decorators do not say more
@@ -42,6 +42,9 @@ class Number(click.ParamType[float]):
         return number
 
 
+# of d2rpick.readers, which is too heavy to be imported for --help; a test holds them together
+FORMATS = ("binout", "radioss-th", "glstat", "matsum", "hdf5", "csv")
+
 TIME = Number()
 POSITIVE = Number(0.0, above=True)
 NOT_NEGATIVE = Number(0.0)
@@ -57,18 +60,23 @@ def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated
 
 
 def history_options(function: Decorated) -> Decorated:
-    """HISTORY and how to read it; passed on as ``history``, ``input_format``, ``time``, ``energy``."""
+    """HISTORY... and how to read it; collected by ``selection`` and ``open_run``."""
     return _stack(
-        click.argument("history", metavar="HISTORY"),
+        click.argument("history", metavar="HISTORY...", nargs=-1, required=True),
         click.option(
-            "-F", "--input-format", type=click.Choice(["auto", "csv", "glstat"]), default="auto", show_default=True,
+            "-F", "--input-format", type=click.Choice(["auto", *FORMATS]), default="auto", show_default=True,
             help="Format of HISTORY; auto goes by its content.",
         ),
-        click.option("--time", metavar="NAME|NUMBER", help="Time column, by its name or number."),
+        click.option("--time", metavar="NAME|NUMBER", help="Time column, by its name, number or HDF5 path."),
         click.option(
             "--energy", metavar="NAME|NUMBER", multiple=True,
-            help="Energy column or label; given several times, their sum.",
+            help="Energy column, label or HDF5 path; given several times, their sum.",
         ),
+        click.option(
+            "--part", metavar="IDS", multiple=True,
+            help="Parts to be switched, by number (3,7), range (10-19) or title; their energies are added.",
+        ),
+        click.option("--flying", metavar="IDS", multiple=True, help="Parts that fly together with them."),
     )(function)  # fmt: skip
 
 
@@ -138,12 +146,20 @@ def choosing_options(function: Decorated) -> Decorated:
     )(function)  # fmt: skip
 
 
-def read(options: dict[str, Any]) -> History:
-    """Read the history that the options of ``history_options`` name."""
-    from d2rpick.readers import Selection, read_history
+def selection(options: dict[str, Any]) -> Selection:
+    """Collect what of a run is asked for; UsageError when energies are asked for in two ways."""
+    from d2rpick.readers import Selection
 
-    selection = Selection(time=options["time"], energy=options["energy"])
-    return read_history(options["history"], selection, options["input_format"])
+    if options["energy"] and options["part"]:
+        raise click.UsageError("--energy and --part exclude each other: columns or parts")
+    return Selection(options["time"], options["energy"], options["part"], options["flying"])
+
+
+def open_run(options: dict[str, Any]) -> Run:
+    """Open the run that the options of ``history_options`` name."""
+    from d2rpick.readers import open_run
+
+    return open_run(options["history"], selection(options), options["input_format"])
 
 
 def oscillator(options: dict[str, Any]) -> Oscillator | None:

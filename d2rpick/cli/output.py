@@ -67,6 +67,13 @@ class Output:
         lines = (click.style(line, bold=True) if line.startswith("*") else line for line in text.split("\n"))
         click.echo("\n".join(lines), color=colour)
 
+    def content(self, content: bytes) -> None:
+        """Give out a result that is the content of a file."""
+        if self.file is not None:
+            self.write(self.file, content)
+        else:
+            click.echo(content, nl=False)
+
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
         """Say what a reader left out, and what the user should know."""
         if self.quiet:

@@ -10,6 +10,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
 
 MOST_STATES = 100_000_000
+FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.writers, which --help does without
 
 EXAMPLES = """\b
 Examples:
@@ -27,7 +28,7 @@ Examples:
 @click.option("--dt", type=shared.POSITIVE, required=True, metavar="T", help="Output interval.")
 @click.option(
     "--write-as",
-    type=click.Choice(["csv", "glstat"]),
+    type=click.Choice(FORMATS),
     help="Format of the result.  [default: by the name of -o, else csv]",
 )
 @click.option("--plot", metavar="FILE", help="Draw displacements and energies to FILE (png, svg, pdf).")
@@ -52,7 +53,7 @@ def command(
         raise click.UsageError(f"--tr {tr:g} is not before --td {td:g}")
     if t_end / dt > MOST_STATES:
         raise click.UsageError(f"--t-end {t_end:g} holds more than {MOST_STATES} intervals of --dt {dt:g}")
-    form = write_as or writers.format_of(options["output_file"])
+    form = write_as or writers.format_of(options["output_file"], FORMATS)
     output = Output.of({**options, "plot": plot})
     start = State.of(0.0, 0.0, options["v0"], 0.0)
     switched = None if tr is None or td is None else Replay(oscillator, start, 0.0, tr, td)
@@ -62,4 +63,4 @@ def command(
 
         output.write(plot, plots.render(plots.draw_replay(motion, switched), plot))
     if options["output_file"] or not plot:
-        output.result(writers.WRITERS[form](motion).rstrip("\n"))
+        output.content(writers.TRAJECTORY_WRITERS[form](motion, oscillator))

@@ -39,8 +39,9 @@ def command(ctx: click.Context, /, td: float, limit: int, output_format: str, ex
     from d2rpick.choice import suggest
     from d2rpick.report import suggestion as report
 
-    output = Output.of(options, options["history"])
-    history = shared.read(options)
+    run = shared.open_run(options)
+    output = Output.of(options, *run.sources)
+    history = run.history(shared.selection(options), with_momenta=True)
     answer = suggest(history, td, shared.settings(options))
     output.notes(history.notes, answer.cautions)
     if options["plot"]:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
+
+if TYPE_CHECKING:
+    from d2rpick.readers import Run
+    from d2rpick.situation import Situation
+    from d2rpick.switched import Comparison
 
 EXAMPLES = """\b
 Examples:
@@ -19,18 +24,27 @@ Examples:
 @click.command("verify", epilog=EXAMPLES)
 @click.option("--tr", type=shared.TIME, required=True, metavar="T", help="Switch to rigid at this time.")
 @click.option("--td", type=shared.TIME, required=True, metavar="T", help="Switch back to deformable at this time.")
+@click.option(
+    "--switched",
+    metavar="FILE",
+    multiple=True,
+    help="Compare a finished switched run with the reference; a file, folder or glob, given again for more.",
+)
 @shared.history_options
 @shared.choosing_options
 @shared.output_options("table", "json", "csv", "markdown")
 @click.pass_context
 def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exit_zero: bool, **options: Any) -> None:
     """Judge one pair of switch times against the HISTORY of a run without switching."""
-    from d2rpick.choice import verify
+    from d2rpick.choice import verify, with_comparison
     from d2rpick.report import verdict as report
 
-    output = Output.of(options, options["history"])
-    history = shared.read(options)
+    run = shared.open_run(options)
+    output = Output.of(options, *run.sources)
+    history = run.history(shared.selection(options), with_momenta=True)
     answer = verify(history, tr, td, shared.settings(options))
+    if options["switched"]:
+        answer = with_comparison(answer, _comparison(run, answer.situation, options))
     output.notes(history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick import plots
@@ -44,3 +58,22 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
     }
     output.result(texts[output_format]())
     finish(ctx, objection=not answer.verified, exit_zero=exit_zero)
+
+
+def _comparison(run: Run, situation: Situation, options: dict[str, Any]) -> Comparison:
+    """Read the switched run as the reference was read, and hold one against the other."""
+    from d2rpick.readers import open_run
+    from d2rpick.switched import compare
+
+    selection = shared.selection(options)
+    other = open_run(options["switched"], selection, options["input_format"])
+    parts = situation.history.parts
+    together = situation.flight.parts or parts
+    return compare(
+        situation.history,
+        other.history(selection),
+        situation.td,
+        situation.latest_td,
+        momenta=(run.momentum(together), other.momentum(together)),
+        centres=(run.centre(parts), other.centre(parts)) if parts else (None, None),
+    )

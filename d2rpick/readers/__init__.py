@@ -8,15 +8,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, Protocol
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import csv_table, glstat
-from d2rpick.readers.source import Selection, Source, open_source, sha256
+from d2rpick.readers import binout, csv_table, glstat, hdf5_file, matsum, radioss_th
+from d2rpick.readers.database import Legs
+from d2rpick.readers.run import Run
+from d2rpick.readers.selection import Selection
+from d2rpick.readers.source import Source, expand, open_source, sha256
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.history import History
+    from d2rpick.readers.database import Database
 
-__all__ = ["READERS", "Reader", "Selection", "Source", "read_history", "sha256"]
+__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "read_history", "sha256"]
 
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
@@ -29,39 +33,70 @@ class Reader(Protocol):
     def recognises(self, head: bytes) -> bool:
         """Whether a file that begins like this is of the reader's format; never raises."""
 
-    def read(self, source: Source, selection: Selection) -> History:
-        """Read what was selected; FormatError when that cannot be done for sure."""
+    def open_legs(self, sources: Sequence[Source], selection: Selection) -> Sequence[Database]:
+        """Open files of this format as the legs of one run; FormatError when one is none."""
 
 
-# In the order they are asked: csv takes any text, so it comes last.
-READERS: Final[Mapping[str, Reader]] = {"glstat": glstat, "csv": csv_table}
+# In the order they are asked, and in which they are preferred as sources of one quantity: binary before text, since it
+# holds more digits; csv takes any text, so it comes last.
+READERS: Final[Mapping[str, Reader]] = {
+    "binout": binout,
+    "radioss-th": radioss_th,
+    "glstat": glstat,
+    "matsum": matsum,
+    "hdf5": hdf5_file,
+    "csv": csv_table,
+}
 
 
-def read_history(name: str, selection: Selection = _DEFAULT, input_format: str = "auto") -> History:
-    """Read one energy history.
+def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
+    """Open the files of one run: of one format as its legs, of different formats as companions.
 
     Parameters
     ----------
-    name : str
-        File name, or ``-`` for standard input.
+    names : sequence of str
+        Files, folders, globs, or ``-`` for standard input.
     selection : Selection
-        Time and energies to take; by default the time and the internal energy.
+        What tables need to know to be read at all: their time and energy columns.
     input_format : str
-        A key of `READERS`, or ``auto``: decided by the content, never by the name.
+        A key of `READERS` for all files, or ``auto``: decided by the content, never by the name.
 
     Raises
     ------
     FormatError
-        If the file cannot be read as an energy history, in one line.
+        If a file cannot be read as an energy history, or companions have no time in common.
     """
-    source = open_source(name)
-    if input_format != "auto":
-        return READERS[input_format].read(source, selection)
+    files = expand(names)
+    kinds: dict[str, list[Source]] = {}
+    for source in map(open_source, files):
+        kinds.setdefault(input_format if input_format != "auto" else _format(source), []).append(source)
+    ordered = [kind for kind in READERS if kind in kinds]
+    databases = tuple(Legs(READERS[kind].open_legs(kinds[kind], selection)) for kind in ordered)
+    _check_companions(databases)
+    return Run(files, databases)
+
+
+def read_history(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> History:
+    """Read one energy history; arguments and errors as of ``open_run``."""
+    return open_run(names, selection, input_format).history(selection)
+
+
+def _format(source: Source) -> str:
     head = source.data[:_HEAD]
-    for reader in READERS.values():
+    for kind, reader in READERS.items():
         if reader.recognises(head):
-            return reader.read(source, selection)
+            return kind
     raise FormatError(
-        f"{name}: binary data of no known format, one of {', '.join(READERS)} was expected; "
+        f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected; "
         "export the energy history as text"
     )
+
+
+def _check_companions(databases: Sequence[Legs]) -> None:
+    """Refuse companions that cannot be of one run."""
+    for one in databases[1:]:
+        own, other = one.span, databases[0].span
+        if own[0] > other[1] or other[0] > own[1]:
+            raise FormatError(
+                f"{databases[0].source} and {one.source} have no time in common, files of one run were expected"
+            )

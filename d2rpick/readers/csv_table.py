@@ -11,12 +11,12 @@ values are there and the last of them is not used, or is certainly whole (`print
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.history import History
 from d2rpick.readers import printed
 from d2rpick.readers.layout import Layout, as_number, find_layout, is_skipped, split
 from d2rpick.readers.names import (
@@ -26,14 +26,14 @@ from d2rpick.readers.names import (
     listing,
     near_miss,
     normalised,
-    quantity_note,
 )
-from d2rpick.readers.source import Selection, Source, states_that_count
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.history import Samples
+    from d2rpick.history import Part, Precision, Samples
+    from d2rpick.readers.selection import Selection
+    from d2rpick.readers.source import Source
 
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _UTF8 = b"\xef\xbb\xbf"
@@ -41,53 +41,152 @@ _UTF8 = b"\xef\xbb\xbf"
 # How many rows from the start, the end and between are looked at to judge the printed format.
 _SAMPLE = 100
 
+# A restart steps back once; a column that does so in more than this share of its rows is no time.
+_MOST_BACK = 0.1
+
 
 def recognises(head: bytes) -> bool:
     """Whether this is text: what it says is seen when it is read."""
     return head.startswith(_UTF16) or b"\0" not in head
 
 
-def read(source: Source, selection: Selection) -> History:
-    """Read the columns asked for, by default the time and the internal energy."""
-    lines = _text(source).split("\n")
-    unended = lines.pop()  # empty when the last line has its end
-    layout = find_layout(source.name, lines, unended)
-    time, energies, notes = _columns(source.name, layout, selection)
-    used = (time, *energies)
+def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table]:
+    """Open tables; the selection tells their time column, and which values must be whole in a last line."""
+    return [Table(source, selection) for source in sources]
 
-    rows = lines[layout.start :]
-    complete = True
-    if not is_skipped(unended):
-        if _is_whole(unended, rows, layout, used):
-            rows.append(unended)
-        else:
-            complete = False
-            notes.append("the last line has no line end and may be cut; it was left out")
-    values = _fast_values(rows, layout, used)
-    if values is None:
-        values = _checked_values(source.name, rows, layout, used)
-    keep, order_notes = states_that_count(source.name, values[:, 0])
-    channel = " + ".join(layout.channel(column) for column in energies)
-    fields = _sample(rows, layout)
-    time_precision, energy_precision = printed.precisions(
-        [row[time] for row in fields], [row[column] for row in fields for column in energies], values[:, 0]
-    )
-    return History(
-        time=values[keep, 0],
-        energy=values[keep, 1:].sum(axis=1),
-        source=(source.name,),
-        format="csv",
-        channel=channel,
-        time_unit=layout.unit(time),
-        time_precision=time_precision,
-        energy_precision=energy_precision,
-        complete=complete,
-        notes=(*notes, *order_notes, *quantity_note(channel)),
-    )
+
+class Table:
+    """One table; a `Database` without parts.
+
+    FormatError when it is no table, or a column that was selected is not there.
+    """
+
+    format = "csv"
+    version = title = ""
+    parts: tuple[Part, ...] = ()
+
+    def __init__(self, source: Source, selection: Selection) -> None:
+        self.source = source.name
+        lines = _text(source).split("\n")
+        unended = lines.pop()  # empty when the last line has its end
+        self._layout = layout = find_layout(source.name, lines, unended)
+        self._time, notes = _time_column(source.name, layout, selection.time)
+        self._rows = lines[layout.start :]
+        self._columns = _labelled(layout, self._time)
+        self.complete = True
+        if not is_skipped(unended):
+            self.complete = _is_whole(unended, self._rows, layout, self._needed(selection))
+            if self.complete:
+                self._rows.append(unended)
+            else:
+                notes.append("the last line has no line end and may be cut; it was left out")
+        self.notes = tuple(notes)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of all columns but the time."""
+        return tuple(self._columns)
+
+    @property
+    def time_unit(self) -> str:
+        """Unit that the name of the time column, or the row below it, gives."""
+        return self._layout.unit(self._time)
+
+    @property
+    def energy_channel(self) -> str:
+        """The column named like an internal energy, or the only one beside the time; else FormatError."""
+        column = _internal_energy(self.source, self._layout, self._time)
+        return next(label for label, own in self._columns.items() if own == column)
+
+    def find(self, wanted: str) -> str:
+        """Name of a column that is meant by its name or 1-based number; FormatError with what there is."""
+        if wanted in self._columns:
+            return wanted
+        column = _named_column(self.source, self._layout, wanted)
+        if column == self._time:
+            raise FormatError(f"{self.source}: {wanted!r} is the time column; name the time and each energy once")
+        return next(label for label, own in self._columns.items() if own == column)
+
+    @property
+    def time(self) -> Samples:
+        """Times as they stand in the file, shape (n,) [time]; FormatError when they step back all the time."""
+        time = self._values(self._time)
+        back, steps = int(np.count_nonzero(np.diff(time) < 0)), time.size - 1
+        if back > 1 and back > _MOST_BACK * steps:
+            raise FormatError(
+                f"{self.source}: time steps back at {back} of {steps} states, increasing times were expected; "
+                "name the time column with --time"
+            )
+        return time
+
+    @property
+    def part_time(self) -> Samples:
+        """Refused: a table has no parts."""
+        raise self._no_parts()
+
+    def channel(self, name: str) -> Samples:
+        """One column, shape (n,); FormatError with the line of a value that is no number."""
+        return self._values(self._columns[name])
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:  # noqa: ARG002  as a Database
+        """Refused: a table has no parts."""
+        raise self._no_parts()
+
+    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
+        """How finely the times and these columns were printed."""
+        fields = _sample(self._rows, self._layout)
+        times = [row[self._time] for row in fields]
+        energies = [row[self._columns[name]] for row in fields for name in names]
+        return printed.precisions(times, energies, self.time)
+
+    def _needed(self, selection: Selection) -> list[int]:
+        """Columns that must be whole in a last line without end: those asked for, or what is taken by default."""
+        try:
+            names = [self.find(wanted) for wanted in selection.energy] or [self.energy_channel]
+        except FormatError:
+            if selection.energy:
+                raise
+            return [self._time, *self._columns.values()]
+        columns = [self._time, *(self._columns[name] for name in names)]
+        if len(set(columns)) < len(columns):
+            raise FormatError(f"{self.source}: a column is asked for twice; name the time and each energy once")
+        return columns
+
+    def _values(self, column: int) -> Samples:
+        if self._whole is not None and np.isfinite(self._whole[:, column]).all():
+            return np.ascontiguousarray(self._whole[:, column])
+        return self._checked[column] if column in self._checked else self._check(column)
+
+    @cached_property
+    def _whole(self) -> Samples | None:
+        """All values of a table without a flaw in its form; None for any other."""
+        return _fast_values(self._rows, self._layout)
+
+    def _check(self, column: int) -> Samples:
+        checked = _checked_values(self.source, self._rows, self._layout, (self._time, column))
+        self._checked.update({self._time: checked[:, 0], column: checked[:, 1]})
+        return self._checked[column]
+
+    @cached_property
+    def _checked(self) -> dict[int, Samples]:
+        return {}
+
+    def _no_parts(self) -> FormatError:
+        return FormatError(f"{self.source}: a table has no parts; choose its columns with --energy")
+
+
+def _labelled(layout: Layout, time: int) -> dict[str, int]:
+    """Columns beside the time by the name they are called by, with their number where a name is not theirs alone."""
+    names = [layout.channel(column) for column in range(layout.columns)]
+    return {
+        name if names.count(name) == 1 else f"{name} (column {column + 1})": column
+        for column, name in enumerate(names)
+        if column != time
+    }
 
 
 def _text(source: Source) -> str:
-    data = source.data
+    data = bytes(source.data)
     if data.startswith(_UTF16):
         text = data.decode("utf-16", errors="replace")
     elif b"\0" in data:
@@ -100,27 +199,18 @@ def _text(source: Source) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _columns(name: str, layout: Layout, selection: Selection) -> tuple[int, list[int], list[str]]:
-    """Columns of the time and the energies, and what had to be assumed."""
-    notes = []
-    if selection.time is not None:
-        time = _named_column(name, layout, selection.time)
-    else:
-        times = [i for i, column in enumerate(layout.names[: layout.trusted]) if is_time(column)]
-        if len(times) > 1:
-            raise FormatError(
-                f"{name}: {len(times)} columns are named like a time; choose with --time: {_menu(layout, times)}"
-            )
-        time = times[0] if times else 0
-        if layout.names and not times:
-            notes.append(f"no column is named like a time; {layout.name(0)!r}, the first, was taken for it")
-    if selection.energy:
-        energies = [_named_column(name, layout, wanted) for wanted in selection.energy]
-    else:
-        energies = [_internal_energy(name, layout, time)]
-    if time in energies or len(set(energies)) < len(energies):
-        raise FormatError(f"{name}: a column is asked for twice; name the time and each energy once")
-    return time, energies, notes
+def _time_column(name: str, layout: Layout, wanted: str | None) -> tuple[int, list[str]]:
+    """Column of the time, and what had to be assumed."""
+    if wanted is not None:
+        return _named_column(name, layout, wanted), []
+    times = [i for i, column in enumerate(layout.names[: layout.trusted]) if is_time(column)]
+    if len(times) > 1:
+        raise FormatError(
+            f"{name}: {len(times)} columns are named like a time; choose with --time: {_menu(layout, times)}"
+        )
+    if layout.names and not times:
+        return 0, [f"no column is named like a time; {layout.name(0)!r}, the first, was taken for it"]
+    return (times[0] if times else 0), []
 
 
 def _internal_energy(name: str, layout: Layout, time: int) -> int:
@@ -192,8 +282,8 @@ def _sample(rows: Sequence[str], layout: Layout) -> list[list[str]]:
     return [row for row in cells if len(row) >= layout.columns]
 
 
-def _fast_values(rows: Sequence[str], layout: Layout, used: Sequence[int]) -> Samples | None:
-    """Values of a table without a flaw, all numbers and no blank lines; None for any other."""
+def _fast_values(rows: Sequence[str], layout: Layout) -> Samples | None:
+    """All values of a table with a number in each cell and no other lines between; None for any other."""
     separator = layout.separator
     if layout.decimal == ",":
         if any("." in row for row in rows):
@@ -207,10 +297,7 @@ def _fast_values(rows: Sequence[str], layout: Layout, used: Sequence[int]) -> Sa
         table = np.loadtxt(rows, delimiter=separator, comments=None, ndmin=2)
     except ValueError:
         return None
-    # Lines it passed over, or words it took for numbers, are looked at one by one.
-    if table.shape != (len(rows), layout.columns) or not np.isfinite(table[:, used]).all():
-        return None
-    return table[:, used]
+    return table if table.shape == (len(rows), layout.columns) else None  # it passes over blank lines
 
 
 def _checked_values(name: str, rows: Sequence[str], layout: Layout, used: Sequence[int]) -> Samples:

@@ -1,165 +1,115 @@
-"""LS-DYNA glstat: states of lines ``label....... value``, each begun by its time line.
+"""LS-DYNA glstat: one block of ``label.......   value`` lines per state, for the model as a whole.
 
-A label fills columns 2-32, padded with dots; its value stands in columns 33-46 (E14.5, six digits).  What
-else a state holds depends on the run: everything but the time and the labels asked for is passed over.  A
-last state whose lines are not all there is left out.
+A label stands in columns 2-32, padded with dots, its value right-justified in columns 33-46.  Labels are
+taken whole: ``internal energy`` also ends ``eroded internal energy``.  A block begins at its ``time....``
+line; the line before it, on what controls the time step, has too many forms to rely on.
 """
 
 from __future__ import annotations
 
-import math
 import re
-from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NoReturn
 
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.history import History, Precision
-from d2rpick.readers.names import listing, near_miss, quantity_note
-from d2rpick.readers.source import Selection, Source, states_that_count
+from d2rpick.readers.database import SolverFile
+from d2rpick.readers.fixed_text import TWICE, Blocks, Grammar, Layout, head
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Hashable, Sequence
 
-    from d2rpick.history import Samples
+    from d2rpick.history import Part, Samples
+    from d2rpick.readers.selection import Selection
+    from d2rpick.readers.source import Content, Source
 
-_LABEL = 31
-_FIELD = 14
-_TIME = b"time"
-_PRECISION = Precision(digits=6)
-
-_TIME_LINE = re.compile(rb"\n time[. ]{27}")
-_VALUE_LINE = re.compile(rb"\n (?=\S)([^\n=]{30}\.)[^\n]{14}")
-_NO_E = re.compile(rb"\s*([+-]?[\d.]+)([+-]\d{3})")  # Ew.d drops the E of a three-digit exponent
+_START: Final = b" time".ljust(32, b".")
+_CONTROL: Final = b"\n dt of cycle"
+_LAST: Final = "time per zone cycle.(nanosec)"  # in every glstat seen; mass scaling may add lines behind it
+_LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]{14})([ \t][^\r\n]*)?\r?$", re.MULTILINE)
 
 
-def recognises(head: bytes) -> bool:
-    """Whether there is a time line, or the head of an LS-DYNA text database with no state at all."""
-    if _TIME_LINE.search(head):
+def recognises(data: bytes) -> bool:
+    """Whether ``data``, the beginning of a file, looks like a glstat; a head alone does, too."""
+    if b"\n" + _START in data or data.startswith(_START):
         return True
-    _, _, rest = head.partition(b"\n")
-    version, _, states = rest.partition(b"\n")
-    return b" ls-dyna " in version and (not states.strip() or b"\n dt of cycle " in states)
+    _, version, begin = head(data)
+    states = data[begin:].strip()
+    return bool(version) and (not states or states.startswith(_CONTROL.strip()))
 
 
-def read(source: Source, selection: Selection) -> History:
-    """Read the labels asked for, by default ``internal energy``, over time."""
-    if selection.time is not None and selection.time.casefold() != "time":
-        raise FormatError(f"{source.name}: no time {selection.time!r} in glstat, its time is 'time'; leave --time out")
-    wanted = _labels(source, selection.energy or ("internal energy",))
-    rows, notes, complete = _states(source, wanted)
-    keep, order_notes = states_that_count(source.name, rows[:, 0])
-    channel = " + ".join(label.decode("latin-1") for label in wanted)
-    return History(
-        time=rows[keep, 0],
-        energy=rows[keep, 1:].sum(axis=1),
-        source=(source.name,),
-        format="glstat",
-        channel=channel,
-        time_precision=_PRECISION,
-        energy_precision=_PRECISION,
-        complete=complete,
-        notes=(*notes, *order_notes, *quantity_note(channel)),
-    )
+def open_legs(sources: Sequence[Source], _: Selection) -> list[Glstat]:
+    """Open each file as a leg of the run."""
+    return [Glstat(source.data, source.name) for source in sources]
 
 
-def _labels(source: Source, asked: Sequence[str]) -> list[bytes]:
-    """Find the labels as the first state spells them."""
-    first = _TIME_LINE.search(source.data)
-    if not first:
-        raise FormatError(
-            f"{source.name}: no states, not one time line was found; did the run get to its first output?"
-        )
-    following = _TIME_LINE.search(source.data, first.end())
-    block = source.data[first.start() : following.start() if following else len(source.data)]
-    present = [label.rstrip(b". ").decode("latin-1") for label in _VALUE_LINE.findall(block)]
-    known = {label.casefold(): label for label in present if label != "time"}
-    choice = list(known.values())
-    labels = []
-    for name in asked:
-        label = known.get(name.strip().casefold())
-        if label is None:
-            raise FormatError(
-                f"{source.name}: the first state has no whole line {name!r}{near_miss(name, choice)}; "
-                f"there are: {listing(choice, most=40)}"
-            )
-        labels.append(label.encode("latin-1"))
-    if len(set(labels)) < len(labels):
-        raise FormatError(f"{source.name}: an energy is asked for twice; name each once")
-    return labels
+class Glstat(SolverFile):
+    """One glstat file; a ``Database`` without parts.
 
-
-def _states(source: Source, wanted: Sequence[bytes]) -> tuple[Samples, list[str], bool]:
-    """Rows of time and wanted values, what to say of lines left out, and whether the file is whole."""
-    data = source.data
-    fields = (re.escape(label) + rb"[. ]{%d}" % (_LABEL - len(label)) for label in (_TIME, *wanted))
-    pattern = re.compile(rb"\n (" + b"|".join(fields) + rb")([^\n]*)")
-    found = pattern.findall(data)
-    labels = [field.rstrip(b". ") for field, _ in found]
-    first = labels.index(_TIME)
-    notes = ["the file begins inside a state, which was left out"] if first else []
-    # The last line found may be cut, and a cut number is often a number: it counts when another line follows.
-    end_of_line = data.find(b"\n", data.rindex(b"\n " + found[-1][0]) + 1)
-    last = len(found) if 0 <= end_of_line < len(data) - 1 else len(found) - 1
-
-    order = _order(labels[first:last], wanted)
-    states, rest = divmod(last - first, len(order))
-    expected = (order * (states + 1))[: last - first]
-    if labels[first:last] != expected:
-        wrong = next(i for i, label in enumerate(expected) if labels[first + i] != label)
-        here, there = labels[first + wrong].decode("latin-1"), expected[wrong].decode("latin-1")
-        raise FormatError(
-            f"{source.name}:{_line_number(data, pattern, first + wrong)}: {here!r} where {there!r} "
-            "was expected, as a state has its time and every label once; repair it or take another label"
-        )
-    values = np.array([_value(line) for _, line in found[first : last - rest]])
-    bad = np.flatnonzero(np.isnan(values))
-    if bad.size:
-        label, line = found[first + bad[0]]
-        raise FormatError(
-            f"{source.name}:{_line_number(data, pattern, first + bad[0])}: "
-            f"{label.rstrip(b'. ').decode('latin-1')!r} is {line.strip().decode('latin-1')!r}, "
-            "a number in columns 33-46 was expected; repair the line or cut the file before it"
-        )
-    if rest or last < len(found):
-        notes.append("the last state is cut short and was left out")
-    elif not data.endswith(b"\n"):
-        notes.append("the file stops inside its last state, behind the lines that were needed")
-    complete = not rest and last == len(found) and data.endswith(b"\n")
-    columns = [order.index(label) for label in (_TIME, *wanted)]
-    return values.reshape(states, len(order))[:, columns], notes, complete
-
-
-def _order(labels: Sequence[bytes], wanted: Sequence[bytes]) -> list[bytes]:
-    """Order in which the first state has its lines."""
-    order = list(labels[: len(wanted) + 1])
-    return order if set(order) == {_TIME, *wanted} else [_TIME, *wanted]
-
-
-def _value(line: bytes) -> float:
-    """Return the number in columns 33-46 from what stands behind the label; NaN when there is none for sure.
-
-    Examples
-    --------
-    >>> [_value(line) for line in (b"   2.04235E+03", b"   1.00000D+00 wall# 1", b" -4.94066-300", b"   3.")]
-    [2042.35, 1.0, nan, nan]
+    FormatError if it has neither a head nor a state, or a time that is no number.
     """
-    field = line[:_FIELD]
-    if len(field) < _FIELD or b"_" in field or line[_FIELD : _FIELD + 1].strip():
-        return math.nan  # cut, no number in Fortran though in Python, or wider than its column
-    try:
-        value = float(field)
-    except ValueError:
-        bare = _NO_E.fullmatch(field)
-        text = bare[1] + b"E" + bare[2] if bare else field.replace(b"D", b"E")
-        try:
-            value = float(text)
-        except ValueError:
-            return math.nan
-    return value if math.isfinite(value) else math.nan
+
+    format: Final = "glstat"
+    parts: tuple[Part, ...] = ()
+    digits = 6
+
+    def __init__(self, data: Content, source: str) -> None:
+        self.source = source
+        self.title, self.version, begin = head(data)
+        self._blocks = Blocks(data, source, begin, _GRAMMAR)
+        if not self.version and not self._blocks.states:
+            raise FormatError(
+                f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is no glstat; "
+                "choose another input format"
+            )
+        self.complete, self.notes = self._blocks.complete, self._blocks.notes
+        if self.complete and _CONTROL in data[self._blocks.tail :]:
+            self.complete = False
+            self.notes += ("the file stops before the time of its next state",)
+        if not self.version:
+            self.notes += ("the file has no head; what stands before its first time line was left out",)
+        self.channels = self._names()
+        self.time = self._blocks.numbers(["time"])[:, 0]
+
+    @property
+    def part_time(self) -> Samples:
+        """Refused: a glstat knows the model as a whole only."""
+        raise self._no_parts()
+
+    def channel(self, name: str) -> Samples:
+        """Values of the line ``name``, shape (n,); FormatError unless every state has a number in one such line."""
+        return self._blocks.numbers([name])[:, 0]
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> NoReturn:  # noqa: ARG002  as a Database
+        """Refused: a glstat knows the model as a whole only."""
+        raise self._no_parts()
+
+    def _no_parts(self) -> FormatError:
+        return FormatError(f"{self.source}: a glstat has no parts; add the matsum of the run")
+
+    def _names(self) -> tuple[str, ...]:
+        layouts = {(run.example, run.stride) for run in self._blocks}
+        names = {str(name): None for layout in sorted(layouts) for name in self._blocks.layout(*layout).fields}
+        return tuple(name for name in names if name != "time")
 
 
-def _line_number(data: bytes, pattern: re.Pattern[bytes], index: int) -> int:
-    match = next(islice(pattern.finditer(data), index, None))
-    return data.count(b"\n", 0, match.start() + 1) + 1
+def _describe(block: bytes) -> Layout:
+    literal = np.where(np.frombuffer(block, np.uint8) == ord("\n"), np.uint8(255), np.uint8(0))
+    fields: dict[Hashable, int] = {}
+    name = ""
+    for line in _LINE.finditer(block):
+        label, _, remark = line.groups()
+        name = label.rstrip(b".").rstrip().decode("latin-1")
+        if remark and remark.strip():  # "wall# 1": there is a line for each wall
+            name += " " + " ".join(remark.decode("latin-1").split())
+        literal[line.start() : line.end()] = 255
+        literal[line.start(2) : line.end(2)] = 0
+        fields[name] = TWICE if name in fields else line.start(2)
+    return Layout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
+
+
+def _is_whole(layout: Layout) -> bool:
+    return _LAST in layout.fields
+
+
+_GRAMMAR: Final = Grammar(_START, _describe, _is_whole, width=14, decimals=5, compare_all=True)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from d2rpick.errors import FormatError
+
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
 TIME_UNITS = frozenset({"s", "sec", "second", "seconds", "ms", "msec", "us", "µs", "μs", "ns", "min", "h"})
 _ENERGY_UNITS = frozenset(
@@ -118,6 +120,26 @@ def quantity_note(channel: str) -> tuple[str, ...]:
     return (f"{channel!r} is no internal energy by its name ({word[0]}); it was taken as it is",)
 
 
+def resolve(wanted: str, known: Sequence[str], where: str) -> str:
+    """Find the name that is meant: as it stands, in other case, or but for blanks, underscores and units.
+
+    FormatError, with near misses and what there is, when none or several are meant.
+
+    Examples
+    --------
+    >>> resolve("internal energy", ["kinetic_energy", "internal_energy"], "binout")
+    'internal_energy'
+    """
+    spellings: tuple[Callable[[str], str], ...] = (str.strip, lambda text: text.strip().casefold(), normalised)
+    for spelling in spellings:
+        same = [name for name in known if spelling(name) == spelling(wanted)]
+        if len(same) == 1:
+            return same[0]
+        if same:
+            raise FormatError(f"{where}: {wanted!r} may be any of these: {listing(same)}; choose one as it is written")
+    raise FormatError(f"{where}: no {wanted!r}{near_miss(wanted, known)}; there are: {listing(known)}")
+
+
 def near_miss(wanted: str, known: Sequence[str]) -> str:
     """Ask for the name that was perhaps meant, or say nothing."""
     import difflib
@@ -127,7 +149,22 @@ def near_miss(wanted: str, known: Sequence[str]) -> str:
     return f" (did you mean {folded[close[0]]!r}?)" if close else ""
 
 
-def listing(names: Sequence[str], most: int = 20) -> str:
+def plain_text(raw: bytes) -> str:
+    r"""Text of a fixed field: without padding, and with blanks for bytes that are no text.
+
+    Examples
+    --------
+    >>> plain_text(b" shell \xe9 \n\0\0  ")
+    'shell é'
+    """
+    try:
+        text = raw.decode("utf-8")
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")
+    return "".join(letter if letter.isprintable() else " " for letter in text).strip()
+
+
+def listing(names: Sequence[object], most: int = 20) -> str:
     """Names for a message, cut where it would fill the screen."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    return ", ".join(map(str, names[:most])) + more

@@ -1,44 +1,48 @@
-"""Where the bytes of a history come from, what is to be taken from them, and what all readers share."""
+"""Where the bytes of a history come from: files, folders, globs, standard input."""
 
 from __future__ import annotations
 
+import mmap
+import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from d2rpick.errors import FormatError, HistoryError
-from d2rpick.history import newest_states
+from d2rpick.errors import FormatError
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from d2rpick.history import Samples
+    from collections.abc import Sequence
 
 STDIN = "-"
+Content = bytes | mmap.mmap
+
+# What solvers call their databases in the folder of a run.
+_DATABASE = re.compile(r"(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d(?:\.gz)?")
 
 # Standard input can be read only once; its bytes stay here for a later sha256("-").
 _stdin = b""
 
 
 @dataclass(frozen=True)
-class Selection:
-    """What the user asked for: columns or labels by name, columns also by 1-based number.
-
-    Nothing asked: each reader takes the time and the internal energy.  Several energies are added.
-    """
-
-    time: str | None = None
-    energy: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Source:
-    """The unpacked bytes of one file, under the name the user gave it."""
+    """The unpacked bytes of one file, mapped where it lies on a disk, under the name the user gave it."""
 
     name: str
-    data: bytes
+    data: Content
+
+
+def expand(names: Sequence[str]) -> tuple[str, ...]:
+    """Replace folders and globs by the files they hold, without changing the order otherwise.
+
+    Of a folder only the databases of solvers count, and they must be of one run.
+
+    Raises
+    ------
+    FormatError
+        If a folder or glob holds none, or a folder the T01 files of several runs.
+    """
+    return tuple(dict.fromkeys(file for name in names for file in _files(name)))
 
 
 def open_source(name: str) -> Source:
@@ -49,8 +53,8 @@ def open_source(name: str) -> Source:
     FormatError
         If there is nothing to be read under this name.
     """
-    data = _read_stdin() if name == STDIN else _read_file(name)
-    if data.startswith(b"\x1f\x8b"):
+    data: Content = _read_stdin() if name == STDIN else _mapped(name)
+    if data[:2] == b"\x1f\x8b":
         data = _unpacked(name, data)
     if not data:
         raise FormatError(f"{name}: the file is empty, an energy history was expected; was the run started?")
@@ -64,17 +68,36 @@ def sha256(name: str) -> str:
     """
     import hashlib
 
-    return hashlib.sha256(_stdin if name == STDIN else _read_file(name)).hexdigest()
+    if name == STDIN:
+        return hashlib.sha256(_stdin).hexdigest()
+    with Path(name).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def states_that_count(name: str, time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """`newest_states`, with the file named in its error, and refused when there are no states at all."""
-    if not time.size:
-        raise FormatError(f"{name}: no states, a history has at least one; look whether the run wrote output")
-    try:
-        return newest_states(time)
-    except HistoryError as error:
-        raise FormatError(f"{name}: {error}") from None
+def _files(name: str) -> Sequence[str]:
+    path = Path(name)
+    if name == STDIN or path.is_file():
+        return [name]
+    if path.is_dir():
+        return _databases(path)
+    if any(sign in name for sign in "*?["):
+        found = sorted(str(file) for file in Path(path.anchor).glob(name.removeprefix(path.anchor)) if file.is_file())
+        if not found:
+            raise FormatError(f"{name}: no file has such a name; check the folder")
+        return found
+    return [name]  # what is wrong with it shows when it is opened
+
+
+def _databases(folder: Path) -> list[str]:
+    matches = {file: _DATABASE.fullmatch(file.name) for file in sorted(folder.iterdir()) if file.is_file()}
+    found = {file: match["root"] for file, match in matches.items() if match}
+    if not found:
+        raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; name the file")
+    roots = sorted({root for root in found.values() if root is not None})
+    if len(roots) > 1:
+        runs = ", ".join(f"{root}T01" for root in roots[:5])
+        raise FormatError(f"{folder}: this folder holds several runs ({runs}), one was expected; name the files of one")
+    return [str(file) for file in found]
 
 
 def _read_stdin() -> bytes:
@@ -83,19 +106,21 @@ def _read_stdin() -> bytes:
     return _stdin
 
 
-def _read_file(name: str) -> bytes:
+def _mapped(name: str) -> Content:
     try:
-        return Path(name).read_bytes()
+        with Path(name).open("rb") as file:
+            try:
+                return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+            except (OSError, ValueError):  # empty, or a pipe
+                return file.read()
     except FileNotFoundError:
         raise FormatError(f"{name}: no such file; check the name and the folder") from None
-    except IsADirectoryError:
-        raise FormatError(f"{name}: this is a folder, a file was expected; name a file in it") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
         reason = getattr(error, "strerror", None) or error
         raise FormatError(f"{name}: cannot be read ({reason}); check the name and the permissions") from None
 
 
-def _unpacked(name: str, data: bytes) -> bytes:
+def _unpacked(name: str, data: Content) -> bytes:
     import gzip
     import zlib
 

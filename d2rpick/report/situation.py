@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from d2rpick.cautions import Caution
+    from d2rpick.history import Part
     from d2rpick.situation import Situation
 
 
@@ -37,7 +39,8 @@ def heading(situation: Situation) -> list[str]:
         lines.append("flight   unknown")
     else:
         end = "no next contact seen" if flight.end is None else f"to {flight.end:.6g}"
-        lines.append(f"flight   from {flight.start:.6g} ({flight.source}), {end}")
+        who = f" of {', '.join(part.title or str(part.id) for part in flight.parts)}" if flight.parts else ""
+        lines.append(f"flight   from {flight.start:.6g} ({flight.source}{who}), {end}")
     return lines
 
 
@@ -56,7 +59,7 @@ def frame(situation: Situation, schema: str, command: Sequence[str], cautions: I
             "sha256": [sha256(name) for name in history.source],
             "format": history.format,
             "channel": history.channel,
-            "parts": None,
+            "parts": parts_of(history.parts),
             "states": int(history.time.size),
             "time_start": float(history.time[0]),
             "time_end": float(history.time[-1]),
@@ -64,6 +67,11 @@ def frame(situation: Situation, schema: str, command: Sequence[str], cautions: I
             "notes": list(history.notes),
         },
     }
+
+
+def parts_of(parts: Sequence[Part] | None) -> list[dict[str, Any]] | None:
+    """Number and title of each part, or null for the whole model."""
+    return None if parts is None else [asdict(part) for part in parts]
 
 
 def mechanics(situation: Situation) -> dict[str, Any]:
@@ -86,7 +94,7 @@ def mechanics(situation: Situation) -> dict[str, Any]:
         "energy_td": situation.energy_td,
         "kinetic_share": situation.kinetic_share,
         "basis": situation.basis,
-        "flight": {"start": flight.start, "end": flight.end, "source": flight.source, "parts": None},
+        "flight": {"start": flight.start, "end": flight.end, "source": flight.source, "parts": parts_of(flight.parts)},
         "oscillator": oscillator,
     }
 

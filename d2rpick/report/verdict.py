@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from d2rpick.report import tables
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice import Verdict
+    from d2rpick.switched import Comparison
 
 SCHEMA = "d2rpick/verify/1"
 
@@ -21,6 +23,8 @@ def as_table(answer: Verdict) -> str:
     lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in _measures(answer).items()]
     verdict = "verified" if answer.verified else "unknown" if answer.tr_ok is None else "not verified"
     reasons = [f"  {reason}" for reason in answer.reasons]
+    if answer.switched:
+        lines += ["", *_comparison(answer.switched)]
     return "\n".join([*heading(answer.situation), "", *lines, "", f"verdict  {verdict}", *reasons])
 
 
@@ -44,8 +48,26 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
             **mechanics(situation),
             **_measures(answer),
             "reasons": list(answer.reasons),
+            "switched": asdict(answer.switched) if answer.switched else None,
         }
     )
+
+
+def _comparison(switched: Comparison) -> list[str]:
+    """Lines that hold the switched run against the reference."""
+    rows = [
+        ("energy at td", switched.energy_frozen, switched.energy_td),
+        ("mean after td", switched.mean_after, switched.mean_after_reference),
+        ("spread after td", switched.spread_after, switched.spread_after_reference),
+    ]
+    after = f"after td, to {switched.end:.6g}"
+    return [
+        f"switched run  {', '.join(switched.source)}",
+        tables.as_text(("", "switched", "reference"), rows),
+        f"largest error of momentum {after}: {tables.short(switched.momentum_error)} of the largest momentum",
+        f"largest displacement of the centre {after}: {tables.short(switched.displacement)}",
+        *switched.notes,
+    ]
 
 
 def _measures(answer: Verdict) -> dict[str, Any]:

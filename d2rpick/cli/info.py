@@ -1,0 +1,37 @@
+"""The command ``info``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from d2rpick.cli import options as shared
+from d2rpick.cli.output import Output
+
+EXAMPLES = """\b
+Examples:
+  d2rpick info sample_data/energy.glstat
+  d2rpick info -f json sample_data/rollover.csv
+"""
+
+
+@click.command("info", epilog=EXAMPLES)
+@shared.history_options
+@shared.output_options("table", "json", "csv", "markdown")
+@click.pass_context
+def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **options: Any) -> None:  # noqa: ARG001
+    """Tell what is in the HISTORY of a run: format, states, sampling, channels, parts, flights."""
+    from d2rpick.overview import survey
+    from d2rpick.report import overview as report
+
+    run = shared.open_run(options)
+    output = Output.of(options, *run.sources)
+    overview = survey(run, shared.selection(options))
+    texts = {
+        "table": lambda: report.as_table(overview),
+        "markdown": lambda: report.as_markdown(overview),
+        "csv": lambda: report.as_csv(overview),
+        "json": lambda: report.as_json(overview, ctx.meta["d2rpick.command"]),
+    }
+    output.result(texts[output_format]())

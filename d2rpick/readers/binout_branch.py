@@ -1,0 +1,244 @@
+"""One branch of a binout family: its states in order, its variables as columns, its parts by id.
+
+States are grouped by file and layout, so that a column is gathered with a few array operations however many
+states there are.  Whatever does not fit - a variable or a part that one state lacks, a count that changes -
+is refused with the state named, never shifted.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.errors import FormatError
+from d2rpick.readers.binout_states import Group, States
+from d2rpick.readers.names import listing, plain_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from d2rpick.history import Samples
+    from d2rpick.readers.lsda import Layout, Lsda, Variable
+
+    Indices = NDArray[np.int64]
+
+
+class Branch:
+    """The states of one branch in all files of a family; false when no file knows the branch.
+
+    Parameters
+    ----------
+    name : str
+    files : sequence of Lsda
+        The family, in its order.
+    by_part : bool
+        Whether variables are lists with one value per part.
+    """
+
+    def __init__(self, name: str, files: Sequence[Lsda], *, by_part: bool) -> None:
+        self.name = name
+        self._by_part = by_part
+        self._files = files
+        self._states = States(name, files)
+
+    def __bool__(self) -> bool:
+        return any(self.name in file.names for file in self._files)
+
+    @property
+    def source(self) -> str:
+        """The files that hold this branch, and the branch, for messages."""
+        holders = [file.source for file in self._files if self.name in file.names]
+        return f"{', '.join(holders)}: {self.name}"
+
+    @property
+    def damage(self) -> str:
+        """Where records are lost or out of place; empty if nowhere."""
+        return self._states.damage
+
+    @property
+    def complete(self) -> bool:
+        """Whether no state is missing and the last one is whole."""
+        return not (self._states.missing or self._states.unfinished or self.damage)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out, what is missing, what only some states hold."""
+        states = self._states
+        notes = [f"{name}: the last state of {self.name} is not whole and was left out" for name in states.unfinished]
+        if states.damage:
+            notes.append(f"{states.damage}; records are lost or out of place")
+        if states.missing:
+            holes = listing(states.missing, most=3)
+            notes.append(f"{self.source} lacks the states {holes}; is a file of the family missing?")
+        if states.superseded:
+            notes.append(f"{self.source}: a newer leg wrote {states.superseded} states again; the newer ones count")
+        names = {name for group in self._states.groups for name in group.layout.variables}
+        if late := sorted(names - self.common):
+            notes.append(f"{self.source} has {listing(late)} in some states only")
+        if self and not states.numbers.size:
+            notes.append(f"{self.source} holds no state yet")
+        return tuple(notes)
+
+    @cached_property
+    def common(self) -> frozenset[str]:
+        """Variables that all states hold."""
+        held = [frozenset(group.layout.variables) for group in self._states.groups]
+        return frozenset.intersection(*held) if held else frozenset()
+
+    @cached_property
+    def scalars(self) -> tuple[str, ...]:
+        """Floating-point variables that all states hold with one value, in the order of the file."""
+        layouts = [group.layout.variables for group in self._states.groups]
+        return tuple(
+            name
+            for name in (layouts[0] if layouts else ())
+            if all(name in layout and layout[name].count == 1 and layout[name].dtype.kind == "f" for layout in layouts)
+        )
+
+    @property
+    def time_width(self) -> int:
+        """Bytes per number of the times, the shortest of all states."""
+        layouts = [group.layout.variables for group in self._states.groups]
+        return min((layout["time"].dtype.itemsize for layout in layouts if "time" in layout), default=8)
+
+    @cached_property
+    def legend(self) -> dict[int, str]:
+        """Titles of the parts by id."""
+        titles: dict[int, str] = {}
+        for file, start, layout in self._metadata:
+            ids, legend = _integers(file, start, layout, "legend_ids"), layout.variables.get("legend")
+            if legend is None or not ids.size or legend.count % ids.size:
+                continue  # without a whole length per title nobody knows where one ends
+            raw, width = file.raw(start, legend), legend.count // ids.size
+            titles.update((id_, plain_text(raw[i * width : (i + 1) * width])) for i, id_ in enumerate(ids.tolist()))
+        return titles
+
+    @cached_property
+    def part_ids(self) -> tuple[int, ...]:
+        """Ids of all parts that any state holds, in the order of the lists."""
+        known: dict[int, None] = {}
+        for group in self._states.groups:
+            for part in group.chunks(max(self._list_lengths(group), default=1)):
+                listed = self._ids(part)
+                changed = np.append(True, (np.diff(listed, axis=0) != 0).any(axis=1))
+                known.update(dict.fromkeys(listed[changed].ravel().tolist()))
+        return tuple(known)
+
+    def text(self, name: str) -> str:
+        """Text from the metadata; empty if it is not there."""
+        for file, start, layout in self._metadata:
+            if name in layout.variables:
+                return plain_text(file.raw(start, layout.variables[name]))
+        return ""
+
+    def channel(self, name: str) -> Samples:
+        """One variable of one value per state, shape (n,)."""
+        column = np.empty(self._states.numbers.size)
+        for group, variable in self._checked(name):
+            if variable.count != 1:
+                raise self._refused(group, f"one {name} was expected, not {variable.count}; ask for another")
+            for part in group.chunks(1):
+                column[part.rows] = part.values(variable, np.zeros((1, 1), dtype=np.int64))[:, 0]
+        return column
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
+        """One variable of some parts, shape (n, len(ids))."""
+        columns = np.empty((self._states.numbers.size, len(ids)))
+        for group, variable in self._checked(quantity):
+            for part in group.chunks(max(variable.count, len(ids))):
+                listed = self._ids(part)
+                if listed.shape[1] != variable.count:
+                    counts = f"{variable.count} values of {quantity} for {listed.shape[1]} parts"
+                    raise self._refused(part, f"{counts}; which is whose cannot be told")
+                places = [self._places(part, listed, id_) for id_ in ids]
+                columns[part.rows] = part.values(variable, np.stack(places, axis=1)) if places else 0.0
+        return columns
+
+    def _checked(self, name: str) -> Iterator[tuple[Group, Variable]]:
+        """Each group with its variable of this name.
+
+        A count that fits neither the parts nor the other states is the mark of records of two states run into
+        each other: then no value of the state can be trusted.
+        """
+        for group in self._states.groups:
+            variables = group.layout.variables
+            if name not in variables:
+                raise self._refused(group, f"no {name}, only {listing(list(variables), most=40)}; ask for one of these")
+            if variables[name].dtype.kind != "f":
+                raise self._refused(group, f"{name} is stored as {variables[name].dtype}, not as floating point")
+            for other, variable in variables.items():
+                if variable.count not in (fit := self._fitting(group, other)):
+                    counts = f"{variable.count} values of {other} where {listing(sorted(fit))} would fit"
+                    raise self._refused(group, f"{counts}; the file is damaged there")
+            yield group, variables[name]
+
+    def _fitting(self, group: Group, name: str) -> set[int]:
+        """Possible counts of a variable: one per state or per part, or what it is in the other states."""
+        if self._by_part:
+            return {1, *self._list_lengths(group)}
+        first, here = self._states.groups[0].layout.variables, group.layout.variables
+        return {first.get(name, here[name]).count}
+
+    def _list_lengths(self, group: Group) -> set[int]:
+        own = group.layout.variables.get("ids")
+        return {own.count} if own else {ids.size for _, _, ids in self._id_lists}
+
+    def _refused(self, group: Group, why: str, row: int = 0) -> FormatError:
+        return FormatError(f"{self.source} state {self._states.numbers[group.rows[row]]}: {why}")
+
+    @cached_property
+    def _metadata(self) -> list[tuple[Lsda, int, Layout]]:
+        return [
+            (file, start, file.layouts[layout]) for file in self._files for start, layout in file.metadata[self.name]
+        ]
+
+    @cached_property
+    def _id_lists(self) -> list[tuple[int, int, Indices]]:
+        """Each list of part ids in the metadata: number of the file, byte, ids."""
+        lists = [
+            (self._files.index(file), at, _integers(file, at, layout, "ids")) for file, at, layout in self._metadata
+        ]
+        return [entry for entry in lists if entry[2].size]
+
+    def _ids(self, group: Group) -> Indices:
+        """Part ids of a group's states, shape (states, parts); (1, parts) if they are the same for all."""
+        own = group.layout.variables.get("ids")
+        if own and own.dtype.kind in "iu":
+            return group.values(own, np.arange(own.count)[None, :]).astype(np.int64)
+        if not self._id_lists:
+            raise FormatError(f"{self.source} has no part ids in its metadata; which value is whose cannot be told")
+        index = self._files.index(group.file)
+        before = sum(1 for file, _, _ in self._id_lists if file < index)
+        here = np.array([start for file, start, _ in self._id_lists if file == index], dtype=np.int64)
+        # The last list before a state is in force; a rank's file may bring its list behind the first states.
+        in_force = np.maximum(before + np.searchsorted(here, group.starts) - 1, 0)
+        lists = {int(i): self._id_lists[i][2] for i in np.unique(in_force)}
+        if len({entry.size for entry in lists.values()}) > 1:
+            raise self._refused(group, "the number of parts changes here or later, that of the values does not")
+        if len(lists) == 1:
+            ids: Indices = next(iter(lists.values()))
+            return ids[None, :]
+        return np.stack([lists[i] for i in in_force.tolist()])
+
+    def _places(self, group: Group, listed: Indices, id_: int) -> Indices:
+        """Where in its lists each state has a part, shape (states,) or (1,)."""
+        found = listed == id_
+        times = found.sum(axis=1)
+        if (times != 1).any():
+            row = int(np.argmax(times != 1))
+            hint = "it comes and goes" if id_ in self.part_ids else f"there are {listing(self.part_ids)}"
+            raise self._refused(group, f"part {id_} is listed {times[row]} times, not once; {hint}", row)
+        return np.asarray(found.argmax(axis=1))
+
+
+def _integers(file: Lsda, start: int, layout: Layout, name: str) -> Indices:
+    """List of integers from a directory; empty if there is none of this name."""
+    variable = layout.variables.get(name)
+    if variable is None or variable.dtype.kind not in "iu":
+        return np.empty(0, dtype=np.int64)
+    places = start + variable.offset + variable.dtype.itemsize * np.arange(variable.count)
+    return file.read(places, variable.dtype).astype(np.int64)

@@ -1,0 +1,238 @@
+"""Database: what a file of a run offers, its columns read only when they are asked for; several legs as one."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Final, Protocol
+
+import numpy as np
+
+from d2rpick.errors import FormatError
+from d2rpick.history import Precision, newest_states
+from d2rpick.readers.names import resolve
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from d2rpick.history import Part, Samples
+
+
+class Database(Protocol):
+    """The states of one leg of a run, in the run's own units.
+
+    Times are those of the file: they may repeat or step back where a restart wrote a state again.  Columns that
+    are not there, or not in every state, raise FormatError.
+    """
+
+    @property
+    def source(self) -> str:
+        """Name of the file or files, for messages."""
+
+    @property
+    def format(self) -> str:
+        """Name of the format, as in the list of readers."""
+
+    @property
+    def version(self) -> str:
+        """Solver and release, as far as the file names them."""
+
+    @property
+    def title(self) -> str:
+        """Title of the run."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the file ends behind a whole state and none is missing before."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know about what was read."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the columns of the whole model; time is none of them."""
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Parts that have histories of their own, in the order of the file."""
+
+    @property
+    def time(self) -> Samples:
+        """Times of the columns of the whole model, shape (n,) [time]."""
+
+    @property
+    def part_time(self) -> Samples:
+        """Times of the parts' columns, shape (m,) [time]."""
+
+    @property
+    def time_unit(self) -> str:
+        """Unit of the times, empty where the file does not name it."""
+
+    @property
+    def energy_channel(self) -> str | None:
+        """Name of the internal energy of the whole model; None where there is none."""
+
+    def find(self, wanted: str) -> str:
+        """Name of the column that the user means, by name or, in tables, by number."""
+
+    def channel(self, name: str) -> Samples:
+        """One column of the whole model, shape (n,)."""
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
+        """One quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
+
+    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
+        """How finely the times and these channels were written; of no channels: those of the parts."""
+
+
+class Legs:
+    """Legs of one run as one `Database`: in the order of their start, and where they overlap the newer counts.
+
+    Also one leg alone needs this where a restart wrote states again or times are printed alike.
+    """
+
+    def __init__(self, legs: Sequence[Database]) -> None:
+        self._legs = sorted(legs, key=_start)
+
+    @property
+    def source(self) -> str:
+        """Names of the files."""
+        return ", ".join(leg.source for leg in self._legs)
+
+    @property
+    def format(self) -> str:
+        """Name of the format."""
+        return self._legs[0].format
+
+    @property
+    def version(self) -> str:
+        """Solver of the first leg."""
+        return self._legs[0].version
+
+    @property
+    def title(self) -> str:
+        """Title of the first leg."""
+        return self._legs[0].title
+
+    @property
+    def time_unit(self) -> str:
+        """Unit of the times."""
+        return self._legs[0].time_unit
+
+    @property
+    def energy_channel(self) -> str | None:
+        """Internal energy of the whole model."""
+        return self._legs[0].energy_channel
+
+    @property
+    def complete(self) -> bool:
+        """Whether all legs are."""
+        return all(leg.complete for leg in self._legs)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Columns that all legs have."""
+        return tuple(n for n in self._legs[0].channels if all(n in leg.channels for leg in self._legs))
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Parts that all legs have."""
+        return tuple(p for p in self._legs[0].parts if all(p.id in {q.id for q in leg.parts} for leg in self._legs))
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """Notes of the legs, and what was left out between them."""
+        own = [note for leg in self._legs for note in leg.notes]
+        sorts = [self._kept] if self.channels else []
+        sorts += [self._parts_kept] if self.parts else []
+        return tuple(dict.fromkeys([*own, *(note for _, notes in sorts for note in notes)]))
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time [time]."""
+        time = self.time if self.channels else self.part_time
+        return float(time[0]), float(time[-1])
+
+    @cached_property
+    def time(self) -> Samples:
+        """Times of the columns of the whole model, increasing."""
+        return self._joined([leg.time for leg in self._legs], self._kept[0])
+
+    @cached_property
+    def part_time(self) -> Samples:
+        """Times of the parts' columns, increasing."""
+        return self._joined([leg.part_time for leg in self._legs], self._parts_kept[0])
+
+    def find(self, wanted: str) -> str:
+        """Name of the column that the user means."""
+        return self._legs[0].find(wanted)
+
+    def channel(self, name: str) -> Samples:
+        """One column of the whole model."""
+        return self._joined([leg.channel(name) for leg in self._legs], self._kept[0])
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
+        """One quantity of some parts."""
+        return self._joined([leg.part_channel(quantity, ids) for leg in self._legs], self._parts_kept[0])
+
+    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
+        """Those of the coarsest leg."""
+        found = [leg.precisions(names) for leg in self._legs]
+        return min((t for t, _ in found), key=_digits), min((e for _, e in found), key=_digits)
+
+    @cached_property
+    def _kept(self) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+        return self._order([leg.time for leg in self._legs])
+
+    @cached_property
+    def _parts_kept(self) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+        return self._order([leg.part_time for leg in self._legs])
+
+    def _order(self, times: Sequence[Samples]) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+        time = np.concatenate(times)
+        if not time.size:
+            raise FormatError(
+                f"{self.source}: no states, a history has at least one; look whether the run wrote output"
+            )
+        return newest_states(time)
+
+    def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
+        whole = columns[0] if len(columns) == 1 else np.concatenate(columns)
+        return whole if keep.all() else whole[keep]
+
+
+def _start(leg: Database) -> float:
+    times = leg.time if leg.channels else leg.part_time
+    return float(times[0]) if times.size else -np.inf
+
+
+def _digits(precision: Precision) -> int:
+    return precision.digits if precision.decimals is None else precision.decimals
+
+
+# Significant digits by bytes per number: 24 bits hold 7 digits; 17 digits restore every double.
+DIGITS: Final = {4: 7, 8: 17}
+
+
+class SolverFile:
+    """What the databases of solvers have in common."""
+
+    source: str
+    channels: tuple[str, ...]
+    digits: int  # significant decimal digits of the values
+    time_unit = ""  # no solver writes one
+
+    @property
+    def energy_channel(self) -> str | None:
+        """Internal energy of the whole model, as this format calls it."""
+        return next((name for name in ("internal energy", "internal_energy") if name in self.channels), None)
+
+    def find(self, wanted: str) -> str:
+        """Name of the channel that is meant; FormatError with what there is."""
+        return resolve(wanted, self.channels, self.source)
+
+    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  as a Database
+        """All columns are written alike."""
+        return Precision(self.digits), Precision(self.digits)

@@ -1,0 +1,334 @@
+"""Solver text databases made of blocks of fixed columns: where the numbers stand, and what they are.
+
+glstat and matsum write one block per state.  Blocks of one file mostly have the same lines, hence the same
+number of bytes.  So a block is taken apart line by line once; the blocks after it are only compared with it,
+byte by byte where the text must be the same (labels, part numbers, line ends), and the numbers are then
+fetched by address.  Where a block differs, it is taken apart itself.
+"""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from d2rpick.errors import FormatError
+from d2rpick.readers.fortran import decode
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+
+    from d2rpick.history import Samples
+    from d2rpick.readers.source import Content
+
+Bytes = NDArray[np.uint8]
+Addresses = NDArray[np.int64]
+
+TWICE: Final = -1  # in place of an offset: the field stands twice in the block, so neither is sure
+
+_CHUNK: Final = 1 << 20  # bytes compared at a time: they stay in the cache between the two passes
+_BATCH: Final = 1 << 14  # numbers converted at a time, for the same reason
+_RECENT: Final = 4  # layouts tried before a block is taken apart
+_NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where in a block what stands.
+
+    ``fields`` maps the name of a number to its offset in the block, or to TWICE.  ``literal`` is 255 for the
+    bytes that all blocks of this layout share and 0 for the others; its shape is that of the block.
+    ``last`` names the number the block ends with.  ``broken_off`` is True when the head of another run
+    follows in place of the next block.
+    """
+
+    fields: Mapping[Hashable, int]
+    literal: Bytes
+    last: Hashable
+    broken_off: bool
+
+
+@dataclass(frozen=True)
+class Grammar:
+    """What the engine has to know about a database.
+
+    ``start`` is the text a block's first line begins with, ``describe`` takes a block apart, ``whole`` tells
+    whether a block that stands alone in its file is known to be whole.  The numbers have ``width`` columns
+    and ``decimals`` places.  ``compare_all`` compares every block in full when the file is opened; otherwise
+    only its first line, and the rest when it is read.
+    """
+
+    start: bytes
+    describe: Callable[[bytes], Layout]
+    whole: Callable[[Layout], bool]
+    width: int
+    decimals: int
+    compare_all: bool
+
+
+class Run(NamedTuple):
+    """``repeats`` blocks of ``stride`` bytes from ``start`` on, laid out like the one at ``example``."""
+
+    start: int
+    stride: int
+    repeats: int
+    example: int
+
+
+class Blocks:
+    """The whole states of one file.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        The file.  Nothing of it is copied but the numbers that are asked for.
+    source : str
+        Its name, for messages.
+    begin : int
+        Address behind the head.
+    grammar : Grammar
+        What a block looks like.
+
+    Attributes
+    ----------
+    states : int
+        Number of whole states.
+    complete : bool
+        False when the file stops inside a state or a line.
+    notes : tuple of str
+        What was left out.
+    tail : int
+        Address at which the last block of the file starts, whole or not; that of its end when it has none.
+    """
+
+    def __init__(self, data: Content, source: str, begin: int, grammar: Grammar) -> None:
+        self.source = source
+        self._data = data
+        self._grammar = grammar
+        self._bytes: Bytes = np.frombuffer(data, np.uint8) if len(data) else np.empty(0, np.uint8)
+        self._end = self._end_of_last_line()
+        self._begin = begin
+        # Addresses as packed integers: a file whose blocks all differ must not fill the memory.
+        self._runs = array("q")
+        self.layout = lru_cache(maxsize=16)(self._describe)
+        self._compared = grammar.compare_all
+        self._walk()
+
+    def __iter__(self) -> Iterator[Run]:
+        return (Run(*self._runs[at : at + 4]) for at in range(0, len(self._runs), 4))
+
+    def numbers(self, names: Sequence[Hashable], anchors: Sequence[Hashable] = ()) -> Samples:
+        """Numbers of all states, shape (states, len(names)).
+
+        ``anchors`` name, for each number, the field or line from which on the text is compared before the
+        number is trusted, in files that were not compared in full when they were opened.
+
+        Raises
+        ------
+        FormatError
+            If a state lacks one of the numbers, has it twice, or has something else in its place.
+        """
+        values = np.empty((self.states, len(names)))
+        addresses = values.view(np.int64)  # each address gives way to the number found there
+        row = 0
+        for run in self:
+            layout = self.layout(run.example, run.stride)
+            offsets = self._offsets(run, layout, names)
+            if not self._compared and not self._alike(run, layout, offsets, anchors):
+                self._compare_in_full()
+                return self.numbers(names)
+            starts = run.start + run.stride * np.arange(run.repeats)
+            np.add(starts[:, None], offsets, out=addresses[row : row + run.repeats])
+            row += run.repeats
+        self._fetch(values.reshape(-1), names)
+        return values
+
+    def line(self, address: int) -> int:
+        """Find the number of the line at ``address``, from 1."""
+        return 1 + sum(self._data[at : min(at + _CHUNK, address)].count(b"\n") for at in range(0, address, _CHUNK))
+
+    def text(self, start: int, size: int) -> bytes:
+        """Copy a piece of the whole lines of the file."""
+        return self._data[start : min(start + size, self._end)]
+
+    def _fetch(self, values: Samples, names: Sequence[Hashable]) -> None:
+        """Replace the addresses in ``values`` by the numbers that stand there."""
+        grammar = self._grammar
+        addresses = values.view(np.int64)
+        if not values.size:
+            return
+        # Every address of the file seen as the start of a field: fetching is then plain indexing.
+        fields = np.ndarray((self._end - grammar.width + 1,), f"S{grammar.width}", self._data, strides=(1,))
+        for at in range(0, values.size, _BATCH):
+            where = addresses[at : at + _BATCH].copy()
+            found = decode(fields[where], grammar.decimals)
+            values[at : at + _BATCH] = found
+            if np.isnan(found).any():
+                bad = int(np.argmax(np.isnan(found)))
+                address, name = int(where[bad]), names[(at + bad) % len(names)]
+                text = self.text(address, grammar.width).decode("latin-1").strip()
+                raise FormatError(
+                    f"{self.source}:{self.line(address)}: {_spoken(name)} is {text!r}, a number in its columns "
+                    "was expected; cut the file before this state"
+                )
+
+    def _offsets(self, run: Run, layout: Layout, names: Sequence[Hashable]) -> Addresses:
+        for name in names:
+            if layout.fields.get(name, TWICE) == TWICE:
+                found = "twice" if name in layout.fields else "never"
+                raise FormatError(
+                    f"{self.source}:{self.line(run.start)}: the state that begins here has {found} a whole "
+                    f"{_spoken(name)}, each state should have one; leave it out or cut the file"
+                )
+        return np.array([layout.fields[name] for name in names], dtype=np.int64)
+
+    # How blocks are found
+
+    def _walk(self) -> None:
+        """Find all runs of blocks, leaving out blocks that are not whole."""
+        self._runs = array("q")
+        self.notes: tuple[str, ...] = ()
+        self.complete = not self._data[self._end : self._end + 4096].strip()
+        self.states, self.tail = 0, self._end
+        recent: list[tuple[int, int]] = []
+        previous: Layout | None = None
+        position = self._find(self._begin)
+        while position is not None:
+            example, stride, count = self._known(position, recent) or self._new(position, recent)
+            layout = self.layout(example, stride)
+            self.tail = position + (count - 1) * stride
+            following = position + count * stride
+            is_last = following >= self._end
+            if (layout.broken_off or is_last) and not self._is_whole(layout, previous):
+                self._leave_out(position, is_last)
+            else:
+                self._runs.extend((position, stride, count, example))
+                self.states += count
+                previous = layout
+            position = None if is_last else following
+        if not self.complete and not self.notes:
+            self.notes = ("the file stops inside a line, which was left out",)
+
+    def _is_whole(self, layout: Layout, previous: Layout | None) -> bool:
+        return self._grammar.whole(layout) if previous is None else previous.last in layout.fields
+
+    def _leave_out(self, position: int, is_last: bool) -> None:
+        self.complete &= not is_last
+        where = "the file" if is_last else "a leg of the run"
+        self.notes += (f"{where} stops inside the state of line {self.line(position)}, which was left out",)
+
+    def _known(self, position: int, recent: list[tuple[int, int]]) -> tuple[int, int, int] | None:
+        """Try the recent layouts: example, stride and count of the blocks that follow one of them."""
+        for example, stride in recent:
+            count = self._count(position, example, stride)
+            if count:
+                return example, stride, count
+        return None
+
+    def _new(self, position: int, recent: list[tuple[int, int]]) -> tuple[int, int, int]:
+        """Take the block apart: the same for a layout not met before."""
+        following = self._find(position + 1)
+        if following is None:
+            return position, self._end - position, 1
+        stride = following - position
+        if self.layout(position, stride).broken_off:
+            return position, stride, 1
+        recent.insert(0, (position, stride))
+        del recent[_RECENT:]
+        return position, stride, self._count(position, position, stride)
+
+    def _count(self, position: int, example: int, stride: int) -> int:
+        """Count the blocks from ``position`` on that look like the example and have another behind them."""
+        literal = self.layout(example, stride).literal
+        if not self._compared:
+            literal = literal[: len(self._grammar.start)]
+        run = Run(position, stride, (self._end - position) // stride, example)
+        count = self._like_example(run, 0, literal)
+        behind = position + count * stride
+        return count if self.text(behind, len(self._grammar.start)) == self._grammar.start else max(0, count - 1)
+
+    def _like_example(self, run: Run, offset: int, literal: Bytes) -> int:
+        """Count the blocks of ``run`` that have, from ``offset`` on, the literal bytes of its example."""
+        size = literal.size
+        template = self._bytes[run.example + offset : run.example + offset + size] & literal
+        done, step = 0, 1
+        while done < run.repeats:
+            step = min(step, run.repeats - done)
+            first = run.start + done * run.stride + offset
+            rows: Bytes = np.ndarray((step, size), np.uint8, self._data, first, (run.stride, 1))
+            # A column is constant where its AND and its OR agree: two passes, nothing stored.
+            for together in (np.bitwise_and, np.bitwise_or):
+                if np.any(together.reduce(rows, axis=0) & literal != template):
+                    return done + int(np.argmax(np.any(rows & literal != template, axis=1)))
+            done += step
+            step = max(1, min(2 * step, _CHUNK // size))
+        return done
+
+    def _alike(self, run: Run, layout: Layout, offsets: Addresses, anchors: Sequence[Hashable]) -> bool:
+        """Tell whether in all blocks of ``run`` the text from anchors to numbers is that of its example."""
+        if not anchors or (run.repeats == 1 and run.start == run.example):
+            return True
+        first = np.array([layout.fields[anchor] for anchor in anchors])
+        order = np.argsort(first)
+        first, last = first[order], np.maximum.accumulate(offsets[order])
+        gaps = np.flatnonzero(first[1:] - last[:-1] > _NEAR) + 1
+        for piece_first, piece_last in zip(np.split(first, gaps), np.split(last, gaps), strict=True):
+            low, high = int(piece_first[0]), int(piece_last[-1])
+            if self._like_example(run, low, layout.literal[low:high]) < run.repeats:
+                return False
+        return True
+
+    def _compare_in_full(self) -> None:
+        states = self.states
+        self._compared = True
+        self._walk()
+        if self.states != states:
+            raise FormatError(f"{self.source}: states overlap, the file is damaged")
+
+    def _describe(self, start: int, size: int) -> Layout:
+        return self._grammar.describe(self.text(start, size))
+
+    def _find(self, position: int) -> int | None:
+        """Address of the next line that begins a block."""
+        start = self._grammar.start
+        if position == 0 and self.text(0, len(start)) == start:
+            return 0
+        for at in range(max(0, position - 1), self._end, _CHUNK):
+            found = self.text(at, _CHUNK + len(start)).find(b"\n" + start)
+            if found >= 0:
+                return at + found + 1
+        return None
+
+    def _end_of_last_line(self) -> int:
+        for stop in range(len(self._data), 0, -_CHUNK):
+            first = max(0, stop - _CHUNK)
+            found = self._data[first:stop].rfind(b"\n")
+            if found >= 0:
+                return first + found + 1
+        return 0
+
+
+def _spoken(name: Hashable) -> str:
+    """Name a field in a message."""
+    return f"{name[1]} of part {name[0]}" if isinstance(name, tuple) else f"{name!r}"
+
+
+def head(data: Content) -> tuple[str, str, int]:
+    """Read the head of an LS-DYNA text database.
+
+    Returns
+    -------
+    title, version : str
+        Empty if there is no head.
+    begin : int
+        Address behind it.
+    """
+    lines = data[:4096].split(b"\n")
+    if len(lines) < 3 or b"ls-dyna" not in lines[1]:
+        return "", "", 0
+    title, version = (line.decode("latin-1") for line in lines[:2])
+    return title.strip(), " ".join(version.split()), len(title) + len(version) + 2

@@ -1,0 +1,323 @@
+"""HDF5: time and energy columns from any layout, and the binouts that lasso-python saves.
+
+A file is taken for a saved binout when it has its branches; of any other the columns are offered by their paths, the
+only ones that fit are taken, and the candidates listed where more than one does.
+"""
+
+from __future__ import annotations
+
+import io
+import mmap
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, Final
+
+import numpy as np
+
+from d2rpick.errors import FormatError
+from d2rpick.history import Part, Precision
+from d2rpick.readers.database import DIGITS, SolverFile
+from d2rpick.readers.hdf5_columns import Column, check_size, columns_of, finite
+from d2rpick.readers.names import near_miss
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    import h5py
+
+    from d2rpick.history import Samples
+    from d2rpick.readers.database import Database
+    from d2rpick.readers.selection import Selection
+    from d2rpick.readers.source import Source
+
+SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
+_ENERGY_NAMES: Final = ("internal_energy", "ie", "inten", "allie", "e_int")
+_TIME_NAMES: Final = ("time", "t")
+_MANY: Final = 12  # candidates named in a message
+_BRANCHES: Final = ("glstat", "matsum")
+
+
+def recognises(data: bytes) -> bool:
+    """Whether ``data``, the beginning of a file, is that of an HDF5 file; MATLAB puts 512 bytes before it."""
+    return SIGNATURE in (data[:8], data[512:520])
+
+
+def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]:
+    """Open each file as a leg of the run; columns that are named overrule what a saved binout would offer."""
+    return [_opened_leg(source, selection) for source in sources]
+
+
+def _opened_leg(source: Source, selection: Selection) -> Database:
+    file = Path(source.name) if isinstance(source.data, mmap.mmap) else io.BytesIO(source.data)
+    branches = {} if selection.time or selection.energy else _branches(file, source.name)
+    return SavedBinout(source.name, branches) if branches else Columns(file, source.name, selection)
+
+
+def _branches(file: Path | BinaryIO, source: str) -> dict[str, Branch]:
+    """Open the glstat and matsum branches that lasso-python saved; none in files of other layouts."""
+    with _opened(file, source) as opened:
+        return {
+            name: Branch(file, source, opened, name)
+            for name in _BRANCHES
+            if f"{name}/time" in opened
+            and f"{name}/internal_energy" in opened
+            and "pandas_type" not in opened[name].attrs
+        }
+
+
+class Columns(SolverFile):
+    """The columns of an HDF5 file of any layout, by their paths; a `Database` without parts."""
+
+    format: Final = "hdf5"
+    version = title = ""
+    complete = True
+    notes: tuple[str, ...] = ()
+    parts: tuple[Part, ...] = ()
+
+    def __init__(self, file: Path | BinaryIO, source: str, selection: Selection) -> None:
+        self._file, self.source = file, source
+        with _opened(file, source) as opened:
+            self._columns = columns_of(opened)
+        self._named_time = _named(selection.time, self._columns, source) if selection.time else None
+        self._energies = [_named(path, self._columns, source) for path in selection.energy]
+        self.channels = tuple(column.path for column in self._columns if column is not self._named_time)
+
+    @property
+    def energy_channel(self) -> str:
+        """The only column called an internal energy, or beside the time; else FormatError with the candidates."""
+        return _only_energy(self._columns, self._named_time, self.source).path
+
+    def find(self, wanted: str) -> str:
+        """Path of the column that is meant."""
+        return _named(wanted, self._columns, self.source).path
+
+    @cached_property
+    def time(self) -> Samples:
+        """Values of the time column, shape (n,)."""
+        return self._load(self._time_column)
+
+    @property
+    def part_time(self) -> Samples:
+        """Refused: columns are no parts."""
+        raise self._no_parts()
+
+    def channel(self, name: str) -> Samples:
+        """Values of one column, shape (n,); FormatError when it is not as long as the time."""
+        column = _named(name, self._columns, self.source)
+        if column.size != self._time_column.size:
+            raise FormatError(
+                f"{self.source}: {column.path} has {column.size} values, {self._time_column.path} has "
+                f"{self._time_column.size}; choose columns of one length"
+            )
+        return self._load(column)
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:  # noqa: ARG002  as a Database
+        """Refused: columns are no parts."""
+        raise self._no_parts()
+
+    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
+        """Digits that the stored types hold."""
+        energies = [_named(name, self._columns, self.source) for name in names]
+        digits = [DIGITS[4 if column.dtype.endswith("32") else 8] for column in (self._time_column, *energies)]
+        return Precision(digits[0]), Precision(min(digits[1:], default=DIGITS[8]))
+
+    @cached_property
+    def _time_column(self) -> Column:
+        if self._named_time:
+            return self._named_time
+        energy = self._energies[0] if self._energies else _only_energy(self._columns, None, self.source)
+        return _only_time(self._columns, energy, self.source)
+
+    def _load(self, column: Column) -> Samples:
+        with _opened(self._file, self.source) as opened:
+            return column.load(opened, self.source)
+
+    def _no_parts(self) -> FormatError:
+        return FormatError(f"{self.source}: its columns are no parts; choose them with --energy")
+
+
+class SavedBinout(SolverFile):
+    """A binout that lasso-python saved: channels of its glstat branch, parts of its matsum branch."""
+
+    format: Final = "hdf5"
+    complete = True
+    notes: tuple[str, ...] = ()
+    digits = DIGITS[8]
+
+    def __init__(self, source: str, branches: dict[str, Branch]) -> None:
+        self.source = source
+        self._glstat, self._matsum = (branches.get(name) for name in _BRANCHES)
+        first = self._glstat or self._matsum
+        assert first is not None  # there is a branch, or this is no saved binout
+        self.title, self.version = first.title, first.version
+        self.channels = self._glstat.channels if self._glstat else ()
+        self.parts = self._matsum.parts if self._matsum else ()
+
+    @property
+    def time(self) -> Samples:
+        """Times of the glstat branch, shape (n,)."""
+        return self._branch(self._glstat, "glstat").time
+
+    @property
+    def part_time(self) -> Samples:
+        """Times of the matsum branch, shape (m,)."""
+        return self._branch(self._matsum, "matsum").time
+
+    def channel(self, name: str) -> Samples:
+        """One column of the whole model, shape (n,)."""
+        return self._branch(self._glstat, "glstat").channel(name)
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
+        """One quantity of some parts, shape (m, len(ids))."""
+        return self._branch(self._matsum, "matsum").part_channel(quantity, ids)
+
+    def _branch(self, branch: Branch | None, name: str) -> Branch:
+        if branch is None:
+            raise FormatError(f"{self.source}: no {name} in this saved binout; name the run's own files")
+        return branch
+
+
+class Branch:
+    """The glstat or matsum branch of a file that lasso-python saved."""
+
+    def __init__(self, file: Path | BinaryIO, source: str, opened: h5py.File, name: str) -> None:
+        self._file, self._source, self.name = file, source, name
+        group = opened[name]
+        self.title = _line(group, "title")
+        self.version = " ".join(text for text in (_line(group, "version"), _line(group, "revision")) if text)
+        check_size(group["time"], source)
+        self.time: Samples = finite(group["time"][()], f"{name}/time", source).reshape(-1)
+        self.channels: tuple[str, ...] = ()
+        self.parts: tuple[Part, ...] = ()
+        if "ids" in group:
+            self.parts = _parts(group)
+        else:
+            self.channels = tuple(
+                column.path
+                for column in columns_of(group)
+                if column.size == self.time.size and column.place is None and column.path != "time"
+            )
+
+    def channel(self, name: str) -> Samples:
+        """Values of the dataset ``name``, shape (n,)."""
+        if name not in self.channels:
+            raise FormatError(f"{self._source}: {self.name} has no channel {name!r}, only {', '.join(self.channels)}")
+        with _opened(self._file, self._source) as opened:
+            return self._load(opened[self.name], name, (self.time.size,))
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
+        """Values of a quantity for the parts ``ids``, shape (n, len(ids))."""
+        known = [part.id for part in self.parts]
+        missing = [id_ for id_ in ids if known.count(id_) != 1]
+        if missing:
+            raise FormatError(
+                f"{self._source}: {self.name} has not exactly one part {', '.join(map(str, missing))}; "
+                f"choose from {', '.join(map(str, known)) or 'none'}"
+            )
+        with _opened(self._file, self._source) as opened:
+            group = opened[self.name]
+            if quantity not in group:
+                raise FormatError(f"{self._source}: {self.name} has no {quantity}")
+            values = self._load(group, quantity, (self.time.size, len(known)))
+        return values[:, [known.index(id_) for id_ in ids]]
+
+    def _load(self, group: h5py.Group, name: str, shape: tuple[int, ...]) -> Samples:
+        """Dataset ``name``, which may lack the axes of length 1 of ``shape``."""
+        dataset = group[name]
+        check_size(dataset, self._source)
+        if [size for size in dataset.shape if size != 1] != [size for size in shape if size != 1]:
+            raise FormatError(f"{self._source}: {dataset.name} has shape {dataset.shape}, {shape} was expected")
+        return finite(dataset[()], dataset.name, self._source).reshape(shape)
+
+
+def _parts(group: h5py.Group) -> tuple[Part, ...]:
+    """Parts in the order of the columns; titles by ``legend_ids``, which may be in another order."""
+    titles: dict[int, str] = {}
+    if "legend" in group and "legend_ids" in group:
+        ids = np.ravel(group["legend_ids"][()])
+        legend = b"".join(np.ravel(group["legend"][()]).tolist())
+        size, rest = divmod(len(legend), max(1, ids.size))
+        if not rest:
+            cut = [legend[size * row : size * (row + 1)] for row in range(ids.size)]
+            titles = {int(id_): text.decode("latin-1").strip() for id_, text in zip(ids, cut, strict=True)}
+    return tuple(Part(int(id_), titles.get(int(id_), "")) for id_ in np.ravel(group["ids"][()]))
+
+
+def _line(group: h5py.Group, name: str) -> str:
+    """Read a text that was saved as an array of one string."""
+    if name not in group:
+        return ""
+    values = np.ravel(group[name][()])
+    text = values[0] if values.size else b""
+    return text.decode("latin-1").strip("\0 ") if isinstance(text, bytes) else str(text).strip()
+
+
+def _named(path: str, columns: Sequence[Column], source: str) -> Column:
+    found = [column for column in columns if column.path == path.strip("/")]
+    if len(found) == 1:
+        return found[0]
+    paths = [column.path for column in columns]
+    raise FormatError(
+        f"{source}: {path!r} names {len(found)} columns{near_miss(path.strip('/'), paths)}; "
+        f"choose one of {_listed(columns)}"
+    )
+
+
+def _only_energy(columns: Sequence[Column], time: Column | None, source: str) -> Column:
+    """Find the only column called an internal energy, or the only one beside the time."""
+    fitting = [column for column in columns if column.name in _ENERGY_NAMES]
+    if not fitting:
+        times = [time] if time else [column for column in columns if column.name in _TIME_NAMES]
+        fitting = [
+            column
+            for column in columns
+            if column not in times and any((column.group, column.size) == (one.group, one.size) for one in times)
+        ]
+    return _only(fitting, columns, "internal energy", source)
+
+
+def _only_time(columns: Sequence[Column], energy: Column, source: str) -> Column:
+    """Find the time in the group of the energy, else in the nearest group around it."""
+    group = energy.group
+    while True:
+        fitting = [column for column in columns if column.name in _TIME_NAMES and column.group == group]
+        if fitting or not group:
+            return _only(fitting, columns, f"time of {energy.path}", source)
+        group = group.rpartition("/")[0]
+
+
+def _only(fitting: Sequence[Column], columns: Sequence[Column], what: str, source: str) -> Column:
+    if len(fitting) == 1:
+        return fitting[0]
+    count = "no column" if not fitting else f"{len(fitting)} columns"
+    raise FormatError(f"{source}: {count} for the {what}, one was expected; name it: {_listed(fitting or columns)}")
+
+
+def _listed(columns: Sequence[Column]) -> str:
+    shown = ", ".join(f"{column.path} ({column.size})" for column in columns[:_MANY])
+    return (shown or "there is none") + (f" and {len(columns) - _MANY} more" if len(columns) > _MANY else "")
+
+
+@contextmanager
+def _opened(file: Path | BinaryIO, source: str) -> Iterator[h5py.File]:
+    """Open the file; whatever h5py makes of a damaged one becomes a FormatError."""
+    try:
+        import h5py
+    except ImportError:
+        raise FormatError(f"{source}: HDF5 files need h5py; pip install h5py, or export the columns as CSV") from None
+    try:
+        with h5py.File(file, "r") as opened:
+            yield opened
+    except (
+        OSError,
+        RuntimeError,
+        KeyError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        OverflowError,
+        MemoryError,
+    ) as error:
+        reason = " ".join(str(error).split())
+        raise FormatError(f"{source}: HDF5 cannot be read ({reason}); the file is damaged or needs a filter") from error

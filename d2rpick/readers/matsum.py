@@ -1,0 +1,186 @@
+"""LS-DYNA matsum: one block per state, with three or four lines for each part.
+
+A part begins with its ``mat.#=`` line and reaches to the next.  Numbers have 13 columns behind their name and
+an equals sign; which names there are depends on the version.  Titles are in a legend at the top, by number.
+Parts may be in some states only: such a part is named in a note and refused when it is asked for, because
+its column would have holes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from typing import TYPE_CHECKING, Final, NoReturn
+
+import numpy as np
+
+from d2rpick.errors import FormatError
+from d2rpick.history import Part
+from d2rpick.readers.database import SolverFile
+from d2rpick.readers.fixed_text import TWICE, Blocks, Grammar, Layout, head
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable, Mapping, Sequence
+
+    from d2rpick.history import Samples
+    from d2rpick.readers.selection import Selection
+    from d2rpick.readers.source import Content, Source
+
+QUANTITIES: Final[Mapping[str, str]] = {
+    "internal_energy": "inten",
+    "kinetic_energy": "kinen",
+    "x_momentum": "x-mom",
+    "y_momentum": "y-mom",
+    "z_momentum": "z-mom",
+    "hourglass_energy": "hgeng",
+    "eroded_internal_energy": "eroded_ie",
+}
+
+_START: Final = b" time ="
+_TIME: Final = (None, "time")
+_MAT: Final = "mat.#"  # the line a part begins with
+_LUMPED: Final = 0  # "mat.#=    0" holds the kinetic energy of lumped masses
+_UNREADABLE: Final = -1  # in place of a part number that is damaged or has overflowed
+_WIDEST: Final = 99_999_999  # larger part numbers overflow their eight columns
+
+_LEGEND: Final = re.compile(rb"^\{BEGIN LEGEND\}[ \r]*\n(.*?)^\{END LEGEND\}", re.MULTILINE | re.DOTALL)
+_ENTRY: Final = re.compile(rb"^([ \d]{8}\d)(?: {5}([^\r\n]*))?\r?$", re.MULTILINE)
+_LINE: Final = re.compile(
+    rb"^(?: time =| mat\.#=([^\r\n]*)| [xyz]-(?:mom|rbv)=| +hgeng=| +\+mass=)[^\r\n]*\r?$", re.MULTILINE
+)
+_FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13})(?=[ \r\n]|\Z)")
+# A part number has 5 or, from 100000 on, 8 columns; a longer one, where it is printed, pushes the line.
+_ID: Final = re.compile(rb"(?=[ \d]{5} {13}i|[ \d]{8} {10}i|\d{9,} {10}i) *(\d+) +inten=")
+_OVERFLOW: Final = re.compile(rb"\*+ +inten=")
+
+
+def recognises(data: bytes) -> bool:
+    """Whether ``data``, the beginning of a file, looks like a matsum."""
+    return b"\n{BEGIN LEGEND}" in data or (b"\n" + _START in data and b"\n mat.#=" in data)
+
+
+def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
+    """Open each file as a leg of the run."""
+    return [Matsum(source.data, source.name) for source in sources]
+
+
+class Matsum(SolverFile):
+    """One matsum file; a ``Database`` without channels of the whole model.
+
+    FormatError if it has neither a head nor a state, or a time that is no number.
+    """
+
+    format: Final = "matsum"
+    channels: tuple[str, ...] = ()
+    digits = 5
+
+    def __init__(self, data: Content, source: str) -> None:
+        self.title, self.version, begin = head(data)
+        self.source = source
+        self._legend = _legend(data)
+        grammar = Grammar(_START, self._describe, self._is_whole, width=13, decimals=4, compare_all=False)
+        self._blocks = Blocks(data, source, begin, grammar)
+        if not self.version and not self._blocks.states:
+            raise FormatError(
+                f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is no matsum; "
+                "choose another input format"
+            )
+        self.complete = self._blocks.complete
+        self.part_time = self._blocks.numbers([_TIME])[:, 0]
+        present = self._present()
+        self.parts = tuple(Part(id_, self._legend.get(id_, "")) for id_ in present if id_ > _LUMPED)
+        self.notes = self._blocks.notes + self._remarks(present)
+
+    @property
+    def time(self) -> Samples:
+        """Refused: a matsum knows the parts only."""
+        raise self._no_channels()
+
+    def channel(self, name: str) -> NoReturn:  # noqa: ARG002  as a Database
+        """Refused: a matsum knows the parts only."""
+        raise self._no_channels()
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
+        """Values of one of ``QUANTITIES`` for the parts ``ids``, shape (n, len(ids)).
+
+        Raises
+        ------
+        FormatError
+            If the file does not have the quantity or a part, or not exactly once in every state.
+        """
+        if quantity not in QUANTITIES:
+            raise FormatError(f"{self.source}: no quantity {quantity!r} in a matsum, only {', '.join(QUANTITIES)}")
+        known = {part.id for part in self.parts}
+        missing = [id_ for id_ in ids if id_ not in known]
+        if missing:
+            raise FormatError(
+                f"{self.source}: no part {', '.join(map(str, missing))}; "
+                f"choose from {', '.join(str(part.id) for part in self.parts) or 'none'}"
+            )
+        names = [(id_, QUANTITIES[quantity]) for id_ in ids]
+        return self._blocks.numbers(names, anchors=[(id_, _MAT) for id_ in ids])
+
+    def _no_channels(self) -> FormatError:
+        return FormatError(f"{self.source}: a matsum has parts only; choose with --part or add the glstat of the run")
+
+    def _present(self) -> Counter[int]:
+        """In how many states each part is, in the order in which the parts appear."""
+        states = Counter[int]()
+        for run in self._blocks:
+            names = self._blocks.layout(run.example, run.stride).fields
+            ids = {name[0]: run.repeats for name in names if isinstance(name, tuple) and name[1] == _MAT}
+            states.update(ids)
+        return states
+
+    def _remarks(self, present: Counter[int]) -> tuple[str, ...]:
+        unseen = [id_ for id_ in self._legend if id_ not in present]
+        passing = [id_ for id_, states in present.items() if id_ > 0 and states < self._blocks.states]
+        remarks = []
+        if unseen and self._blocks.states:
+            remarks.append(f"no state has part {', '.join(map(str, unseen))} of the legend")
+        if passing:
+            remarks.append(f"only some states have part {', '.join(map(str, passing))}")
+        if _UNREADABLE in present:
+            remarks.append("parts whose number is damaged or too wide for its columns were left out")
+        return tuple(remarks)
+
+    def _is_whole(self, layout: Layout) -> bool:
+        """Judge a state that stands alone: only the legend can tell."""
+        return bool(self._legend) and all((id_, _MAT) in layout.fields for id_ in self._legend)
+
+    def _describe(self, block: bytes) -> Layout:
+        literal = np.where(np.frombuffer(block, np.uint8) == ord("\n"), np.uint8(255), np.uint8(0))
+        fields: dict[Hashable, int] = {}
+        part: int | None = None
+        name: Hashable = None
+        for line in _LINE.finditer(block):
+            first, behind = line.span()
+            literal[first:behind] = 255
+            if line[1] is not None:
+                part = self._part_number(line[1], block)
+                fields[part, _MAT] = TWICE if (part, _MAT) in fields else first
+            for field in _FIELD.finditer(block, first, behind):
+                name = (part, field[1].decode())
+                literal[field.start(2) : field.end(2)] = 0
+                fields[name] = TWICE if name in fields else field.start(2)
+        return Layout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
+
+    def _part_number(self, text: bytes, block: bytes) -> int:
+        """Find the number of the part whose line goes on with ``text``.
+
+        A single overflowed number is the single one of the legend that is too wide; of several, it could
+        not be told which is which.
+        """
+        if match := _ID.match(text):
+            return int(match[1])
+        wide = [id_ for id_ in self._legend if id_ > _WIDEST]
+        if _OVERFLOW.match(text) and len(wide) == 1 and block.count(b"\n mat.#=*") == 1:
+            return wide[0]
+        return _UNREADABLE
+
+
+def _legend(data: Content) -> dict[int, str]:
+    """Titles of the parts by number, in the order of the legend."""
+    match = _LEGEND.search(data)
+    entries = _ENTRY.findall(match[1]) if match else []
+    return {int(id_): title.decode("latin-1").strip() for id_, title in entries}

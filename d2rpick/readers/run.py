@@ -1,0 +1,174 @@
+"""Run: all files of one run, and what of them is taken for the energy to be locked in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.errors import FormatError
+from d2rpick.history import History
+from d2rpick.momentum import Momenta, Track
+from d2rpick.readers.names import listing, quantity_note
+from d2rpick.readers.selection import select_parts
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.history import Part, Samples
+    from d2rpick.readers.database import Legs
+    from d2rpick.readers.selection import Selection
+
+_AXES = ("x_momentum", "y_momentum", "z_momentum")
+_CENTRES = ("x_center", "y_center", "z_center")
+
+
+@dataclass(frozen=True)
+class Run:
+    """Databases of one run, one per format, those that say most of it first; ``sources`` name their files."""
+
+    sources: tuple[str, ...]
+    databases: tuple[Legs, ...]
+
+    @property
+    def name(self) -> str:
+        """The files, for messages."""
+        return ", ".join(self.sources)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Parts with histories of their own."""
+        holder = self._with_parts()
+        return holder.parts if holder else ()
+
+    def history(self, selection: Selection, *, with_momenta: bool = False) -> History:
+        """Take the selected energy: of parts, of named channels, or by default of the whole model.
+
+        ``with_momenta`` reads the momenta of the parts too, where there are any.  FormatError when something is not
+        there, with what there is.
+        """
+        history = self._energy(selection)
+        if not with_momenta:
+            return history
+        flying = select_parts(selection.flying, self.parts, self.name) if selection.flying else None
+        return replace(history, momenta=self.momenta(history.parts, flying))
+
+    def momenta(self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> tuple[Momenta, ...]:
+        """Give the momentum of the parts and that of the whole model, as far as they are written.
+
+        ``chosen`` are the parts to be switched (None: all), ``flying`` those known to fly together, if they are.
+        """
+        found = []
+        holder = self._with_parts()
+        if holder:
+            ids = [part.id for part in holder.parts]
+            try:
+                values = np.stack([holder.part_channel(axis, ids) for axis in _AXES], axis=2)
+            except FormatError:
+                pass  # not written, or not for all parts: it cannot say what flies together
+            else:
+                members = tuple(ids.index(part.id) for part in chosen or holder.parts)
+                known = tuple(ids.index(part.id) for part in flying) if flying else None
+                precision = holder.precisions(())[1]
+                found.append(Momenta(holder.part_time, values, holder.parts, precision, members, known))
+        whole = next((one for one in self.databases if set(_AXES) <= set(one.channels)), None)
+        if whole:
+            values = np.stack([whole.channel(axis) for axis in _AXES], axis=1)[:, np.newaxis]
+            found.append(Momenta(whole.time, values, None, whole.precisions(_AXES)[1], (0,)))
+        return tuple(found)
+
+    def momentum(self, parts: Sequence[Part] | None) -> Track | None:
+        """Give the momentum of some parts together, or of the whole model; None where it is not written."""
+        of_parts = parts is not None
+        found = next((one for one in self.momenta(parts, None) if (one.parts is not None) == of_parts), None)
+        return Track(found.time, found.of(found.chosen)) if found else None
+
+    def part_energies(self, parts: Sequence[Part]) -> Samples:
+        """Internal energies of some parts, shape (n, parts), at the times of their history [energy]."""
+        return self._of_holder("internal_energy", parts)
+
+    def centre(self, parts: Sequence[Part]) -> Track | None:
+        """Give the mean of the centres of some parts [length]; None where they are not written."""
+        try:
+            places = [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES]
+        except FormatError:
+            return None
+        holder = self._with_parts()
+        return Track(holder.part_time, np.stack(places, axis=1)) if holder else None
+
+    def _of_holder(self, quantity: str, parts: Sequence[Part]) -> Samples:
+        holder = self._with_parts()
+        if holder is None:
+            raise FormatError(f"{self.name}: no parts with histories of their own")
+        return holder.part_channel(quantity, [part.id for part in parts])
+
+    def _energy(self, selection: Selection) -> History:
+        if selection.parts:
+            return self._of_parts(select_parts(selection.parts, self.parts, self.name))
+        if selection.energy:
+            return self._of_channels(selection.energy)
+        for database in self.databases:
+            if database.energy_channel is not None:
+                return self._of_channels((database.energy_channel,))
+        return self._of_all_parts()
+
+    def _with_parts(self) -> Legs | None:
+        return next((database for database in self.databases if database.parts), None)
+
+    def _of_parts(self, chosen: tuple[Part, ...]) -> History:
+        holder = self._with_parts()
+        assert holder is not None  # or there were no parts to choose from
+        energies = self.part_energies(chosen)
+        idle = [part for part, energy in zip(chosen, energies.T, strict=True) if not energy.any()]
+        notes = tuple(
+            f"part {part.id} {part.title!r} never has internal energy: it is rigid or has no elements" for part in idle
+        )
+        channel = "internal energy of " + ", ".join(part.title or f"part {part.id}" for part in chosen)
+        return self._made(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
+
+    def _of_all_parts(self) -> History:
+        if not self.parts:
+            there = listing([name for database in self.databases for name in database.channels])
+            raise FormatError(f"{self.name}: no internal energy; choose with --energy: {there or 'there is nothing'}")
+        every = self._of_parts(self.parts)
+        note = "the energies of all parts were added, those that stay deformable among them; choose with --part"
+        return replace(every, channel="internal energy of all parts", parts=None, notes=(*every.notes, note))
+
+    def _of_channels(self, wanted: Sequence[str]) -> History:
+        database, names = self._holding(wanted)
+        columns = [database.channel(name) for name in names]
+        channel = " + ".join(names)
+        return self._made(
+            database, database.time, np.sum(columns, axis=0), channel, names, quantity_note(channel), None
+        )
+
+    def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
+        """Find the database that has all these channels, under the names it gives them."""
+        refusals = []
+        for database in self.databases:
+            if database.channels:
+                try:
+                    return database, tuple(database.find(name) for name in wanted)
+                except FormatError as error:
+                    refusals.append(error)
+        raise refusals[0] if refusals else FormatError(f"{self.name}: no channel {wanted[0]!r}; choose with --part")
+
+    def _made(
+        self, database: Legs, time: Samples, energy: Samples, channel: str, names: Sequence[str],
+        notes: tuple[str, ...], parts: tuple[Part, ...] | None,
+    ) -> History:  # fmt: skip
+        time_precision, energy_precision = database.precisions(names)
+        return History(
+            time=time,
+            energy=energy,
+            source=self.sources,
+            format=" + ".join(one.format for one in self.databases),
+            channel=channel,
+            parts=parts,
+            time_precision=time_precision,
+            energy_precision=energy_precision,
+            time_unit=database.time_unit,
+            complete=all(one.complete for one in self.databases),
+            notes=tuple(dict.fromkeys([*(note for one in self.databases for note in one.notes), *notes])),
+        )
