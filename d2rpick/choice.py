@@ -123,8 +123,8 @@ def verify(history: History, tr: float, td: float, settings: Settings) -> Verdic
     """Judge one pair; RangeError when a time lies outside the record or tr is not before td."""
     if not tr < td:
         raise RangeError(f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td")
-    history.energy_at(tr)
     situation = examine(history, td, settings)
+    history.energy_at(tr)
     candidate = _judge(situation, [(tr, "given", None)])[0]
     known = situation.flight.start is not None
     share = situation.kinetic_share

@@ -87,7 +87,7 @@ def span_of(history: History, td: float, fit: Identification, first: float) -> S
     begin = int(np.searchsorted(history.time, first))
     time, energy = history.time[begin:], history.energy[begin:]
     period = 2 * np.pi / fit.mode.omega
-    width = max(3, round(period / _MEANS_PER_PERIOD / float(np.median(np.diff(time)))))
+    width = max(3, round(period / _MEANS_PER_PERIOD / float(np.sort(np.diff(time))[(time.size - 1) // 2])))
     with np.errstate(over="ignore", invalid="ignore"):  # far off, a damped fit grows beyond all numbers
         room = np.maximum(_SHARE_OFF * fit.mode.vibration_energy(time), _ERRORS_OFF * fit.rms / np.sqrt(width))
         error = np.convolve(energy - fit.mode.energy(time), np.ones(width) / width, mode="same")

@@ -48,7 +48,7 @@ def rows_of(text: str) -> list[dict[str, Any]]:
 
 
 def _typed(key: str, cell: str) -> Any:
-    if key in ("kind", "notes"):
+    if key in ("kind", "notes", "reasons"):
         return cell
     return json.loads(cell) if cell else None
 
@@ -80,7 +80,7 @@ def test_csv_holds_the_numbers_of_json_to_the_last_digit(args: tuple[str, ...]) 
     expected = found["candidates"] if args[0] == "suggest" else [found]
     assert len(rows) == len(expected)
     for row, one in zip(rows, expected, strict=True):
-        assert row == {key: "; ".join(one[key]) if key == "notes" else one[key] for key in row}
+        assert row == {key: "; ".join(one[key]) if isinstance(one[key], list) else one[key] for key in row}
     if args[0] == "suggest":
         assert set(rows[0]) == set(expected[0])
 
@@ -310,3 +310,10 @@ def test_the_plot_comes_beside_the_result_and_shows_the_switch_times(tmp_path: P
     drawn = file.read_text()
     for label in ("tr = 0.0128853", "td = 0.064"):
         assert f"<!--  {label}  -->" in drawn
+
+
+def test_no_recommendation_leaves_no_older_one_in_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "tr.txt"
+    file.write_text("0.0128853\n")
+    result = run(*NOTHING, "-f", "value", "-o", str(file), "--overwrite")
+    assert (result.exit_code, file.read_text()) == (1, "")

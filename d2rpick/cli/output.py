@@ -62,12 +62,13 @@ class Output:
 
     def result(self, text: str) -> None:
         """Give out the result; on a terminal the line of the recommended candidate stands out."""
+        text = text and f"{text}\n"
         if self.file is not None:
-            self.write(self.file, f"{text}\n".encode())
+            self.write(self.file, text.encode())
             return
         colour = False if os.environ.get("NO_COLOR") else True if os.environ.get("FORCE_COLOR") else None
         lines = (click.style(line, bold=True) if line.startswith("*") else line for line in text.split("\n"))
-        click.echo("\n".join(lines), color=colour)
+        click.echo("\n".join(lines), nl=False, color=colour)
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
         """Say what a reader left out, and what the user should know."""
