@@ -89,7 +89,7 @@ def span_of(history: History, td: float, fit: Identification, first: float, last
     inside = slice(*np.searchsorted(history.time, [first, np.nextafter(last, np.inf)]))
     time, energy = history.time[inside], history.energy[inside]
     period = 2 * np.pi / fit.mode.omega
-    width = max(3, round(period / _MEANS_PER_PERIOD / float(np.median(np.diff(time)))))
+    width = max(3, round(period / _MEANS_PER_PERIOD / float(np.sort(np.diff(time))[(time.size - 1) // 2])))
     with np.errstate(over="ignore", invalid="ignore"):  # far off, a damped fit grows beyond all numbers
         least = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
         room = np.maximum(_SHARE_OFF * fit.mode.vibration_energy(time), least)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from d2rpick.history import Samples
     from d2rpick.mode import Mode
 
 # The growth of the lock-in error that ``timing_tolerance`` allows.
@@ -42,12 +43,12 @@ def kinetic_share(mode: Mode, td: float) -> float:
     return float(mode.kinetic_energy(td) / mode.vibration_energy(td))
 
 
-def lock_in_error(mode: Mode, tr: float, td: float) -> float:
-    """L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the deformation that is locked in.
+def lock_in_error(mode: Mode, tr: Samples | float, td: float) -> Samples:
+    """L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the deformation that is locked in, of the shape of ``tr``.
 
     The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1.
     """
-    return float(abs(mode.deformation(tr) - mode.deformation(td)) / np.sqrt(mode.vibration_energy(td)))
+    return np.asarray(np.abs(mode.deformation(tr) - mode.deformation(td)) / np.sqrt(mode.vibration_energy(td)))
 
 
 def residual(lock_in: float, kinetic: float) -> float:
@@ -61,14 +62,34 @@ def residual(lock_in: float, kinetic: float) -> float:
     return sqrt(lock_in**2 + kinetic)
 
 
-def timing_tolerance(mode: Mode, tr: float, td: float) -> float:
-    """How far tr may be off, to either side, before L grows by 0.05 [time].
+def timing_tolerance(mode: Mode, tr: Samples, td: float) -> Samples:
+    """How far each tr of shape (n,) may be off, to either side, before L grows by 0.05 [time].
 
-    Found on the closed form: the nearest time where q leaves the band about q(td) that is wider than the
-    deviation at tr by the tolerated growth.
+    That is the nearest time where q leaves the band about q(td) that is wider than the deviation at tr by the
+    tolerated growth; a period where q stays inside, since all it does it has done then.
     """
-    wanted = float(mode.deformation(td))
-    room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * float(np.sqrt(mode.vibration_energy(td)))
-    span = 2 * np.pi / mode.omega  # within a period q passes any level it reaches
-    edges = [edge for level in (wanted - room, wanted + room) for edge in mode.crossings(level, tr - span, tr + span)]
-    return min((abs(edge - tr) for edge in edges), default=span)
+    wanted, scale = mode.deformation(td), np.sqrt(mode.vibration_energy(td))
+    room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * scale
+    half = np.pi / mode.omega
+    ahead = mode.standstill_after(tr) + half * np.arange(3)[:, np.newaxis]
+    behind = mode.standstill_after(tr) - half * np.arange(1, 4)[:, np.newaxis]
+    distances = [_leaving(mode, tr, turns, wanted, room) for turns in (ahead, behind)]
+    return np.minimum(np.minimum(*distances), 2 * half)
+
+
+def _leaving(mode: Mode, tr: Samples, turns: Samples, wanted: Samples, room: Samples) -> Samples:
+    """Distance from tr to where |q - wanted| exceeds ``room``, over the standstills ``turns``; infinite if nowhere.
+
+    Between neighbouring standstills q is monotone, so the first one outside has the place just before it.
+    """
+    edges = np.vstack([tr, turns])
+    outside = np.abs(mode.deformation(edges) - wanted) > room
+    outside[0] = False  # tr itself, whatever rounding says
+    first = np.argmax(outside, axis=0)
+    column = np.arange(tr.size)
+    inner, outer = edges[np.maximum(first - 1, 0), column], edges[first, column]
+    for _ in range(50):  # halvings, to rounding
+        middle = (inner + outer) / 2
+        left = np.abs(mode.deformation(middle) - wanted) > room
+        inner, outer = np.where(left, inner, middle), np.where(left, middle, outer)
+    return np.where(first > 0, np.abs(inner - tr), np.inf)

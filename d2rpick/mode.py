@@ -94,13 +94,17 @@ class Mode:
         """Energy of the vibration about the preload, V = (q - q_0)**2 + T; dV/dt = -2 alpha T [energy]."""
         return self._swing(t, self.cosine, self.sine) ** 2 + self.kinetic_energy(t)
 
-    def extrema(self, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end), ascending, where the deformation stands still (q' = 0) [time]."""
+    def standstill_after(self, t: Samples | float) -> Samples:
+        """Find the first time at or after ``t`` where the deformation stands still; the next is half a period on."""
         cosine, sine = self._velocity_parts
         phase = np.arctan2(-cosine, sine)  # cosine cos x + sine sin x = 0 at x = phase + n pi
-        first = np.floor((self.omega * (start - self.origin) - phase) / np.pi)
-        last = np.ceil((self.omega * (end - self.origin) - phase) / np.pi)
-        times = self.origin + (phase + np.pi * np.arange(first, last + 1)) / self.omega
+        turns = np.ceil((self.omega * (np.asarray(t) - self.origin) - phase) / np.pi)
+        return np.asarray(self.origin + (phase + np.pi * turns) / self.omega)
+
+    def extrema(self, start: float, end: float) -> tuple[float, ...]:
+        """Find the times in (start, end), ascending, where the deformation stands still (q' = 0) [time]."""
+        first = float(self.standstill_after(start))
+        times = first + np.pi / self.omega * np.arange(max(0.0, np.ceil((end - first) * self.omega / np.pi)))
         return tuple(times[(times > start) & (times < end)].tolist())
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:

@@ -15,7 +15,8 @@ from d2rpick.replay import Replay, Trajectory, from_mode
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from d2rpick.choice import Candidate, Suggestion, Verdict
+    from d2rpick.candidates import Candidate
+    from d2rpick.choice import Suggestion, Verdict
     from d2rpick.situation import Situation
 
 FORMATS = ("png", "svg", "pdf")

@@ -55,9 +55,23 @@ class Replay:
 
     def residual(self) -> float:
         """Energy norm of what the switched run lacks at td, over that of the reference vibration [-]."""
-        oscillator, reference, switched = self.oscillator, self.reference(self.td), self.motion(self.td)
-        lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
-        return float(np.sqrt(oscillator.vibration_energy(lack) / oscillator.vibration_energy(reference)))
+        return float(residual(self.oscillator, self.reference(self.td), self.motion(self.td)))
+
+
+def residual(oscillator: Oscillator, reference: State, switched: State) -> Samples:
+    """Energy norm of what ``switched`` lacks, over that of the vibration of ``reference`` [-].
+
+    Both are states at td, numbers or arrays; R of a replayed motion.
+    """
+    lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
+    return np.sqrt(oscillator.vibration_energy(lack) / oscillator.vibration_energy(reference))
+
+
+def replayed_residual(mode: Mode, tr: Samples, td: float) -> Samples:
+    """Replay each tr of shape (n,) up to ``td`` and give the residual there [-]."""
+    oscillator, at_td = from_mode(mode, td)
+    at_tr = oscillator.free(at_td, tr - td)  # the closed form runs backwards as well
+    return residual(oscillator, at_td, oscillator.rigid(at_tr, td - tr))
 
 
 def from_mode(mode: Mode, time: float) -> tuple[Oscillator, State]:

@@ -114,7 +114,7 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
         _inside(history, settings.after, "--after")
     seen = next(filter(None, (flight_around(momenta, td) for momenta in history.momenta)), None)
     fit, span = _oscillator(history, td, settings, seen)
-    mode, no_mode = _reliable_mode(history, td, fit, span)
+    mode, no_mode = _reliable_mode(history, td, fit, span, given=settings.oscillator is not None)
     flight = _flight(history, td, settings.after, seen, span)
     return Situation(history, td, settings, flight, fit, mode, span, no_mode)
 
@@ -168,13 +168,14 @@ def _inside(history: History, time: float, option: str) -> None:
 
 
 def _reliable_mode(
-    history: History, td: float, fit: Identification | None, span: Span | None
+    history: History, td: float, fit: Identification | None, span: Span | None, *, given: bool
 ) -> tuple[Mode | None, str | None]:
     """Give the mode of ``fit`` if it can be relied on at td, else None and why not."""
     if fit is None:
         return None, "no oscillator was looked for (--no-verify)"
     if not fit.describes_record or fit.mode is None:
-        return None, f"no single oscillator describes the record: {fit.reason}"
+        what = "the given oscillator does not describe" if given else "no single oscillator describes"
+        return None, f"{what} the record: {fit.reason}"
     if span is None:
         return None, "the oscillator does not describe the record at td"
     period = 2 * np.pi / fit.mode.omega

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick import measures
-from d2rpick.choice import EQUALLY_GOOD, Candidate, Suggestion, rank, suggest, verify
+from d2rpick.candidates import Candidate
+from d2rpick.choice import EQUALLY_GOOD, Suggestion, rank, suggest, verify
 from d2rpick.errors import RangeError
 from d2rpick.history import History
 from d2rpick.replay import to_mode

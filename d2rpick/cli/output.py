@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,6 +12,7 @@ from d2rpick.errors import D2RPickError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from pathlib import Path
 
     from d2rpick.cautions import Caution
 
@@ -40,12 +40,14 @@ class Output:
         names = [name for name in (options["output_file"], plot) if name is not None]
         for name in names:
             output.claim(name)
-        if len({Path(name).resolve() for name in names}) < len(names):
+        if len({os.path.realpath(name) for name in names}) < len(names):
             raise D2RPickError(f"{plot}: --plot and --output-file name the same file; name two")
         return output
 
     def claim(self, name: str) -> None:
         """Raise D2RPickError when ``name`` cannot be written, is an input, or exists and was not to be replaced."""
+        from pathlib import Path  # not above: --help does without it
+
         path = Path(name)
         if path.is_dir():
             raise D2RPickError(f"{name or repr(name)}: this is a folder; name a file in it")
@@ -60,12 +62,13 @@ class Output:
 
     def result(self, text: str) -> None:
         """Give out the result; on a terminal the line of the recommended candidate stands out."""
+        text = text and f"{text}\n"
         if self.file is not None:
-            self.write(self.file, f"{text}\n".encode())
+            self.write(self.file, text.encode())
             return
         colour = False if os.environ.get("NO_COLOR") else True if os.environ.get("FORCE_COLOR") else None
         lines = (click.style(line, bold=True) if line.startswith("*") else line for line in text.split("\n"))
-        click.echo("\n".join(lines), color=colour)
+        click.echo("\n".join(lines), nl=False, color=colour)
 
     def content(self, content: bytes) -> None:
         """Give out a result that is the content of a file."""
@@ -88,6 +91,8 @@ class Output:
 
         A link stays, and the file it points to is replaced; a device or a named pipe is written to.
         """
+        from pathlib import Path
+
         path = Path(name)
         try:
             if path.exists() and not path.is_file():
@@ -104,15 +109,16 @@ def _replace(path: Path, content: bytes) -> None:
     import tempfile
 
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    scratch = path.parent / temporary
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
         mask = os.umask(0)
         os.umask(mask)
-        Path(temporary).chmod(0o666 & ~mask)  # mkstemp gives the owner alone access
-        Path(temporary).replace(path)
+        scratch.chmod(0o666 & ~mask)  # mkstemp gives the owner alone access
+        scratch.replace(path)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        scratch.unlink(missing_ok=True)
         raise
 
 

@@ -55,7 +55,5 @@ def command(ctx: click.Context, /, td: float, limit: int, output_format: str, ex
         "json": lambda: report.as_json(answer, ctx.meta["d2rpick.command"]),
         "value": lambda: report.as_value(answer),
     }
-    text = texts[output_format]()
-    if text:
-        output.result(text)
+    output.result(texts[output_format]())
     finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)

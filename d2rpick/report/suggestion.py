@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING
 
-from d2rpick.choice import Candidate
+from d2rpick.candidates import Candidate
 from d2rpick.report import tables
 from d2rpick.report.situation import frame, heading, mechanics
 

@@ -29,13 +29,16 @@ def as_table(answer: Verdict) -> str:
 
 
 def as_markdown(answer: Verdict) -> str:
-    """The measures as a Markdown table of two columns."""
-    return tables.as_markdown(("measure", "value"), list(_measures(answer).items()))
+    """The measures as a Markdown table of two columns, and the reasons below it."""
+    table = tables.as_markdown(("measure", "value"), list(_measures(answer).items()))
+    return "\n".join([table, *(f"\n* {reason}" for reason in answer.reasons)])
 
 
 def as_csv(answer: Verdict) -> str:
-    """One row, a column for each measure."""
-    measures = _measures(answer)
+    """One row, a column for each measure, and the reasons."""
+    situation = answer.situation
+    measures = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **_measures(answer)}
+    measures["reasons"] = "; ".join(answer.reasons)
     return tables.as_csv(list(measures), [list(measures.values())]).rstrip("\n")
 
 

@@ -1,0 +1,143 @@
+"""Ratios that the project promises, measured on this machine: ``python -m tests.benchmarks``.
+
+What is compared takes turns, and medians are divided; results are checked before they are timed.  Rows without
+a goal say how much a condition of the measurement matters.  Exit code 1 when a goal is missed.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from d2rpick.history import Samples
+
+ROOT = Path(__file__).resolve().parents[2]
+SUGGEST = ("suggest", "--td", "0.064", "sample_data/energy.csv")
+THREADS = "OPENBLAS_NUM_THREADS"
+# The command line sets one thread for itself; so do the measurements inside this process.
+ONE_THREAD = {THREADS: "1"}
+_PROCESSES = 25
+_POINTS = 1_000_000
+_ROUNDS = 5
+
+
+def seconds(call: Callable[[], object]) -> float:
+    """How long a call takes."""
+    start = perf_counter()
+    call()
+    return perf_counter() - start
+
+
+def ratio(one: Callable[[], object], other: Callable[[], object], rounds: int, repeats: int = 1) -> float:
+    """Time of ``one`` over that of ``other``, taking turns of so many repeats.
+
+    With more than one repeat each turn begins with an unmeasured call, so that the measured ones find their memory.
+    """
+    times: tuple[list[float], list[float]] = ([], [])
+    for _ in range(rounds):
+        for call, found in zip((one, other), times, strict=True):
+            turn = [seconds(call) for _ in range(repeats + (repeats > 1))]
+            found += turn[1:] or turn
+    return median(times[0]) / median(times[1])
+
+
+def process_ratio(libraries: str, *args: str, env: Mapping[str, str] | None = None) -> float:
+    """Whole process of a command over a process that only imports what it cannot do without."""
+    own = (THREADS, "PYTHONDONTWRITEBYTECODE")
+    clean = {name: value for name, value in os.environ.items() if name not in own and not name.startswith("D2RPICK_")}
+
+    def process(*command: str) -> Callable[[], object]:
+        return lambda: subprocess.run(
+            [sys.executable, *command], check=True, capture_output=True, cwd=ROOT, env={**clean, **(env or {})}
+        )
+
+    ours, least = process("-m", "d2rpick", *args), process("-c", f"import {libraries}")
+    with TemporaryDirectory() as compiled:
+        clean["PYTHONPYCACHEPREFIX"] = compiled  # an installed package is compiled; a working copy may not be
+        ours(), least()
+        return ratio(ours, least, _PROCESSES)
+
+
+def identification_ratio() -> float:
+    """One identification over one fit of scipy that starts at the right answer."""
+    from tests.benchmarks import identification
+
+    return identification.ratio()
+
+
+def integration_ratio(repeats: int) -> float:
+    """DOP853 at a relative tolerance of 1e-10 over the closed form: full states at a million points to 0.15 s."""
+    import numpy as np
+    from scipy.integrate import solve_ivp
+
+    from tests import paper
+
+    step = 0.15 / (_POINTS - 1)
+    times = step * np.arange(_POINTS)
+    k, m, heavy = paper.OSCILLATOR.stiffness, paper.OSCILLATOR.frame_mass, paper.OSCILLATOR.mass
+    system = np.zeros((4, 4))
+    system[:2, 2:] = np.eye(2)
+    system[2:, :2] = [[-k / m, k / m], [k / heavy, -k / heavy]]
+    system[2:, 2:] = -paper.OSCILLATOR.alpha * np.eye(2)
+
+    def slope(_: float, state: Samples) -> Samples:
+        return np.asarray(system @ state)
+
+    def closed_form() -> tuple[Samples, ...]:
+        return paper.OSCILLATOR.free_on_grid(paper.START, step, _POINTS)
+
+    def integrated() -> Samples:
+        solution = solve_ivp(
+            slope, (0.0, times[-1]), np.array(paper.START), "DOP853", t_eval=times, rtol=1e-10, atol=1e-12
+        )
+        return np.asarray(solution.y)
+
+    for ours, theirs in zip(closed_form(), integrated(), strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-9 * np.max(np.abs(theirs)))
+    return ratio(integrated, closed_form, _ROUNDS, repeats)
+
+
+class Row(NamedTuple):
+    """A ratio to measure, and the most or the least it may be."""
+
+    what: str
+    measure: Callable[[], float]
+    most: float | None = None
+    least: float | None = None
+
+
+ROWS = (
+    Row("suggest / import numpy, click: processes", lambda: process_ratio("numpy, click", *SUGGEST), most=1.5),
+    Row("  both with one thread", lambda: process_ratio("numpy, click", *SUGGEST, env=ONE_THREAD)),
+    Row("--help / import click: processes", lambda: process_ratio("click", "--help"), most=1.5),
+    Row("identification / least_squares from the right answer", identification_ratio, most=3.0),
+    Row("DOP853 / closed form, 1e6 points", lambda: integration_ratio(repeats=3), least=20.0),
+    Row("  alternating call by call, in memory just freed", lambda: integration_ratio(repeats=1)),
+)
+
+
+def main() -> int:
+    """Print all ratios beside their goals, and tell whether these are met."""
+    os.environ.setdefault(THREADS, "1")
+    print(f"{'ratio':<54}  measured  goal")
+    missed = 0
+    for row in ROWS:
+        found = row.measure()
+        goal = f"<= {row.most:g}" if row.most else f">= {row.least:g}" if row.least else ""
+        met = (row.most is None or found <= row.most) and (row.least is None or found >= row.least)
+        missed += not met
+        print(f"{row.what:<54}  {found:8.2f}  {goal}{'' if met else '  missed'}".rstrip(), flush=True)
+    return int(missed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

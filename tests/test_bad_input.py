@@ -1,0 +1,244 @@
+"""What cannot be run has one line that says where, what and what to do; what has no answer is an objection."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, codes, run
+from tests.test_output import FORMATS, check_by_schema
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+HEAD = "time,internal_energy\n"
+
+
+def table(energy: Callable[[float], float], states: int = 101) -> bytes:
+    """Give a CSV file with an energy at every hundredth of a second."""
+    return (HEAD + "".join(f"{i / 100!r},{energy(i / 100)!r}\n" for i in range(states))).encode()
+
+
+def with_line(number: int, line: str) -> bytes:
+    """Give a good CSV file but for its ``number``-th line."""
+    lines = table(lambda t: t * t).decode().split("\n")
+    lines[number - 1] = line
+    return "\n".join(lines).encode()
+
+
+def refused(*args: str) -> str:
+    """Give the message of a command that could not run; it is one line on stderr and all there is."""
+    result = run(*args)
+    assert (result.exit_code, result.stdout) == (2, ""), result.stderr
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.startswith("d2rpick: ")
+    return result.stderr.removeprefix("d2rpick: ").rstrip("\n")
+
+
+# Files that are no history: content, further arguments, and what the message has to say.
+FILES = {
+    "empty": (b"", (), ["input: the file is empty", "energy history was expected"]),
+    "binary": (bytes(range(256)) * 20, (), ["input: binary data", "csv", "glstat", "export"]),
+    "prose": (b"Dear all,\nplease find enclosed\n", (), ["input:1: 'Dear all,'", "a table of time and energy"]),
+    "header only": (HEAD.encode(), (), ["input:1: ", "no rows"]),
+    "one state": (table(lambda _: 1.0, 1), (), ["input: 1 state", "at least 3"]),
+    "two states": (table(lambda t: 1 + t, 2), (), ["input: 2 states", "at least 3"]),
+    "nan": (with_line(7, "0.05,nan"), (), ["input:7: 'internal_energy' is 'nan'", "a number was expected", "line"]),
+    "infinite": (with_line(7, "0.05,inf"), (), ["input:7: 'internal_energy' is 'inf'", "a number was expected"]),
+    "a word": (with_line(7, "0.05,stop"), (), ["input:7: 'internal_energy' is 'stop'", "a number was expected"]),
+    "an empty cell": (with_line(7, "0.05,"), (), ["input:7: 'internal_energy' is ''", "a number was expected"]),
+    "a cell too few": (with_line(7, "0.05"), (), ["input:7: 1 value", "2 were expected"]),
+    "a time that is none": (with_line(7, "later,1"), (), ["input:7: 'time' is 'later'", "a number was expected"]),
+    "damaged gzip": (gzip.compress(table(math.cos))[:-9], (), ["input: gzip", "copy the file again"]),
+    "not glstat": (table(math.cos), ("-F", "glstat"), ["input: ", "time line"]),
+    "no state of glstat": (
+        b" title\n                         ls-dyna smp.1 d\n\n\n", (), ["input: no states", "first output"]
+    ),
+    "several energies": (
+        b"time,IE_a,IE_b\n0,1,2\n1,2,3\n2,3,4\n", (), ["input: 2 columns", "--energy", "2 'IE_a', 3 'IE_b'"]
+    ),
+    "no energy": (b"time,vx,vy\n0,1,2\n1,2,3\n2,3,4\n", (), ["input: no column", "--energy", "2 'vx', 3 'vy'"]),
+    "unknown column": (table(math.cos), ("--energy", "heat"), ["input: no column 'heat'", "2 'internal_energy'"]),
+    "column misspelt": (
+        table(math.cos), ("--energy", "internal_enrg"), ["no column 'internal_enrg'", "did you mean 'internal_energy'"]
+    ),
+    "column zero": (table(math.cos), ("--energy", "0"), ["no column '0'", "1 'time'"]),
+    "energy is the time": (table(math.cos), ("--energy", "time"), ["input: ", "twice"]),
+    "td after the record": (table(math.cos), ("--td", "7"), ["input: ", "time 7 lies outside the record, 0 to 1"]),
+    "after outside": (table(math.cos), ("--after", "7"), ["input: --after 7 lies outside the record, 0 to 1"]),
+    "window outside": (table(math.cos), ("--fit-window", "0", "7"), ["--fit-window 7 lies outside the record, 0 to 1"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", FILES)
+@pytest.mark.parametrize("command", ["suggest", "verify"])
+def test_a_file_that_cannot_be_used_is_named_with_what_is_wrong(
+    command: str, case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    content, args, parts = FILES[case]
+    Path("input").write_bytes(content)
+    first = ("suggest",) if command == "suggest" else ("verify", "--tr", "0")
+    message = refused(*first, "--td", "0.5", *args, "input")
+    assert message.startswith("input:")
+    for part in parts:
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    ("args", "parts"),
+    [
+        (("absent.csv",), ["absent.csv: no such file", "check the name"]),
+        ((str(Path(ENERGY).parent),), [f"{Path(ENERGY).parent}: this is a folder", "a file in it"]),
+        ((GLSTAT, "-F", "csv"), [f"{GLSTAT}:1: ", "a table of time and energy"]),
+        ((GLSTAT, "--energy", "internal enrgy"), ["did you mean 'internal energy'", "kinetic energy"]),
+        ((GLSTAT, "--time", "cycle"), ["no time 'cycle'", "leave --time out"]),
+        ((ROLLOVER,), [f"{ROLLOVER}: 3 columns", "--energy", "'boxIE_J'"]),
+    ],
+)
+def test_an_input_that_is_not_there_or_not_so_is_named(args: tuple[str, ...], parts: list[str]) -> None:
+    message = refused("suggest", "--td", "0.064", *args)
+    for part in parts:
+        assert part in message
+
+
+GIVEN = shlex.join(OSCILLATOR)
+ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
+
+
+@pytest.mark.parametrize(
+    ("line", "parts"),
+    [
+        ("sugest --td 1 x", ["No such command 'sugest'", "Did you mean 'suggest'?", "d2rpick --help"]),
+        ("dance", ["No such command 'dance'", "suggest, verify, replay"]),
+        ("suggest --tdd 1 x", ["--tdd", "Did you mean", "--td", "d2rpick suggest --help"]),
+        ("verify --tolerence 1 x", ["--tolerence", "Did you mean", "--tolerance"]),
+        ("suggest x", ["--td"]),
+        ("verify --td 1 x", ["--tr"]),
+        ("suggest --td 1", ["HISTORY"]),
+        ("suggest --td 1 x y", ["y"]),
+        ("suggest --td 64ms x", ["--td", "'64ms' is not a number"]),
+        ("suggest --td 0,064 x", ["--td", "'0,064' is not a number"]),
+        ("suggest --td nan x", ["--td", "finite"]),
+        ("suggest --td inf x", ["--td", "finite"]),
+        ("suggest --td 1 -f jsno x", ["'jsno'", "'json'"]),
+        ("verify --tr 1 --td 2 -f value x", ["'value'", "'markdown'"]),
+        ("suggest --td 1 -F hdf5 x", ["'hdf5'", "'glstat'"]),
+        ("suggest --td 1 --limit 0 x", ["--limit", "1"]),
+        ("suggest --td 1 --margin -1 x", ["--margin", "-1 was found", "at least 0 was expected"]),
+        ("suggest --td 1 --tolerance -1 x", ["--tolerance", "at least 0 was expected"]),
+        ("suggest --td 1 --stiffness 0 x", ["--stiffness", "above 0 was expected"]),
+        # contradictions
+        (f"verify --tr 0.07 --td 0.064 {ENERGY}", ["tr 0.07 is not before td 0.064"]),
+        (f"verify --tr 0.064 --td 0.064 {ENERGY}", ["tr 0.064 is not before td 0.064"]),
+        (f"suggest --td -1 {ENERGY}", [ENERGY, "time -1 lies outside the record, 0 to 0.15"]),
+        (f"verify --tr -1 --td 0.064 {ENERGY}", [ENERGY, "time -1 lies outside the record, 0 to 0.15"]),
+        (f"suggest --td 0.064 {GIVEN} --no-verify {ENERGY}", ["an oscillator", "--no-verify", "exclude"]),
+        (f"suggest --td 0.064 {GIVEN} --fit-window 0 0.1 {ENERGY}", ["an oscillator", "--fit-window", "exclude"]),
+        (f"suggest --td 0.064 --no-verify --fit-window 0 0.1 {ENERGY}", ["--no-verify", "--fit-window", "exclude"]),
+        (f"suggest --td 0.064 --fit-window 0.1 0.05 {ENERGY}", ["--fit-window 0.1 0.05 is empty"]),
+        (f"suggest --td 0.064 --mass 31.4 {ENERGY}", ["--mass needs --stiffness"]),
+        (f"suggest --td 0.064 {GIVEN} --frame-mass 2 {ENERGY}", ["either --frame-mass or --beta"]),
+        (f"suggest --td 0.064 {GIVEN} --alpha 5000 {ENERGY}", ["alpha 5000", "less than 502.2"]),
+        # replay
+        ("replay", ["--stiffness"]),
+        ("replay --stiffness 1 --mass 1 --v0 1 --t-end 1 --dt 1", ["either --frame-mass or --beta"]),
+        (f"{ONE_COMMAND} --dt 0", ["--dt", "above 0 was expected"]),
+        (f"{ONE_COMMAND} --dt 1e-12", ["--dt 1e-12", "100000000"]),
+        (f"{ONE_COMMAND} --tr 0.006", ["--tr and --td go together"]),
+        (f"{ONE_COMMAND} --td 0.006", ["--tr and --td go together"]),
+        (f"{ONE_COMMAND} --tr 0.006 --td 0.005", ["--tr 0.006 is not before --td 0.005"]),
+        (f"{ONE_COMMAND} -o motion.txt", ["motion.txt", "--write-as csv or glstat"]),
+        # files to be written; all of them are known to be wrong before anything is computed
+        (f"suggest --td 0.064 -o absent/result.txt {ENERGY}", ["absent/result.txt: there is no folder 'absent'"]),
+        (f"suggest --td 0.064 -o . {ENERGY}", [".: this is a folder"]),
+        (f"suggest --td 0.064 -o '' {ENERGY}", ["this is a folder"]),
+        (f"suggest --td 0.064 --plot absent/plot.png {ENERGY}", ["absent/plot.png: there is no folder 'absent'"]),
+        (f"suggest --td 0.064 --plot plot.gif {ENERGY}", ["plot.gif", "png, svg, pdf"]),
+        (f"suggest --td 0.064 --plot plot {ENERGY}", ["plot: ", "png, svg, pdf"]),
+        (f"suggest --td 0.064 -o x.svg --plot ./x.svg {ENERGY}", ["--plot and --output-file name the same file"]),
+        (f"{ONE_COMMAND} --plot plot.gif", ["plot.gif", "png, svg, pdf"]),
+    ],
+)  # fmt: skip
+def test_a_usage_that_makes_no_sense_is_explained_in_one_line(
+    line: str, parts: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    message = refused(*shlex.split(line))
+    for part in parts:
+        assert part in message
+    assert not list(tmp_path.iterdir())
+
+
+# Records that can be read but hold no answer: content, arguments, and the warning that says why.
+OBJECTIONS = {
+    "constant": (table(lambda _: 5.0), (), "no-candidate"),
+    "zero": (table(lambda _: 0.0), (), "no-energy"),
+    "zero at td": (table(lambda t: max(0.0, math.cos(4 * t))), ("--td", "0.6"), "no-energy"),
+    "negative at td": (table(lambda t: math.cos(6 * t) - 0.5), (), "no-energy"),
+    "only rising": (table(lambda t: t), (), "no-candidate"),
+    "td at the start": (table(lambda t: 1 + math.cos(9 * t)), ("--td", "0"), "no-candidate"),
+    "td in the load": (table(lambda t: 1 + math.cos(9 * t)), ("--after", "0.7"), "td-in-load"),
+    "end of the load unknown": (table(lambda t: 1 + t + math.cos(30 * t)), ("--no-verify",), "no-flight"),
+}
+
+
+@pytest.mark.parametrize("case", OBJECTIONS)
+def test_a_record_without_an_answer_is_an_objection_and_says_why(
+    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    content, args, code = OBJECTIONS[case]
+    Path("input").write_bytes(content)
+    found = answer("suggest", "--td", "0.5", *args, "input")
+    check_by_schema(found)
+    assert found["recommended"] is None
+    assert not any(candidate["acceptable"] for candidate in found["candidates"])
+    assert {code, "no-candidate"} <= codes(found)
+    for form in FORMATS["suggest"]:
+        result = run("suggest", "--td", "0.5", *args, "-f", form, "input")
+        assert result.exit_code == 1
+        assert [line.split(": ")[:2] for line in result.stderr.splitlines() if line.startswith("warning")] == [
+            ["warning", warning["code"]] for warning in found["warnings"]
+        ]
+
+
+def test_a_pair_in_the_load_is_an_objection_with_its_reason() -> None:
+    found = answer("verify", "--tr", "0.0128853", "--td", "0.064", "--after", "0.1", ENERGY)
+    assert (found["verified"], found["tr_ok"]) == (False, False)
+    assert any("before the end of the load at 0.1" in reason for reason in found["reasons"])
+
+
+def test_a_td_behind_the_next_contact_is_an_objection(tmp_path: Path) -> None:
+    lines = Path(ENERGY).read_text().splitlines()
+    rows = [line.split(",") for line in lines[1:]]
+    hit = [f"{t},{float(e) + max(0.0, float(t) - 0.1) * 1e4!r}" for t, *_, e, _ in rows]
+    file = tmp_path / "hit.csv"
+    file.write_text("\n".join([HEAD.strip(), *hit, ""]))
+    found = answer("suggest", "--td", "0.09", "--margin", "0.02", str(file))
+    assert found["flight"]["end"] == pytest.approx(0.1, abs=1e-3)
+    assert found["recommended"] is None
+    assert "td-after-contact" in codes(found)
+    assert answer("verify", "--tr", "0.0135867", "--td", "0.09", "--margin", "0.02", str(file))["td_ok"] is False
+    assert answer("suggest", "--td", "0.0687534", "--margin", "0.005", str(file))["recommended"] is not None
+
+
+@pytest.mark.parametrize("source", [ENERGY, GLSTAT])
+def test_a_history_cut_anywhere_is_refused_or_answered_from_what_is_left(source: str, tmp_path: Path) -> None:
+    data, file = Path(source).read_bytes(), tmp_path / "cut"
+    for size in [0, 1, 50, 200, 700, 5_000, len(data) // 2, len(data) - 1]:
+        file.write_bytes(data[:size])
+        result = run("suggest", "--td", "0.064", "-f", "json", str(file))
+        assert result.exit_code in (0, 1, 2)
+        assert "Traceback" not in result.stderr
+        assert (result.exit_code == 2) == (result.stdout == "")
+        if result.stdout:
+            found = json.loads(result.stdout)
+            assert found["history"]["time_end"] <= 0.15
+            assert found["recommended"]["tr"] == pytest.approx(0.0128852793630525, rel=1e-5)

@@ -1,0 +1,285 @@
+"""What the commands and their options do, seen from outside."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from d2rpick import __version__
+from d2rpick.cli import COMMANDS
+from d2rpick.readers import Selection, read_history
+from tests import paper
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, codes, run
+
+if TYPE_CHECKING:
+    from subprocess import CompletedProcess
+
+SUGGEST = ("suggest", "--td", "0.064")
+ROLLING = ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
+
+
+def program(*args: str, **options: Any) -> CompletedProcess[str]:
+    """Run ``python -m d2rpick`` as a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "d2rpick", *args], capture_output=True, text=True, check=False, cwd=ROOT, **options
+    )
+
+
+# What the tool is for.
+
+
+@pytest.mark.parametrize(("source", "digits"), [(ENERGY, 1e-10), (GLSTAT, 1e-5)])
+def test_the_published_record_gets_the_published_answer(source: str, digits: float) -> None:
+    found = answer(*SUGGEST, source)
+    assert found["basis"] == "oscillator"
+    assert found["recommended"] == {"tr": pytest.approx(paper.CROSSINGS[2][0] / 1e3, rel=digits), "td": 0.064}
+    assert found["kinetic_share"] == pytest.approx(paper.KINETIC_SHARE, rel=digits)
+    assert found["better_td"]["td"] == pytest.approx(paper.BETTER_TD, rel=digits)
+    assert found["better_td"]["tr"] == pytest.approx(paper.BETTER_TR, rel=digits)
+    assert found["better_td"]["residual"] == pytest.approx(0, abs=10 * digits)
+    assert [(w["code"], "92%" in w["message"]) for w in found["warnings"]] == [("poor-td", True)]
+
+
+def test_a_rollover_without_an_oscillator_is_judged_by_energy_after_the_trip() -> None:
+    found = answer(*ROLLING)
+    assert found["basis"] == "energy"
+    assert 0.088 <= found["recommended"]["tr"] <= 0.110
+    assert {"energy-only", "flight-from-energy"} <= codes(found)
+    for candidate in found["candidates"]:
+        assert {candidate[key] for key in ("sign_match", "lock_in_error", "residual", "timing_tolerance")} == {None}
+
+
+def test_the_better_pair_verifies_and_the_crossing_before_it_of_opposite_sign_does_not() -> None:
+    good = run("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY)
+    assert good.exit_code == 0
+    assert "verdict  verified" in good.stdout
+    bad = answer("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY)
+    assert (bad["verified"], bad["tr_ok"], bad["sign_match"]) == (False, False, False)
+    assert any("opposite sign" in reason for reason in bad["reasons"])
+
+
+# Options of suggest and verify.
+
+
+def test_an_oscillator_can_be_given_instead_of_identified() -> None:
+    given, identified = answer(*SUGGEST, *OSCILLATOR, ENERGY), answer(*SUGGEST, ENERGY)
+    assert (given["oscillator"]["source"], identified["oscillator"]["source"]) == ("given", "identified")
+    assert given["oscillator"]["omega"] == pytest.approx(paper.OMEGA_2, rel=1e-13)
+    assert given["kinetic_share"] == pytest.approx(identified["kinetic_share"], rel=1e-9)
+    times = [[c["tr"] for c in found["candidates"]] for found in (given, identified)]
+    np.testing.assert_allclose(times[0], times[1], rtol=1e-9)
+    assert [c["acceptable"] for c in given["candidates"]] == [c["acceptable"] for c in identified["candidates"]]
+
+
+def test_beta_is_the_ratio_of_the_masses() -> None:
+    by_mass = shlex.split("--stiffness 660e3 --mass 31.4 --frame-mass 15.7 --alpha 50 --v0 6")
+    assert answer(*SUGGEST, *by_mass, ENERGY)["candidates"] == answer(*SUGGEST, *OSCILLATOR, ENERGY)["candidates"]
+
+
+def test_an_oscillator_that_is_not_that_of_the_record_is_not_relied_on() -> None:
+    found = answer(*SUGGEST, *OSCILLATOR[:-1], "7", ENERGY)
+    assert (found["basis"], found["oscillator"]["describes_record"]) == ("energy", False)
+    assert "energy-only" in codes(found)
+
+
+def test_a_fit_window_gives_the_same_oscillator_from_a_part_of_the_record() -> None:
+    found = answer(*SUGGEST, "--fit-window", "0.02", "0.1", ENERGY)
+    assert found["oscillator"]["omega"] == pytest.approx(paper.OMEGA_2, rel=1e-9)
+    assert found["recommended"]["tr"] == pytest.approx(paper.CROSSINGS[2][0] / 1e3, rel=1e-9)
+
+
+def test_without_verification_only_the_energy_level_counts() -> None:
+    found = answer(*SUGGEST, "--no-verify", ENERGY)
+    assert (found["basis"], found["oscillator"], found["kinetic_share"]) == ("energy", None, None)
+    assert {c["sign_match"] for c in found["candidates"]} == {None}
+
+
+@pytest.mark.parametrize("options", [("--after", "0.02"), ("--margin", "0.02")])
+def test_nothing_before_the_end_of_the_load_and_the_margin_is_acceptable(options: tuple[str, str]) -> None:
+    found = answer(*SUGGEST, *options, ENERGY)
+    assert found["recommended"]["tr"] == pytest.approx(paper.CROSSINGS[3][0] / 1e3, rel=1e-9)
+    assert min(c["tr"] for c in found["candidates"] if c["acceptable"]) > 0.02
+    assert answer("verify", "--tr", "0.0128853", "--td", "0.064", *options, ENERGY)["tr_ok"] is False
+
+
+def test_after_moves_the_start_of_the_flight_and_says_so() -> None:
+    flight = answer(*SUGGEST, "--after", "0.02", ENERGY)["flight"]
+    assert (flight["start"], flight["source"]) == (0.02, "given")
+
+
+@pytest.mark.parametrize("tolerance", [0.001, 0.05, 0.2])
+def test_the_tolerance_bounds_what_is_acceptable(tolerance: float) -> None:
+    candidates = answer(*ROLLING, "--tolerance", str(tolerance))["candidates"]
+    assert max(c["level_error"] for c in candidates if c["acceptable"]) <= tolerance
+    assert all(c["level_error"] <= tolerance for c in candidates if c["kind"] == "extremum")
+
+
+@pytest.mark.parametrize(
+    ("limit", "measure"), [(("--max-kinetic-share", "0.5"), "kinetic share"), (("--max-residual", "0.9"), "residual")]
+)
+def test_a_limit_turns_a_poor_pair_into_an_objection(limit: tuple[str, str], measure: str) -> None:
+    found = answer(*SUGGEST, *limit, ENERGY)
+    assert found["recommended"] is None
+    assert found["better_td"] is not None
+    assert any(measure in w["message"] and w["code"] == "no-candidate" for w in found["warnings"])
+    judged = answer("verify", "--tr", "0.0128853", "--td", "0.064", *limit, ENERGY)
+    assert (judged["verified"], judged["tr_ok"]) == (False, True)
+    assert any(measure in reason for reason in judged["reasons"])
+    assert answer(*SUGGEST, limit[0], "0.99", ENERGY)["recommended"] is not None
+
+
+def test_limit_shortens_the_table_but_not_json_and_csv() -> None:
+    lines = run(*SUGGEST, "--limit", "3", ENERGY).stdout.splitlines()
+    ranks = [line.lstrip("* ").split()[0] for line in lines if line.startswith(("*", "      "))]
+    assert ranks == ["1", "2", "3"]
+    assert "... and 7 more (--limit)" in lines
+    assert len(answer(*SUGGEST, "--limit", "3", ENERGY)["candidates"]) == 10
+    assert len(run(*SUGGEST, "--limit", "3", "-f", "csv", ENERGY).stdout.splitlines()) == 11
+
+
+def test_columns_are_chosen_by_name_or_number_and_energies_added() -> None:
+    by_name = answer(*SUGGEST, "--time", "time", "--energy", "internal_energy", ENERGY)
+    by_number = answer(*SUGGEST, "--time", "1", "--energy", "6", ENERGY)
+    assert by_name["candidates"] == by_number["candidates"]
+    assert by_name["history"]["channel"] == "internal_energy"
+    total = answer(*SUGGEST, "--energy", "6", "--energy", "7", ENERGY)
+    both = read_history(ENERGY, Selection(energy=("6", "7")))
+    assert total["history"]["channel"] == "internal_energy + kinetic_energy"
+    assert total["energy_td"] == pytest.approx(both.energy_at(0.064), rel=1e-6)
+
+
+# replay.
+
+
+@pytest.mark.parametrize("suffix", ["csv", "glstat"])
+def test_a_replayed_history_read_back_has_the_same_answer(suffix: str, tmp_path: Path) -> None:
+    name = str(tmp_path / f"again.{suffix}")
+    written = run("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "-o", name)
+    assert (written.exit_code, written.stdout, written.stderr) == (0, "", "")
+    again, sample = answer(*SUGGEST, name), answer(*SUGGEST, GLSTAT if suffix == "glstat" else ENERGY)
+    assert again["history"]["format"] == suffix
+    assert again["recommended"]["tr"] == pytest.approx(sample["recommended"]["tr"], rel=1e-10)
+
+
+def test_replay_writes_the_motion_through_both_switches() -> None:
+    result = run("replay", *OSCILLATOR, *shlex.split("--tr 0.006 --td 0.08 --t-end 0.15 --dt 1e-3"))
+    head, *rows = result.stdout.splitlines()
+    assert head == "time,z,y,vz,vy,internal_energy,kinetic_energy"
+    table = {float(row.split(",")[0]): [float(cell) for cell in row.split(",")] for row in rows}
+    assert len(table) == 151
+    for expected in paper.SWITCHED_6_80:
+        np.testing.assert_allclose(table[expected[0]][:6], expected, rtol=1e-11)
+
+
+def test_what_stdout_is_given_and_what_a_file_is_given_is_the_same(tmp_path: Path) -> None:
+    args = ("replay", *OSCILLATOR, "--t-end", "0.01", "--dt", "1e-3", "--write-as", "glstat")
+    run(*args, "-o", str(tmp_path / "motion.csv"))
+    assert (tmp_path / "motion.csv").read_text() == run(*args).stdout
+
+
+@pytest.mark.parametrize("line", [line for line in (ROOT / "sample_data/README.md").read_text().split("`")
+                                  if line.startswith("d2rpick replay")])  # fmt: skip
+@pytest.mark.parametrize("name", ["energy.csv", "energy.glstat"])
+def test_the_sample_data_is_what_the_command_beside_it_writes(
+    line: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sample_data").mkdir()
+    args = shlex.split(line.replace("energy.csv", name))
+    assert run(*args[1:]).exit_code == 0
+    fresh, kept = read_history(f"sample_data/{name}"), read_history(str(ROOT / "sample_data" / name))
+    np.testing.assert_allclose(fresh.time, kept.time, rtol=1e-14)
+    np.testing.assert_allclose(fresh.energy, kept.energy, rtol=1e-5 if "glstat" in name else 1e-11, atol=1e-13)
+
+
+# The program.
+
+
+def test_the_module_runs_as_a_program() -> None:
+    result = program("--version")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout.split()[-1] == __version__
+
+
+def test_a_reader_that_has_seen_enough_ends_the_program_silently() -> None:
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    args = [sys.executable, "-m", "d2rpick", *SUGGEST, "-q", ENERGY]
+    result = subprocess.run(args, stdout=write_end, stderr=subprocess.PIPE, check=False, cwd=ROOT)
+    os.close(write_end)
+    assert (result.returncode, result.stderr) == (141, b"")
+
+
+def test_debug_shows_the_traceback_and_the_message() -> None:
+    result = run(*SUGGEST, "--debug", "absent.csv")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("Traceback")
+    assert result.stderr.splitlines()[-1].startswith("d2rpick: absent.csv: ")
+
+
+def test_options_come_from_the_environment_too() -> None:
+    result = run("suggest", ENERGY, env={"D2RPICK_SUGGEST_TD": "0.064", "D2RPICK_SUGGEST_OUTPUT_FORMAT": "value"})
+    assert float(result.stdout) == pytest.approx(paper.CROSSINGS[2][0] / 1e3, rel=1e-10)
+    assert run("suggest", ENERGY, env={"D2RPICK_SUGGEST_TD": "soon"}).exit_code == 2
+
+
+@pytest.mark.parametrize("source", [ENERGY, GLSTAT])
+def test_a_history_comes_through_standard_input(source: str) -> None:
+    data = Path(source).read_bytes()
+    piped = run(*SUGGEST, "-f", "csv", "-", stdin=data)
+    assert piped.stdout == run(*SUGGEST, "-f", "csv", source).stdout
+
+
+def test_without_a_command_the_help_is_an_error_message() -> None:
+    result = run()
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr == run("--help").stdout
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_shell_completes_the_names_of_commands(command: str) -> None:
+    env = {"_D2RPICK_COMPLETE": "bash_complete", "COMP_WORDS": f"d2rpick {command[:3]}", "COMP_CWORD": "1"}
+    assert run(env=env).stdout.strip() == f"plain,{command}"
+
+
+# Help.
+
+
+def examples(command: str) -> list[list[str]]:
+    """Arguments of the examples at the end of a command's help."""
+    text = run(*filter(None, [command]), "--help").stdout
+    _, end = text.split("\n  Examples:\n")
+    lines = end.replace("\\\n", " ").strip("\n").split("\n")
+    calls = [shlex.split(line) for line in lines]
+    assert all(call[0] == "d2rpick" for call in calls), end
+    return [call[1:] for call in calls]
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_every_help_ends_with_examples_that_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / "sample_data", "sample_data")
+    calls = examples(command)
+    assert calls
+    for call in calls:
+        assert call[0] == command or not command
+        result = run(*call)
+        assert (call, result.exit_code) in [(call, 0), (call, 1)], result.stderr
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_is_the_same_by_its_short_name_and_explains_every_option(command: str) -> None:
+    text = run(command, "--help").stdout
+    assert run(command, "-h").stdout == text
+    options, _ = text.split("Options:\n")[1].split("\n\n")
+    for entry in options.replace("\n      ", " ").split("\n"):
+        name, *meaning = entry.split("  ", 3)[1:]
+        assert any(part.strip() for part in meaning), f"{name} is not explained"

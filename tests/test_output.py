@@ -1,0 +1,319 @@
+"""Where results go and in which form: formats, files, figures, colours, exit codes."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import threading
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from d2rpick import __version__
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+
+SUGGEST = ("suggest", "--td", "0.064")
+VERIFY = ("verify", "--tr", "0.0135867", "--td", "0.0687534")
+NOTHING = (*SUGGEST, "--max-residual", "0.5", ENERGY)  # an objection
+ANSWERS = [
+    (*SUGGEST, ENERGY),
+    (*SUGGEST, GLSTAT),
+    NOTHING,
+    ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER),
+    (*VERIFY, ENERGY),
+    ("verify", "--tr", "0.1", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER),
+]
+FORMATS = {"suggest": ("table", "json", "csv", "markdown", "value"), "verify": ("table", "json", "csv", "markdown")}
+
+
+def check_by_schema(found: dict[str, Any]) -> None:
+    """Hold an answer against the schema that ships with the package under its name."""
+    _, command, version = found["schema"].split("/")
+    schema = json.loads((files("d2rpick") / "schemas" / f"{command}-{version}.json").read_text("utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(found, schema, jsonschema.Draft202012Validator)
+
+
+def rows_of(text: str) -> list[dict[str, Any]]:
+    """Rows of a CSV result with the types that JSON has."""
+    return [{key: _typed(key, cell) for key, cell in row.items()} for row in csv.DictReader(io.StringIO(text))]
+
+
+def _typed(key: str, cell: str) -> Any:
+    if key in ("kind", "notes", "reasons"):
+        return cell
+    return json.loads(cell) if cell else None
+
+
+# Formats.
+
+
+@pytest.mark.parametrize("args", ANSWERS)
+def test_json_follows_the_schema_and_says_where_it_comes_from(args: tuple[str, ...]) -> None:
+    found = answer(*args)
+    check_by_schema(found)
+    assert found["tool_version"] == __version__
+    assert found["command"] == [*args, "-f", "json"]
+    assert found["history"]["source"] == [args[-1]]
+    assert found["history"]["sha256"] == [hashlib.sha256(Path(args[-1]).read_bytes()).hexdigest()]
+
+
+@pytest.mark.parametrize("key", ["td", "candidates", "history", "warnings"])
+def test_the_schema_asks_for_what_scripts_rely_on(key: str) -> None:
+    found = answer(*SUGGEST, ENERGY)
+    del found[key]
+    with pytest.raises(jsonschema.ValidationError, match=key):
+        check_by_schema(found)
+
+
+@pytest.mark.parametrize("args", ANSWERS)
+def test_csv_holds_the_numbers_of_json_to_the_last_digit(args: tuple[str, ...]) -> None:
+    found, rows = answer(*args), rows_of(run(*args, "-f", "csv").stdout)
+    expected = found["candidates"] if args[0] == "suggest" else [found]
+    assert len(rows) == len(expected)
+    for row, one in zip(rows, expected, strict=True):
+        assert row == {key: "; ".join(one[key]) if isinstance(one[key], list) else one[key] for key in row}
+    if args[0] == "suggest":
+        assert set(rows[0]) == set(expected[0])
+
+
+@pytest.mark.parametrize("source", [ENERGY, GLSTAT])
+def test_value_is_the_recommended_tr_in_the_shortest_digits_that_read_back(source: str) -> None:
+    text = run(*SUGGEST, "-f", "value", source).stdout
+    assert text.endswith("\n")
+    assert float(text) == answer(*SUGGEST, source)["recommended"]["tr"]
+    assert text.strip() == repr(float(text))
+
+
+def test_value_is_nothing_when_nothing_is_recommended() -> None:
+    result = run(*NOTHING, "-f", "value")
+    assert (result.exit_code, result.stdout) == (1, "")
+
+
+@pytest.mark.parametrize("args", ANSWERS)
+def test_markdown_begins_with_a_table(args: tuple[str, ...]) -> None:
+    table, *_ = run(*args, "-f", "markdown").stdout.split("\n\n")
+    head, rule, *rows = [line.strip("|\n").split("|") for line in table.rstrip("\n").split("\n")]
+    assert {cell.strip() for cell in rule} == {"---"}
+    assert rows
+    assert {len(row) for row in (rule, *rows)} == {len(head)}
+
+
+def test_the_table_names_what_it_rests_on_and_marks_the_recommended_row() -> None:
+    lines = run(*SUGGEST, ENERGY).stdout.splitlines()
+    assert lines[0].startswith(f"history  {ENERGY}: csv, internal_energy, 1501 states")
+    assert [line.split()[2] for line in lines if line.startswith("*")] == ["0.0128853"]
+    assert lines[-2:] == [
+        "recommended  tr = 0.0128853, td = 0.064, residual 0.957",
+        "better pair  tr = 0.0135867, td = 0.0687534, residual 0.000",
+    ]
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    energy=st.lists(st.floats(-1e3, 1e6, allow_subnormal=False), min_size=3, max_size=40),
+    step=st.floats(1e-6, 1e3),
+    share=st.floats(0.0, 1.0),
+)
+def test_whatever_the_energies_every_format_gives_one_answer(
+    tmp_path_factory: pytest.TempPathFactory, energy: list[float], step: float, share: float
+) -> None:
+    file = tmp_path_factory.mktemp("history") / "random.csv"
+    time = step * np.arange(len(energy))
+    file.write_text("time,energy\n" + "".join(f"{t!r},{e!r}\n" for t, e in zip(time.tolist(), energy, strict=True)))
+    args = ("suggest", "--td", repr(float(share * time[-1])), "-q", str(file))
+    found = answer(*args)
+    check_by_schema(found)
+    results = {name: run(*args, "-f", name) for name in FORMATS["suggest"]}
+    assert {result.exit_code for result in results.values()} == {0 if found["recommended"] else 1}
+    assert [row["tr"] for row in rows_of(results["csv"].stdout)] == [c["tr"] for c in found["candidates"]]
+    assert results["value"].stdout == (f"{found['recommended']['tr']!r}\n" if found["recommended"] else "")
+
+
+# Exit codes and streams.
+
+
+@pytest.mark.parametrize(
+    ("args", "code"),
+    [
+        ((*SUGGEST, ENERGY), 0),
+        (NOTHING, 1),
+        ((*SUGGEST, "absent.csv"), 2),
+        ((*VERIFY, ENERGY), 0),
+        (("verify", "--tr", "0.02", "--td", "0.064", ENERGY), 1),
+        (("verify", "--tr", "0.07", "--td", "0.064", ENERGY), 2),
+    ],
+)
+def test_the_exit_code_does_not_depend_on_the_format_and_objections_can_be_let_pass(
+    args: tuple[str, ...], code: int
+) -> None:
+    formats = FORMATS[args[0]]
+    assert [run(*args, "-f", name).exit_code for name in formats] == [code] * len(formats)
+    assert run(*args, "--exit-zero").exit_code == {0: 0, 1: 0, 2: 2}[code]
+
+
+def test_warnings_go_to_stderr_and_quiet_silences_them_but_not_errors() -> None:
+    loud, quiet = run(*SUGGEST, ENERGY), run(*SUGGEST, "--quiet", ENERGY)
+    assert loud.stderr.startswith("warning: poor-td: ")
+    assert "poor-td" not in loud.stdout
+    assert (quiet.stdout, quiet.stderr) == (loud.stdout, "")
+    assert run(*SUGGEST, "-q", "absent.csv").stderr.startswith("d2rpick: ")
+
+
+def test_notes_of_a_reader_go_to_stderr_and_into_json(tmp_path: Path) -> None:
+    cut = tmp_path / "cut.glstat"
+    cut.write_bytes(Path(GLSTAT).read_bytes()[:-40])
+    found, result = answer(*SUGGEST, str(cut)), run(*SUGGEST, str(cut))
+    assert found["history"]["complete"] is False
+    assert "truncated-input" in [warning["code"] for warning in found["warnings"]]
+    assert [f"note: {note}" for note in found["history"]["notes"]] == result.stderr.splitlines()[:1]
+
+
+STAR = "\x1b[1m*"
+
+
+@pytest.mark.parametrize(
+    ("env", "coloured"),
+    [
+        ({}, False),
+        ({"FORCE_COLOR": "1"}, True),
+        ({"NO_COLOR": "1"}, False),
+        ({"NO_COLOR": "1", "FORCE_COLOR": "1"}, False),
+    ],
+)
+def test_colour_is_for_terminals_unless_asked_for(env: dict[str, str], coloured: bool) -> None:
+    assert (STAR in run(*SUGGEST, ENERGY, env=env).stdout) == coloured
+
+
+def test_a_terminal_has_colour_unless_refused_and_files_never_do(tmp_path: Path) -> None:
+    # CliRunner's color stands for a terminal
+    assert STAR in run(*SUGGEST, ENERGY, color=True).stdout
+    assert "\x1b" not in run(*SUGGEST, ENERGY, color=True, env={"NO_COLOR": "1"}).stdout
+    file = tmp_path / "result.txt"
+    run(*SUGGEST, ENERGY, "-o", str(file), env={"FORCE_COLOR": "1"})
+    assert "\x1b" not in file.read_text()
+
+
+# Files.
+
+
+@pytest.mark.parametrize("form", FORMATS["suggest"])
+def test_a_file_gets_what_stdout_would_have_got(form: str, tmp_path: Path) -> None:
+    file = tmp_path / "result"
+    to_file, to_stdout = run(*SUGGEST, ENERGY, "-f", form, "-o", str(file)), run(*SUGGEST, ENERGY, "-f", form)
+    assert (to_file.exit_code, to_file.stdout, to_file.stderr) == (0, "", to_stdout.stderr)
+    written, printed = file.read_text(), to_stdout.stdout
+    if form == "json":
+        assert {**json.loads(written), "command": []} == {**json.loads(printed), "command": []}
+    else:
+        assert written == printed
+    assert [path.name for path in tmp_path.iterdir()] == ["result"]
+
+
+@pytest.mark.parametrize("option", ["-o", "--plot"])
+def test_a_file_is_replaced_only_when_that_was_asked_for(option: str, tmp_path: Path) -> None:
+    file = tmp_path / "result.svg"
+    file.write_text("kept")
+    refused = run(*SUGGEST, ENERGY, option, str(file))
+    assert (refused.exit_code, file.read_text()) == (2, "kept")
+    assert "--overwrite" in refused.stderr
+    assert run(*SUGGEST, ENERGY, option, str(file), "--overwrite").exit_code == 0
+    assert file.read_text() != "kept"
+
+
+@pytest.mark.parametrize("option", ["-o", "--plot"])
+@pytest.mark.parametrize("spelling", ["energy.svg", "./energy.svg", "link.svg"])
+def test_an_input_is_never_written_to(
+    option: str, spelling: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("energy.svg").write_bytes(Path(ENERGY).read_bytes())
+    Path("link.svg").symlink_to("energy.svg")
+    result = run(*SUGGEST, "energy.svg", option, spelling, "--overwrite")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "this is an input" in result.stderr
+    assert Path("energy.svg").read_bytes() == Path(ENERGY).read_bytes()
+
+
+def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    file = tmp_path / "result.txt"
+    file.write_text("old")
+    monkeypatch.setattr(Path, "replace", fail)
+    result = run(*SUGGEST, ENERGY, "-q", "-o", str(file), "--overwrite")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith(f"d2rpick: {file}: cannot be written (Permission denied)")
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
+
+
+def test_a_link_stays_and_the_file_behind_it_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "target").write_text("old")
+    (tmp_path / "link").symlink_to("target")
+    assert run(*SUGGEST, ENERGY, "-f", "value", "-o", str(tmp_path / "link"), "--overwrite").exit_code == 0
+    assert (tmp_path / "link").is_symlink()
+    assert float((tmp_path / "target").read_text()) > 0
+
+
+def test_a_named_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
+    import os
+
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    received: list[str] = []
+    reader = threading.Thread(target=lambda: received.append(pipe.read_text()), daemon=True)
+    reader.start()
+    assert run(*SUGGEST, ENERGY, "-f", "value", "-o", str(pipe), "--overwrite").exit_code == 0
+    reader.join(timeout=10)
+    assert received == [run(*SUGGEST, ENERGY, "-f", "value").stdout]
+    assert pipe.is_fifo()
+
+
+# Figures.
+
+FIRST_BYTES = {"png": b"\x89PNG\r\n", "svg": b"<?xml", "pdf": b"%PDF-"}
+
+
+@pytest.mark.parametrize("suffix", FIRST_BYTES)
+@pytest.mark.parametrize(
+    "args",
+    [
+        (*SUGGEST, ENERGY),
+        NOTHING,
+        ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER),
+        (*VERIFY, ENERGY),
+        ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "--tr", "0.013", "--td", "0.064"),
+    ],
+)
+def test_a_plot_is_drawn_in_the_format_of_its_suffix(suffix: str, args: tuple[str, ...], tmp_path: Path) -> None:
+    file = tmp_path / f"figure.{suffix.upper()}"
+    result = run(*args, "--plot", str(file))
+    assert result.exit_code == (1 if args == NOTHING else 0)
+    assert file.read_bytes().startswith(FIRST_BYTES[suffix])
+    assert [path.name for path in tmp_path.iterdir()] == [file.name]
+
+
+def test_the_plot_comes_beside_the_result_and_shows_the_switch_times(tmp_path: Path) -> None:
+    file = tmp_path / "figure.svg"
+    assert run(*SUGGEST, ENERGY, "--plot", str(file)).stdout == run(*SUGGEST, ENERGY).stdout
+    drawn = file.read_text()
+    for label in ("tr = 0.0128853", "td = 0.064"):
+        assert f"<!--  {label}  -->" in drawn
+
+
+def test_no_recommendation_leaves_no_older_one_in_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "tr.txt"
+    file.write_text("0.0128853\n")
+    result = run(*NOTHING, "-f", "value", "-o", str(file), "--overwrite")
+    assert (result.exit_code, file.read_text()) == (1, "")
