@@ -9,11 +9,13 @@ from d2rpick.candidates import Candidate, Found, find_candidates, judge
 from d2rpick.cautions import POOR_KINETIC_SHARE, Caution, cautions_of
 from d2rpick.crossings import find_extrema
 from d2rpick.errors import RangeError
+from d2rpick.health import Health, assess, cautions_of_health
 from d2rpick.situation import Settings, Situation, examine
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from d2rpick.balance import Balance
     from d2rpick.history import History
     from d2rpick.switched import Comparison
 
@@ -39,6 +41,7 @@ class Suggestion:
     recommended: Pair | None
     better_td: Pair | None
     cautions: tuple[Caution, ...]
+    health: Health | None = None
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,19 @@ def verify(history: History, tr: float, td: float, settings: Settings) -> Verdic
         reasons=reasons,
         cautions=tuple(cautions_of(situation)),
     )
+
+
+def with_health(answer: Suggestion, balance: Balance) -> Suggestion:
+    """Add how far the reference run can be trusted, above all in the rigid window, else in the flight up to td.
+
+    ``balance`` is that of the reference run up to td: what comes later does not matter for the choice.
+    """
+    history, td = answer.situation.history, answer.situation.td
+    start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
+    window = None if start is None or start >= td else (start, td)
+    locked = history.mean_energy(*window) if window else None
+    health = assess(balance, window, locked)
+    return replace(answer, health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
 
 
 def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:

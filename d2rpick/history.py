@@ -111,6 +111,11 @@ class History:
             raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}")
         return float(np.interp(time, self.time, self.energy))
 
+    def mean_energy(self, start: float, end: float) -> float | None:
+        """Mean energy of the states in a window; None where there is none [energy]."""
+        inside = self.energy[slice(*np.searchsorted(self.time, [start, np.nextafter(end, np.inf)]))]
+        return float(inside.mean()) if inside.size else None
+
 
 def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """Which states of a file count, and what to say of the others.

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.health import Health, assess
 from d2rpick.momentum import FreeFlight, all_flights
+from d2rpick.readers.balance import balance_of
 from d2rpick.readers.selection import select_parts
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ class Overview:
 
     Times in the unit of the run, which ``time_unit`` gives only where a file names it.  ``sampling`` is None where
     there is a single state.  ``flights`` are the windows in which the parts asked for, or all, fly freely by their
-    momentum.
+    momentum, ``health`` is that of the run, with the longest of them as its window; None without energies.
     """
 
     source: tuple[str, ...]
@@ -54,6 +56,7 @@ class Overview:
     channels: tuple[str, ...]
     parts: tuple[PartOverview, ...]
     flights: tuple[FreeFlight, ...]
+    health: Health | None
     notes: tuple[str, ...]
 
 
@@ -62,6 +65,7 @@ def survey(run: Run, selection: Selection) -> Overview:
     first = run.databases[0]
     time = first.time if first.channels else first.part_time
     steps = np.diff(time)
+    flights = _flights(run, selection)
     return Overview(
         source=run.sources,
         format=" + ".join(database.format for database in run.databases),
@@ -75,7 +79,8 @@ def survey(run: Run, selection: Selection) -> Overview:
         complete=all(database.complete for database in run.databases),
         channels=tuple(dict.fromkeys(name for database in run.databases for name in database.channels)),
         parts=tuple(_overviews(run)),
-        flights=_flights(run, selection),
+        flights=flights,
+        health=_health(run, flights),
         notes=tuple(dict.fromkeys(note for database in run.databases for note in database.notes)),
     )
 
@@ -85,6 +90,14 @@ def _overviews(run: Run) -> list[PartOverview]:
         return []
     highest = run.part_energies(run.parts).max(axis=0)
     return [PartOverview(part, float(energy)) for part, energy in zip(run.parts, highest, strict=True)]
+
+
+def _health(run: Run, flights: tuple[FreeFlight, ...]) -> Health | None:
+    balance = balance_of(run, run.parts)
+    if balance is None:
+        return None
+    longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)
+    return assess(balance, (longest.start, longest.end) if longest else None)
 
 
 def _flights(run: Run, selection: Selection) -> tuple[FreeFlight, ...]:

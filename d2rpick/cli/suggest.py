@@ -36,13 +36,16 @@ def command(ctx: click.Context, /, td: float, limit: int, output_format: str, ex
     A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
-    from d2rpick.choice import suggest
+    from d2rpick.choice import suggest, with_health
+    from d2rpick.readers.balance import balance_of
     from d2rpick.report import suggestion as report
 
     run = shared.open_run(options)
     output = Output.of(options, *run.sources)
     history = run.history(shared.selection(options), with_momenta=True)
     answer = suggest(history, td, shared.settings(options))
+    if balance := balance_of(run, history.parts, td):
+        answer = with_health(answer, balance)
     output.notes(history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick import plots

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
+from d2rpick.health import cautions_of_health
 from d2rpick.report import tables
+from d2rpick.report.health import measures_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.cautions import Caution
     from d2rpick.momentum import FreeFlight
     from d2rpick.overview import Overview
 
 SCHEMA = "d2rpick/info/1"
+
+
+def cautions(overview: Overview) -> tuple[Caution, ...]:
+    """What to know of the health of the run."""
+    return tuple(cautions_of_health(overview.health)) if overview.health else ()
 
 
 def as_table(overview: Overview) -> str:
@@ -51,7 +59,8 @@ def as_json(overview: Overview, command: Sequence[str]) -> str:
         }
         for f in overview.flights
     ]
-    front = {"schema": SCHEMA, "tool_version": __version__, "command": list(command), "warnings": []}
+    front: dict[str, Any] = {"schema": SCHEMA, "tool_version": __version__, "command": list(command)}
+    front["warnings"] = [asdict(caution) for caution in cautions(overview)]
     return tables.as_json({**front, **facts})
 
 
@@ -72,7 +81,10 @@ def _rows(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("complete", overview.complete),
         ("channels", ", ".join(overview.channels) or None),
     ]
-    return rows + [("flight", _flight(flight)) for flight in overview.flights]
+    rows += [("flight", _flight(flight)) for flight in overview.flights]
+    if overview.health:
+        rows += [(one.what, one.value) for one in measures_of(overview.health) if one.value]
+    return rows
 
 
 def _flight(flight: FreeFlight) -> str:

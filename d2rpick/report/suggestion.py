@@ -51,6 +51,7 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
             **mechanics(answer.situation),
             "candidates": [asdict(candidate) for candidate in answer.candidates],
             "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
+            "health": asdict(answer.health) if answer.health else None,
             "better_td": {"td": better.td, "tr": better.tr, "residual": better.residual} if better else None,
         }
     )
