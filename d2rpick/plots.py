@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
 from d2rpick.errors import FormatError
+from d2rpick.mode import Mode
 from d2rpick.replay import Replay, Trajectory, from_mode
 
 if TYPE_CHECKING:
@@ -25,6 +28,10 @@ _REFERENCE, _SWITCHED, _GOOD, _FLIGHT = "#000000", "#d55e00", "#009e73", "#56b4e
 # Beyond this ratio of the highest energy to the level, the level would vanish on a linear axis.
 _LOGARITHMIC = 20.0
 _DECADES_BELOW_LEVEL = 2.0
+# Width of a figure, and the height of one panel and of two [inch]; on a narrow page letters keep their size.
+_SIZES = {False: (9.0, 4.0, 6.5), True: (4.2, 3.9, 6.6)}
+# Share of the axes that the label of a switch time takes up, at most.
+_LABEL = {False: 0.14, True: 0.3}
 
 
 def format_of(name: str) -> str:
@@ -42,10 +49,29 @@ def render(figure: Figure, name: str) -> bytes:
     return content.getvalue()
 
 
-def draw_suggestion(answer: Suggestion) -> Figure:
+def svg_element(figure: Figure, prefix: str) -> str:
+    """Turn a figure into an SVG element for a page, whose ids all begin with ``prefix``; letters stay letters."""
+    content = io.StringIO()
+    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": prefix}):
+        figure.savefig(content, format="svg", metadata=nothing)
+    element = content.getvalue()
+    element = element[element.index("<svg") :]
+    element = re.sub(r' (?:width|height)="[\d.]+pt"', "", element, count=2)  # the page says how wide
+    element = re.sub(r'(?<= id=")|(?<=href="#)|(?<=url\(#)', prefix, element)
+    return element.replace("<svg", '<svg role="img"', 1)
+
+
+def draw_suggestion(answer: Suggestion, *, narrow: bool = False) -> Figure:
     """Energy with level, candidates and the recommended pair; below it the motion after that pair."""
     tr = answer.recommended.tr if answer.recommended else None
-    return _draw(answer.situation, answer.candidates, tr)
+    return _draw(answer.situation, answer.candidates, tr, narrow=narrow)
+
+
+def draw_better(answer: Suggestion, *, narrow: bool = False) -> Figure:
+    """Draw the same for the better pair; there must be one."""
+    assert answer.better_td is not None
+    return _draw(answer.situation.at(answer.better_td.td), (), answer.better_td.tr, narrow=narrow)
 
 
 def draw_verdict(answer: Verdict) -> Figure:
@@ -70,33 +96,39 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
     return figure
 
 
-def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | None) -> Figure:
-    with_motion = tr is not None and situation.described(tr)
-    figure = Figure(figsize=(9, 6.5 if with_motion else 4), layout="constrained")
+def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | None, *, narrow: bool = False) -> Figure:
+    with_motion = tr is not None and isinstance(situation.mode, Mode) and situation.described(tr)
+    width, one, two = _SIZES[narrow]
+    figure = Figure(figsize=(width, two if with_motion else one), layout="constrained")
     axes = figure.subplots(2 if with_motion else 1, 1, sharex=True, squeeze=False)[:, 0]
-    _draw_energy(axes[0], situation, candidates, tr)
+    _draw_energy(axes[0], situation, candidates)
     if with_motion and tr is not None:
         _draw_motion(axes[1], situation, tr)
     unit = situation.history.time_unit
     axes[-1].set_xlabel(f"time [{unit}]" if unit else "time")
     for panel in axes:
-        _finish(panel)
+        _finish(panel, legend=not narrow)
+        _mark(panel, tr, situation.td, _LABEL[narrow])
+    if narrow:  # a legend inside would hide the curves
+        axes[-1].locator_params(axis="x", nbins=4)
+        known = [dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True)) for panel in axes]
+        handles = {name: handle for one in known for name, handle in one.items()}
+        figure.legend(handles.values(), handles, loc="outside lower left", ncols=2, fontsize="small", frameon=False)
     return figure
 
 
-def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, ...], tr: float | None) -> None:
+def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, ...]) -> None:
     history, level, flight = situation.history, situation.energy_td, situation.flight
     if flight.start is not None:
         end = history.time[-1] if flight.end is None else flight.end
         axes.axvspan(flight.start, end, color=_FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
-    axes.plot(history.time, history.energy, color=_REFERENCE, linewidth=1, label=history.channel)
+    axes.plot(history.time, history.energy, color=_REFERENCE, linewidth=1, label=_plain(history.channel))
     axes.axhline(level, color=_SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
     for acceptable, fill, name in ((True, _GOOD, "acceptable tr"), (False, "none", "other candidates")):
         some = [c for c in candidates if c.acceptable == acceptable]
         if some:
             times, energies = [c.tr for c in some], [c.energy for c in some]
             axes.scatter(times, energies, s=28, facecolors=fill, edgecolors=_GOOD, zorder=3, label=name)
-    _mark(axes, tr, situation.td)
     if level > 0 and float(history.energy.max()) > _LOGARITHMIC * level:
         axes.set_yscale("log")
         axes.set_ylim(bottom=level / 10**_DECADES_BELOW_LEVEL)
@@ -105,7 +137,7 @@ def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, 
 
 def _draw_motion(axes: Axes, situation: Situation, tr: float) -> None:
     mode, span, td = situation.mode, situation.span, situation.td
-    assert mode is not None
+    assert isinstance(mode, Mode)
     assert span is not None
     time = np.linspace(span.start, max(span.end, td), 2000)
     oscillator, start = from_mode(mode, span.start)
@@ -115,13 +147,23 @@ def _draw_motion(axes: Axes, situation: Situation, tr: float) -> None:
         (replay.motion(time), _SWITCHED, "switched"),
     ):
         axes.plot(time, mode.preload + states.y - states.z, color=colour, linewidth=1, label=name)
-    _mark(axes, tr, td)
-    axes.set_ylabel("deformation [square root of energy]")
+    axes.set_ylabel("deformation [√energy]")
 
 
-def _mark(axes: Axes, tr: float | None, td: float) -> None:
-    """Mark the switch times; their labels stand above the axes, away from each other and from the curves."""
-    for name, time, side in (("tr", tr, "right"), ("td", td, "left")):
+def _mark(axes: Axes, tr: float | None, td: float, width: float) -> None:
+    """Mark the switch times; their labels stand above the axes, away from each other and from the edges.
+
+    A label takes up ``width`` of the axes: where one would reach over an edge it changes its side if there is room.
+    """
+    low, high = axes.get_xlim()
+    places = [None if time is None else (time - low) / (high - low) for time in (tr, td)]
+    room = 1.0 if places[0] is None or places[1] is None else places[1] - places[0]
+    sides = ["right", "left"]
+    if places[0] is not None and places[0] < width < room:
+        sides[0] = "left"
+    if places[1] is not None and places[1] > 1 - width and room > width * (1 + (sides[0] == "left")):
+        sides[1] = "right"
+    for name, time, side in zip(("tr", "td"), (tr, td), sides, strict=True):
         if time is not None:
             axes.axvline(time, color=_SWITCHED, linestyle="--", linewidth=0.8)
             axes.annotate(
@@ -130,7 +172,13 @@ def _mark(axes: Axes, tr: float | None, td: float) -> None:
             )  # fmt: skip
 
 
-def _finish(axes: Axes) -> None:
+def _finish(axes: Axes, *, legend: bool = True) -> None:
     axes.grid(visible=True, linewidth=0.3)
     axes.margins(x=0)
-    axes.legend(fontsize="small", loc="upper right")
+    if legend:
+        axes.legend(fontsize="small", loc="upper right")
+
+
+def _plain(name: str) -> str:
+    """Keep a name from a file from being read as a formula, or, with an underscore in front, as one to be hidden."""
+    return name.replace("$", r"\$") if not name.startswith("_") else f" {name}".replace("$", r"\$")

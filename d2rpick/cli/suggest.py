@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
 
+if TYPE_CHECKING:
+    from d2rpick.choice import Suggestion
+    from d2rpick.readers import Run
+
 EXAMPLES = """\b
 Examples:
   d2rpick suggest --td 0.064 sample_data/energy.csv
   d2rpick suggest --td 0.37 --energy boxIE_J sample_data/rollover.csv
   d2rpick suggest --td 0.064 -f json sample_data/energy.glstat
+  d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
 """
 
 
@@ -28,6 +33,7 @@ Examples:
 )
 @shared.history_options
 @shared.choosing_options
+@click.option("--report", metavar="FILE", help="Write all of it to FILE, one HTML page to read, print and sign.")
 @shared.output_options("table", "json", "csv", "markdown", "value")
 @click.pass_context
 def command(ctx: click.Context, /, td: float, limit: int, output_format: str, exit_zero: bool, **options: Any) -> None:
@@ -51,6 +57,8 @@ def command(ctx: click.Context, /, td: float, limit: int, output_format: str, ex
         from d2rpick import plots
 
         output.write(options["plot"], plots.render(plots.draw_suggestion(answer), options["plot"]))
+    if options["report"]:
+        output.write(options["report"], _page(answer, run, ctx.meta["d2rpick.command"]).encode())
     texts = {
         "table": lambda: report.as_table(answer, limit),
         "markdown": lambda: report.as_markdown(answer, limit),
@@ -60,3 +68,21 @@ def command(ctx: click.Context, /, td: float, limit: int, output_format: str, ex
     }
     output.result(texts[output_format]())
     finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
+
+
+def _page(answer: Suggestion, run: Run, command: tuple[str, ...]) -> str:
+    """Draw the figures, wide and narrow, and write the page around them."""
+    from d2rpick import plots
+    from d2rpick.report.page import as_page
+
+    drawings = {"Internal energy with its level at td, and the choice": plots.draw_suggestion}
+    if answer.better_td:
+        drawings["The better pair"] = plots.draw_better
+    figures = {
+        caption: (
+            plots.svg_element(draw(answer), f"wide{number}-"),
+            plots.svg_element(draw(answer, narrow=True), f"narrow{number}-"),
+        )
+        for number, (caption, draw) in enumerate(drawings.items())
+    }
+    return as_page(answer, run, command, figures)

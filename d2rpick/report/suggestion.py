@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from d2rpick.choice import Pair, Suggestion
 
 SCHEMA = "d2rpick/suggest/1"
-_HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")
+HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")
 
 
 def as_table(answer: Suggestion, limit: int) -> str:
     """Heading, the first ``limit`` candidates, the recommended and the better pair; the recommended row has a star."""
-    lines = [*heading(answer.situation), "", tables.as_text(_HEAD, _rows(answer, limit))]
+    lines = [*heading(answer.situation), "", tables.as_text(HEAD, rows(answer, limit))]
     left = len(answer.candidates) - limit
     if left > 0:
         lines.append(f"... and {left} more (--limit)")
@@ -30,15 +30,15 @@ def as_table(answer: Suggestion, limit: int) -> str:
 
 def as_markdown(answer: Suggestion, limit: int) -> str:
     """The candidates as a Markdown table, and the two pairs below it."""
-    table = tables.as_markdown(_HEAD, _rows(answer, limit))
+    table = tables.as_markdown(HEAD, rows(answer, limit))
     return f"{table}\n\nrecommended: {_pair(answer.recommended)}\n\nbetter pair: {_pair(answer.better_td)}"
 
 
 def as_csv(answer: Suggestion) -> str:
     """All candidates, a column for each key of the JSON output."""
     names = [field.name for field in fields(Candidate)]
-    rows = ([getattr(c, n) for n in names[:-1]] + ["; ".join(c.notes)] for c in answer.candidates)
-    return tables.as_csv(names, rows).rstrip("\n")
+    cells = ([getattr(c, n) for n in names[:-1]] + ["; ".join(c.notes)] for c in answer.candidates)
+    return tables.as_csv(names, cells).rstrip("\n")
 
 
 def as_json(answer: Suggestion, command: Sequence[str]) -> str:
@@ -62,7 +62,8 @@ def as_value(answer: Suggestion) -> str:
     return repr(answer.recommended.tr) if answer.recommended else ""
 
 
-def _rows(answer: Suggestion, limit: int) -> list[list[tables.Cell]]:
+def rows(answer: Suggestion, limit: int) -> list[list[tables.Cell]]:
+    """Cells of the first ``limit`` candidates, below ``HEAD``."""
     return [
         [
             "*" if c.recommended else " ",
