@@ -11,9 +11,11 @@ from d2rpick.crossings import find_crossings
 from d2rpick.identify import Identification, identify
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
-    from d2rpick.history import History, Part
+    from d2rpick.history import History, Part, Samples
+
+    Model = Callable[[Samples, Samples], Identification]
 
 # Tails of the record before td that are tried for an oscillator, as shares of what comes before td.  Below an
 # eighth a record has hardly the periods an oscillator needs, and what fits so little of it proves nothing.
@@ -49,10 +51,12 @@ class Span(NamedTuple):
     end: float
 
 
-def described_span(history: History, td: float, first: float, last: float) -> tuple[Span | None, Identification]:
-    """Find the longest window around td that one oscillator describes.
+def described_span(
+    history: History, td: float, first: float, last: float, model: Model = identify
+) -> tuple[Span | None, Identification]:
+    """Find the longest window around td that one oscillator describes, or whatever ``model`` identifies.
 
-    First a part of the record that one oscillator describes is looked for: all of it, up to td, then ever
+    First a part of the record that it describes is looked for: all of it, up to td, then ever
     shorter tails.  From there the window grows both ways while the samples stay with the fit, is fitted anew,
     and so on until it stays.
 
@@ -61,6 +65,8 @@ def described_span(history: History, td: float, first: float, last: float) -> tu
     history : History
     td, first, last : float
         Time to look around, and where the search begins and ends [time].
+    model : function
+        `identify`, or `identify_several`.
 
     Returns
     -------
@@ -71,9 +77,9 @@ def described_span(history: History, td: float, first: float, last: float) -> tu
     """
     refused = []
     for start, end in _windows(first, td, last):
-        fit = identify_within(history, start, end)
+        fit = identify_within(history, start, end, model)
         if fit.describes_record:
-            span, fit = _grow(history, td, fit, first, last)
+            span, fit = _grow(history, td, fit, first, last, model)
             if span:
                 return span, fit
         refused.append(fit)
@@ -88,7 +94,7 @@ def span_of(history: History, td: float, fit: Identification, first: float, last
     assert fit.mode is not None
     inside = slice(*np.searchsorted(history.time, [first, np.nextafter(last, np.inf)]))
     time, energy = history.time[inside], history.energy[inside]
-    period = 2 * np.pi / fit.mode.omega
+    period = 2 * np.pi / fit.mode.fastest
     width = max(3, round(period / _MEANS_PER_PERIOD / float(np.sort(np.diff(time))[(time.size - 1) // 2])))
     with np.errstate(over="ignore", invalid="ignore"):  # far off, a damped fit grows beyond all numbers
         least = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
@@ -126,21 +132,21 @@ def _windows(first: float, td: float, last: float) -> Iterator[tuple[float, floa
             yield td - length, end
 
 
-def identify_within(history: History, start: float, end: float) -> Identification:
+def identify_within(history: History, start: float, end: float, model: Model = identify) -> Identification:
     """Identify the oscillator from the samples in [start, end]."""
     inside = slice(*np.searchsorted(history.time, [start, np.nextafter(end, np.inf)]))
-    return identify(history.time[inside], history.energy[inside])
+    return model(history.time[inside], history.energy[inside])
 
 
 def _grow(
-    history: History, td: float, fit: Identification, first: float, last: float
+    history: History, td: float, fit: Identification, first: float, last: float, model: Model
 ) -> tuple[Span | None, Identification]:
     """Extend the fitted window while the record stays with the fit, refit, repeat."""
     span = span_of(history, td, fit, first, last)
     for _ in range(_MOST_REFITS):
         if span is None or span == (fit.start, fit.end):
             break
-        refit = identify_within(history, *span)
+        refit = identify_within(history, *span, model)
         if not refit.describes_record:
             break
         fit, span = refit, span_of(history, td, refit, first, last)
