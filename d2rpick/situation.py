@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick import measures
+from d2rpick.crossings import find_extrema
+from d2rpick.envelope import upper_envelope
 from d2rpick.errors import RangeError
 from d2rpick.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
-from d2rpick.identify import Identification, assess
+from d2rpick.identify import Identification, assess, identify_several
+from d2rpick.modes import Modes
 from d2rpick.momentum import FreeFlight, flight_around
+from d2rpick.parts import Parts, PartVibration, read_parts
+from d2rpick.profile import Profile
 
 if TYPE_CHECKING:
-    from d2rpick.history import History
+    from d2rpick.history import History, Samples
     from d2rpick.mode import Mode
 
+# Of the fastest mode: what a parabola through three of them misses of a minimum is of the order of 1e-4 of a period.
+_POINTS_PER_PERIOD = 64
 # Where the scatter of the last period exceeds this share of the vibration energy at td, the vibration has sunk
 # into it: its sign is no longer certain.
 _DROWNED = 0.2
@@ -30,7 +38,8 @@ class Settings:
     the next contact.  ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
     given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
-    the energy level alone.
+    the energy level alone.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the
+    step while rigid to that while deformable; without the first nothing is said of the run time.
     """
 
     after: float | None = None
@@ -41,14 +50,17 @@ class Settings:
     oscillator: Mode | None = None
     fit_window: tuple[float, float] | None = None
     replay: bool = True
+    cost_share: float | None = None
+    step_ratio: float = 1.0
 
 
 @dataclass(frozen=True)
 class Situation:
     """A history seen from one td [time].
 
-    ``fit`` is None only where no oscillator was looked for; ``mode`` is its mode where it can be relied on at td,
-    else None, and then ``no_mode`` says why.  ``span`` is the window in which it describes the record.
+    ``fit`` is None only where no oscillator was looked for; ``mode`` is its mode, or several, where it can be relied on
+    at td, else None, and then ``no_mode`` says why.  ``span`` is the window in which it describes the record.
+    ``parts`` are the deformations of single parts, where their energies are known and an oscillator was looked for.
     """
 
     history: History
@@ -56,14 +68,21 @@ class Situation:
     settings: Settings
     flight: Flight
     fit: Identification | None
-    mode: Mode | None
+    mode: Mode | Modes | None
     span: Span | None
     no_mode: str | None
+    parts: Parts | None = None
+    part_vibration: PartVibration | None = None
 
     @property
     def basis(self) -> str:
-        """What a choice rests on: "oscillator" or "energy"."""
-        return "oscillator" if self.mode else "energy"
+        """What a choice rests on: "parts", "oscillator" (one or several of them) or "energy"."""
+        return "parts" if self.part_vibration else "oscillator" if self.mode else "energy"
+
+    @property
+    def vibration(self) -> PartVibration | Mode | Modes | None:
+        """Deformations with their signs, or None on basis "energy"."""
+        return self.part_vibration or self.mode
 
     @property
     def energy_td(self) -> float:
@@ -73,7 +92,12 @@ class Situation:
     @property
     def kinetic_share(self) -> float | None:
         """K, or None on basis "energy" [-]."""
-        return measures.kinetic_share(self.mode, self.td) if self.mode else None
+        return measures.kinetic_share(self.vibration, self.td) if self.vibration else None
+
+    @property
+    def kinetic_share_estimated(self) -> bool:
+        """Whether K comes from the envelope of the energy, for want of an oscillator that describes the record."""
+        return self.part_vibration is not None and self.mode is None
 
     @property
     def earliest_tr(self) -> float | None:
@@ -85,9 +109,49 @@ class Situation:
         """End of the flight with the margin; infinite when no contact was seen [time]."""
         return float("inf") if self.flight.end is None else self.flight.end - self.settings.margin
 
+    @property
+    def in_flight(self) -> bool:
+        """Whether td lies in a known flight, with the margin."""
+        return self.earliest_tr is not None and self.earliest_tr < self.td <= self.latest_td
+
+    def peaks(self, start: float, end: float) -> tuple[float, ...]:
+        """Times in (start, end], ascending, where the energy peaks: of the oscillator, of the samples without one."""
+        if self.mode and self.span:
+            return self.mode.peaks(max(start, self.span.start), min(end, self.span.end))
+        history = self.history
+        return tuple(e.time for e in find_extrema(history.time, history.energy) if e.peak and start < e.time <= end)
+
     def described(self, time: float) -> bool:
         """Whether the oscillator describes the record at ``time``."""
         return self.mode is not None and self.span is not None and self.span.start <= time <= self.span.end
+
+    def measured(self, time: float) -> bool:
+        """Whether the deformation at ``time`` can be compared with that at td."""
+        if self.part_vibration:
+            parts = self.part_vibration.parts
+            return parts.comparable_since(self.td) <= time <= float(parts.time[-1])
+        return self.described(time)
+
+    @cached_property
+    def profile(self) -> Profile | None:
+        """Lock-in error over all times before td that can be compared with it; None where it has a closed form."""
+        if self.part_vibration:
+            parts = self.part_vibration.parts
+            known = parts.time[parts.time >= parts.comparable_since(self.td)]
+            return Profile.of(self.part_vibration, known, self.td)
+        if isinstance(self.mode, Modes) and self.span:
+            step = 2 * np.pi / self.mode.fastest / _POINTS_PER_PERIOD
+            count = max(3, int(np.ceil((self.td - self.span.start) / step)) + 1)
+            return Profile.of(self.mode, np.linspace(self.span.start, self.td, count), self.td)
+        return None
+
+    def turns_since(self, time: float) -> int:
+        """How often the sampled energy turns between ``time`` and td."""
+        return int(np.count_nonzero((self._turns > time) & (self._turns < self.td)))
+
+    @cached_property
+    def _turns(self) -> Samples:
+        return np.array([e.time for e in find_extrema(self.history.time, self.history.energy)])
 
     def energy_at(self, time: float) -> float:
         """Energy at ``time``: of the oscillator where it describes the record, of the samples elsewhere [energy]."""
@@ -116,7 +180,12 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
     fit, span = _oscillator(history, td, settings, seen)
     mode, no_mode = _reliable_mode(history, td, fit, span, given=settings.oscillator is not None)
     flight = _flight(history, td, settings.after, seen, span)
-    return Situation(history, td, settings, flight, fit, mode, span, no_mode)
+    situation = Situation(history, td, settings, flight, fit, mode, span, no_mode)
+    if history.part_energies is None or not settings.replay:
+        return situation
+    # without a sign of the next contact nothing is known of what comes after td
+    end = flight.end or (float(history.time[-1]) if seen or span else td)
+    return _with_parts(situation, history.part_energies, end)
 
 
 def _oscillator(
@@ -131,8 +200,24 @@ def _oscillator(
     fit = _given_fit(history, settings, first)
     if fit is None:
         span, fit = described_span(history, td, first, last)
+        if span is None:
+            span, several = described_span(history, td, first, last, identify_several)
+            fit = several if span else fit
         return fit, span
     return fit, span_of(history, td, fit, first, last) if fit.describes_record else None
+
+
+def _with_parts(situation: Situation, energies: Samples, end: float) -> Situation:
+    """Add what the energies of single parts, (n, k), tell of the flight up to ``end``."""
+    history, td, start = situation.history, situation.td, situation.flight.start
+    first = min(td, float(history.time[0]) if start is None else start)
+    inside = slice(*np.searchsorted(history.time, [first, np.nextafter(end, np.inf)]))
+    if history.time[inside].size < 3:
+        return situation
+    parts = read_parts(history.time[inside], energies[inside], history.part_names)
+    whole = situation.mode or upper_envelope(history.time[inside], history.energy[inside])
+    vibration = PartVibration(parts, whole) if parts.signed and whole else None
+    return replace(situation, parts=parts, part_vibration=vibration)
 
 
 def _flight(history: History, td: float, after: float | None, seen: FreeFlight | None, span: Span | None) -> Flight:
@@ -169,7 +254,7 @@ def _inside(history: History, time: float, option: str) -> None:
 
 def _reliable_mode(
     history: History, td: float, fit: Identification | None, span: Span | None, *, given: bool
-) -> tuple[Mode | None, str | None]:
+) -> tuple[Mode | Modes | None, str | None]:
     """Give the mode of ``fit`` if it can be relied on at td, else None and why not."""
     if fit is None:
         return None, "no oscillator was looked for (--no-verify)"

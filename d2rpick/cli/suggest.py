@@ -11,11 +11,14 @@ from d2rpick.cli.output import Output, finish
 
 if TYPE_CHECKING:
     from d2rpick.choice import Suggestion
+    from d2rpick.history import History
     from d2rpick.readers import Run
+    from d2rpick.situation import Settings
 
 EXAMPLES = """\b
 Examples:
   d2rpick suggest --td 0.064 sample_data/energy.csv
+  d2rpick suggest --td-window 0.06 0.07 sample_data/energy.csv
   d2rpick suggest --td 0.37 --energy boxIE_J sample_data/rollover.csv
   d2rpick suggest --td 0.064 -f json sample_data/energy.glstat
   d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
@@ -23,7 +26,10 @@ Examples:
 
 
 @click.command("suggest", epilog=EXAMPLES)
-@click.option("--td", type=shared.TIME, required=True, metavar="T", help="Switch back to deformable at this time.")
+@click.option("--td", type=shared.TIME, metavar="T", help="Switch back to deformable at this time.")
+@click.option(
+    "--td-window", type=(shared.TIME, shared.TIME), metavar="LO HI", help="Choose the time to switch back in here."
+)
 @click.option(
     "--limit",
     type=click.IntRange(min=1),
@@ -36,21 +42,30 @@ Examples:
 @click.option("--report", metavar="FILE", help="Write all of it to FILE, one HTML page to read, print and sign.")
 @shared.output_options("table", "json", "csv", "markdown", "value")
 @click.pass_context
-def command(ctx: click.Context, /, td: float, limit: int, output_format: str, exit_zero: bool, **options: Any) -> None:
-    """Rank the times tr at which the parts of HISTORY can be made rigid until td.
+def command(
+    ctx: click.Context,
+    /,
+    td: float | None,
+    td_window: tuple[float, float] | None,
+    limit: int,
+    output_format: str,
+    exit_zero: bool,
+    **options: Any,
+) -> None:
+    """Rank the times tr at which the parts of HISTORY can be made rigid until td, or choose both times.
 
     A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
-    from d2rpick.choice import suggest, with_health
+    from d2rpick.choice import with_health
     from d2rpick.readers.balance import balance_of
     from d2rpick.report import suggestion as report
 
     run = shared.open_run(options)
     output = Output.of(options, *run.sources)
     history = run.history(shared.selection(options), with_momenta=True)
-    answer = suggest(history, td, shared.settings(options))
-    if balance := balance_of(run, history.parts, td):
+    answer = _answer(history, td, td_window, shared.settings(options))
+    if balance := balance_of(run, history.parts, answer.situation.td):
         answer = with_health(answer, balance)
     output.notes(history.notes, answer.cautions)
     if options["plot"]:
@@ -68,6 +83,22 @@ def command(ctx: click.Context, /, td: float, limit: int, output_format: str, ex
     }
     output.result(texts[output_format]())
     finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
+
+
+def _answer(history: History, td: float | None, window: tuple[float, float] | None, settings: Settings) -> Suggestion:
+    """Choose tr for ``td``, or both in ``window``; UsageError unless one of them is given."""
+    from d2rpick.choice import suggest
+    from d2rpick.window import advice, suggest_in_window
+
+    if td is not None and window:
+        raise click.UsageError("--td and --td-window exclude each other")
+    if window:
+        if not window[0] < window[1]:
+            raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
+        return suggest_in_window(history, window, settings)
+    if td is None:
+        raise click.UsageError(advice(history, settings))
+    return suggest(history, td, settings)
 
 
 def _page(answer: Suggestion, run: Run, command: tuple[str, ...]) -> str:

@@ -125,7 +125,9 @@ class Run:
             f"part {part.id} {part.title!r} never has internal energy: it is rigid or has no elements" for part in idle
         )
         channel = "internal energy of " + ", ".join(part.title or f"part {part.id}" for part in chosen)
-        return self._made(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
+        names = [part.title or f"part {part.id}" for part in chosen]
+        history = self._made(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
+        return _with_terms(history, names, energies)
 
     def _of_all_parts(self) -> History:
         if not self.parts:
@@ -139,9 +141,9 @@ class Run:
         database, names = self._holding(wanted)
         columns = [database.channel(name) for name in names]
         channel = " + ".join(names)
-        return self._made(
-            database, database.time, np.sum(columns, axis=0), channel, names, quantity_note(channel), None
-        )
+        notes = quantity_note(channel)
+        history = self._made(database, database.time, np.sum(columns, axis=0), channel, names, notes, None)
+        return _with_terms(history, names, np.stack(columns, axis=1))
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
         """Find the database that has all these channels, under the names it gives them."""
@@ -172,3 +174,11 @@ class Run:
             complete=all(one.complete for one in self.databases),
             notes=tuple(dict.fromkeys([*(note for one in self.databases for note in one.notes), *notes])),
         )
+
+
+def _with_terms(history: History, names: Sequence[str], energies: Samples) -> History:
+    """Add the terms of a summed energy, (n, k), but those that are always zero; one alone is the energy itself."""
+    active = np.flatnonzero(energies.any(axis=0))
+    if active.size < 2:
+        return history
+    return replace(history, part_names=tuple(names[i] for i in active.tolist()), part_energies=energies[:, active])

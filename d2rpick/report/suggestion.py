@@ -35,10 +35,10 @@ def as_markdown(answer: Suggestion, limit: int) -> str:
 
 
 def as_csv(answer: Suggestion) -> str:
-    """All candidates, a column for each key of the JSON output."""
-    names = [field.name for field in fields(Candidate)]
-    cells = ([getattr(c, n) for n in names[:-1]] + ["; ".join(c.notes)] for c in answer.candidates)
-    return tables.as_csv(names, cells).rstrip("\n")
+    """All candidates, a column for each key of the JSON output but ``parts``."""
+    names = [field.name for field in fields(Candidate) if field.name not in ("parts", "notes")]
+    cells = ([getattr(c, n) for n in names] + ["; ".join(c.notes)] for c in answer.candidates)
+    return tables.as_csv([*names, "notes"], cells).rstrip("\n")
 
 
 def as_json(answer: Suggestion, command: Sequence[str]) -> str:
@@ -48,18 +48,23 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
         {
             **frame(answer.situation, SCHEMA, command, answer.cautions),
             "td": answer.situation.td,
+            "td_window": list(answer.td_window) if answer.td_window else None,
             **mechanics(answer.situation),
             "candidates": [asdict(candidate) for candidate in answer.candidates],
             "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
             "health": asdict(answer.health) if answer.health else None,
+            "expected": asdict(answer.expected) if answer.expected else None,
             "better_td": {"td": better.td, "tr": better.tr, "residual": better.residual} if better else None,
         }
     )
 
 
 def as_value(answer: Suggestion) -> str:
-    """The recommended tr in the shortest digits that read back to it; empty when there is none."""
-    return repr(answer.recommended.tr) if answer.recommended else ""
+    """The recommended tr, and td where it was chosen too, in the shortest digits that read back; empty without one."""
+    pair = answer.recommended
+    if pair is None:
+        return ""
+    return f"{pair.tr!r} {pair.td!r}" if answer.td_window else repr(pair.tr)
 
 
 def rows(answer: Suggestion, limit: int) -> list[list[tables.Cell]]:
