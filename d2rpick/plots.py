@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 from pathlib import PurePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
 import numpy as np
@@ -16,15 +16,25 @@ from d2rpick.mode import Mode
 from d2rpick.replay import Replay, Trajectory, from_mode
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from matplotlib.axes import Axes
 
     from d2rpick.candidates import Candidate
     from d2rpick.choice import Suggestion, Verdict
+    from d2rpick.exhibits import Exhibit, Panel
+    from d2rpick.history import Samples
     from d2rpick.situation import Situation
 
 FORMATS = ("png", "svg", "pdf")
 # Okabe and Ito's palette: told apart with any colour vision.
 _REFERENCE, _SWITCHED, _GOOD, _FLIGHT = "#000000", "#d55e00", "#009e73", "#56b4e9"
+_COLOURS = (_REFERENCE, _SWITCHED, _GOOD)
+_STYLES: Final[Mapping[str, dict[str, Any]]] = {
+    "line": {"linewidth": 1}, "thin": {"linewidth": 0.6, "linestyle": "--"}, "dots": {"linestyle": "", "marker": "."},
+}  # fmt: skip
+# Dots on a curve: few enough that the line below stays in sight.
+_DOTS = 100
 # Beyond this ratio of the highest energy to the level, the level would vanish on a linear axis.
 _LOGARITHMIC = 20.0
 _DECADES_BELOW_LEVEL = 2.0
@@ -43,9 +53,11 @@ def format_of(name: str) -> str:
 
 
 def render(figure: Figure, name: str) -> bytes:
-    """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for."""
-    content = io.BytesIO()
-    figure.savefig(content, format=format_of(name), dpi=150)
+    """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for, always the same."""
+    content, form = io.BytesIO(), format_of(name)
+    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
+    with mpl.rc_context({"svg.hashsalt": "d2rpick"}):
+        figure.savefig(content, format=form, dpi=150, metadata=undated)
     return content.getvalue()
 
 
@@ -96,6 +108,42 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
     return figure
 
 
+def draw_exhibit(exhibit: Exhibit) -> Figure:
+    """All panels of an exhibit over their common time."""
+    rows, columns = len(exhibit.panels), len(exhibit.panels[0])
+    figure = Figure(figsize=(9 if columns == 1 else 5.2 * columns, 3.2 * rows), layout="constrained")
+    figure.suptitle(exhibit.title, fontsize="medium")
+    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for axes, panel in zip(grid.flat, (panel for row in exhibit.panels for panel in row), strict=True):
+        _draw_panel(axes, panel, exhibit.columns)
+    for axes in grid[-1]:
+        axes.set_xlabel("time [ms]")
+    return figure
+
+
+def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
+    time = next(iter(columns.values()))
+    drawn = dict.fromkeys(_STYLES, 0)
+    for curve in panel.curves:
+        every = max(1, time.size // _DOTS) if curve.style == "dots" else 1
+        axes.plot(
+            time[::every], columns[curve.column][::every], label=curve.label,
+            color=_COLOURS[drawn[curve.style]], **_STYLES[curve.style],
+        )  # fmt: skip
+        drawn[curve.style] += 1
+    for name, level in panel.levels:
+        axes.axhline(level, color=_SWITCHED, linewidth=0.8, label=name)
+        _show_level(axes, level, max(float(columns[curve.column].max()) for curve in panel.curves))
+    for x, y in panel.points:
+        axes.plot(x, y, "o", color=_GOOD, markersize=5)
+    if panel.rigid:
+        axes.axvspan(*panel.rigid, color=_FLIGHT, alpha=0.2, linewidth=0, label="rigid")
+    axes.set_title(panel.title, fontsize="small")
+    axes.set_ylabel(panel.ylabel)
+    _finish(axes, legend=False)
+    axes.legend(fontsize="small", loc="best")
+
+
 def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | None, *, narrow: bool = False) -> Figure:
     with_motion = tr is not None and isinstance(situation.mode, Mode) and situation.described(tr)
     width, one, two = _SIZES[narrow]
@@ -129,10 +177,14 @@ def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, 
         if some:
             times, energies = [c.tr for c in some], [c.energy for c in some]
             axes.scatter(times, energies, s=28, facecolors=fill, edgecolors=_GOOD, zorder=3, label=name)
-    if level > 0 and float(history.energy.max()) > _LOGARITHMIC * level:
+    _show_level(axes, level, float(history.energy.max()))
+    axes.set_ylabel("internal energy")
+
+
+def _show_level(axes: Axes, level: float, highest: float) -> None:
+    if level > 0 and highest > _LOGARITHMIC * level:
         axes.set_yscale("log")
         axes.set_ylim(bottom=level / 10**_DECADES_BELOW_LEVEL)
-    axes.set_ylabel("internal energy")
 
 
 def _draw_motion(axes: Axes, situation: Situation, tr: float) -> None:
