@@ -26,6 +26,7 @@ _UNDESCRIBED = {
     "parts": "the signs of the parts cannot be followed from here to td",
     "oscillator": "not described by the oscillator",
 }
+_SAME_SWING = ("on the same swing as td: hardly anything is saved",)
 
 
 @dataclass(frozen=True)
@@ -91,11 +92,11 @@ def judge(situation: Situation, found: Sequence[Found]) -> tuple[Candidate, ...]
     if not found:
         return ()
     times = np.array([one.tr for one in found])
-    low, high = _interval(situation, times)
+    reaches = _reach(situation, found, times)
     measured = _measured(situation, times)
     return tuple(
-        _candidate(situation, one, known, low=float(a), high=float(b))
-        for one, known, a, b in zip(found, measured, low, high, strict=True)
+        _candidate(situation, one, known, low=one.tr - reach, high=one.tr + reach)
+        for one, known, reach in zip(found, measured, reaches.tolist(), strict=True)
     )
 
 
@@ -171,14 +172,17 @@ def _measured(situation: Situation, times: Samples) -> list[_OfVibration | None]
     return [next(found) if one else None for one in measured]
 
 
-def _interval(situation: Situation, times: Samples) -> tuple[Samples, Samples]:
-    """Bounds of the true tr, from the samples or, where an oscillator describes them, from its fit."""
-    history, td, fit, mode = situation.history, situation.td, situation.fit, situation.mode
+def _reach(situation: Situation, found: Sequence[Found], times: Samples) -> Samples:
+    """How far the true tr may lie away: of a match half a cell of the profile, else what the level leaves open."""
+    history, td, profile = situation.history, situation.td, situation.profile
+    fit, mode = situation.fit, situation.mode
     reach = sampled_reach(history, times, td)
     if mode and fit:
         described = np.array([situation.described(float(t)) for t in times])
         reach = np.where(described, fitted_reach(history, fit, mode, times, td), reach)
-    return times - reach, times + reach
+    if profile:
+        reach = np.where([one.kind == "match" for one in found], profile.cell(times) / 2, reach)
+    return reach
 
 
 def _candidate(situation: Situation, found: Found, known: _OfVibration | None, *, low: float, high: float) -> Candidate:
@@ -188,6 +192,8 @@ def _candidate(situation: Situation, found: Found, known: _OfVibration | None, *
     objections = tuple(_objections(situation, tr, known, level_error))
     rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
     parts = contributions(situation, tr) if known else ()
+    same_swing = situation.turns_since(tr) < 2
+    remarks = (*_SAME_SWING * same_swing, *_remarks(situation, (high - low) / 2, known, parts))
     return Candidate(
         rank=0,
         tr=tr,
@@ -207,9 +213,9 @@ def _candidate(situation: Situation, found: Found, known: _OfVibration | None, *
         tr_high=high,
         acceptable=not objections,
         recommended=False,
-        notes=objections + tuple(_remarks(situation, (high - low) / 2, known, parts)),
+        notes=objections + remarks,
         run_time_share=_run_time_share(situation, rigid_fraction),
-        same_swing=situation.turns_since(tr) < 2,
+        same_swing=same_swing,
         parts=parts,
     )
 
@@ -241,7 +247,7 @@ def _remarks(
 ) -> Iterator[str]:
     """What to know of this tr beside its acceptance."""
     if situation.vibration is None:
-        yield f"sign, lock-in error and residual unknown: {situation.no_mode}"
+        yield f"sign, lock-in error and residual unknown: {situation.no_vibration}"
     elif known is None:
         yield f"sign, lock-in error and residual unknown: {_UNDESCRIBED[situation.basis]}"
     if known and known.lock_in_error > measures.TOLERATED_GROWTH and parts:

@@ -36,12 +36,12 @@ class Expectation:
 
 
 def expectation(situation: Situation, energy_tr: float | None) -> Expectation | None:
-    """Estimate from the mean energy of the flight; None on another basis than "energy" and without a known flight.
+    """Estimate from the mean energy of the flight; None on another basis than "energy", without a flight or energy.
 
     ``energy_tr`` is what the recommended tr locks in [energy], None where nothing is recommended.
     """
     mean = mean_in_flight(situation)
-    if situation.basis != "energy" or mean is None:
+    if situation.basis != "energy" or mean is None or not situation.energy_td > 0:
         return None
     level = situation.energy_td / (2 * mean)
     ratio = None if energy_tr is None else energy_tr / (2 * mean)

@@ -17,8 +17,8 @@ from d2rpick.modes import sum_and_jacobian
 if TYPE_CHECKING:
     from d2rpick.history import Samples
 
-# Least difference of two rates over the record [rad]: below half a beat two modes act as one.
-_APART: Final = np.pi / 2
+# Least difference of two rates over the record to start from [rad]: below a quarter of a beat two modes act as one.
+_APART: Final = np.pi / 4
 # Of the variance: rates that leave more of it unexplained are none of the record's, and refining them is no use.
 _HOPELESS: Final = 0.5
 

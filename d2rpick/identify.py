@@ -36,6 +36,9 @@ _MODELS: Final = ((VIBRATION, 1.25), (WITH_PLASTIC, 1.5), (WITH_PRELOAD, 2.0))
 # apart, as they do a preload from a vibration.
 _SEVERAL: Final = (2, 3)
 _PERIODS_OF_SEVERAL: Final = 2.0
+# Least difference of two rates over the record [rad], half a beat of q: two modes nearer than that and out of step
+# make up any decay.
+_APART: Final = np.pi / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,6 +297,8 @@ def _implausible(mode: Mode | Modes, interval: float, least_periods: float, span
             f"the record shows {periods:.3g} vibration periods, fewer than the {least_periods} that tell a "
             "vibration from a drift"
         )
+    if mode.apart < _APART:
+        return "two of the modes have almost the same rate: their difference would not show within the record"
     if mode.alpha < -MAX_GROWTH:
         return (
             f"the vibration grows, alpha times the record's length is {mode.alpha:.2g}, below {-MAX_GROWTH}: "

@@ -73,6 +73,11 @@ class Mode:
         return self.omega
 
     @property
+    def apart(self) -> float:
+        """Least difference of the rates of two modes: there is no other [1/time]."""
+        return float("inf")
+
+    @property
     def omega_0(self) -> float:
         """Undamped angular rate, omega_0**2 = omega**2 + alpha**2 / 4 [1/time]."""
         return float(np.hypot(self.omega, self.alpha / 2))

@@ -64,6 +64,11 @@ class Modes:
         return max(mode.omega for mode in self.modes)
 
     @property
+    def apart(self) -> float:
+        """Least difference of the rates of two modes [1/time]."""
+        return float(np.diff(sorted(mode.omega for mode in self.modes)).min())
+
+    @property
     def alpha(self) -> float:
         """Damping, proportional to mass [1/time]."""
         return self.modes[0].alpha

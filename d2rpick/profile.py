@@ -39,6 +39,11 @@ class Profile:
         share = -fall / (rise - fall)
         return tuple((t[at] - left / 2 + share * (left + right) / 2).tolist())
 
+    def cell(self, at: Samples) -> Samples:
+        """Interval between the two times around each of ``at`` [time]."""
+        after = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
+        return np.asarray(self.time[after] - self.time[after - 1])
+
     def tolerance(self, tr: float, error: float) -> float:
         """How far ``tr`` may be off before ``error``, the one there, grows by 0.05; at most over all times [time]."""
         t, limit = self.time, error + measures.TOLERATED_GROWTH

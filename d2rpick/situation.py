@@ -90,6 +90,14 @@ class Situation:
         return self.energy_at(self.td)
 
     @property
+    def no_vibration(self) -> str | None:
+        """Why no deformation with its sign is known, None where one is."""
+        if self.vibration:
+            return None
+        unsigned = self.parts.unsigned if self.parts else ()
+        return "; ".join([self.no_mode or "", *(f"{part.name}: {part.reason}" for part in unsigned)])
+
+    @property
     def kinetic_share(self) -> float | None:
         """K, or None on basis "energy" [-]."""
         return measures.kinetic_share(self.vibration, self.td) if self.vibration else None

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # Peaks of a window that are tried, the highest first: the higher a peak of several modes, the less energy is kinetic.
 _MOST_PEAKS = 12
+# Where a flight may be known from, best first.
+_SOURCES = ("given", "momentum", "oscillator", "energy", None)
 
 
 def suggest_in_window(history: History, window: tuple[float, float], settings: Settings) -> Suggestion:
@@ -30,10 +32,12 @@ def suggest_in_window(history: History, window: tuple[float, float], settings: S
     for time in window:
         history.energy_at(time)
     situation = _flying(history, window, settings)
+    window_in_flight = window[0], min(window[1], situation.latest_td)
     if situation.vibration is None:
-        found = _highest(situation, window)
+        found = _highest(situation, window_in_flight)
     else:
-        td = _best_td(situation, situation.peaks(*window)) or _best_td(situation, window) or window[1]
+        peaks = situation.peaks(*window_in_flight)
+        td = _best_td(situation, peaks) or _best_td(situation, window_in_flight) or window[1]
         found = suggest(history, td, settings)
     return replace(found, td_window=window)
 
@@ -56,14 +60,10 @@ def advice(history: History, settings: Settings) -> str:
 
 
 def _flying(history: History, window: tuple[float, float], settings: Settings) -> Situation:
-    """Situation at the first of both ends and the middle of the window that lies in a flight, else at its end."""
+    """Situation at the start, middle or end of the window: in the flight that is known best, the first of these."""
     low, high = window
-    situation = examine(history, high, settings)
-    for td in (low, (low + high) / 2):
-        if situation.in_flight:
-            break
-        situation = examine(history, td, settings)
-    return situation
+    situations = [examine(history, td, settings) for td in (low, (low + high) / 2, high)]
+    return min(situations, key=lambda one: (not one.in_flight, _SOURCES.index(one.flight.source)))
 
 
 def _best_td(situation: Situation, times: tuple[float, ...]) -> float | None:

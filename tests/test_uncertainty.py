@@ -75,7 +75,7 @@ def test_intervals_of_a_fit_hold_the_true_crossing() -> None:
         noise = 0.01 * float(np.max(mode.energy(time))) * rng.normal(size=time.size)
         history = History(time, mode.energy(time) + noise, source=("test",), format="csv", channel="E")
         fit = identify(history.time, history.energy)
-        if not fit.describes_record or fit.mode is None:
+        if not fit.describes_record or not isinstance(fit.mode, Mode):
             continue
         td = 3.3
         for sign in (1, -1):

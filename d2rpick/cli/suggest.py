@@ -61,6 +61,7 @@ def command(
     from d2rpick.readers.balance import balance_of
     from d2rpick.report import suggestion as report
 
+    _check_times(td, td_window)
     run = shared.open_run(options)
     output = Output.of(options, *run.sources)
     history = run.history(shared.selection(options), with_momenta=True)
@@ -85,16 +86,20 @@ def command(
     finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
 
 
+def _check_times(td: float | None, window: tuple[float, float] | None) -> None:
+    """Raise UsageError where the times asked for make no sense, before a file is opened."""
+    if td is not None and window:
+        raise click.UsageError("--td and --td-window exclude each other")
+    if window and not window[0] < window[1]:
+        raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
+
+
 def _answer(history: History, td: float | None, window: tuple[float, float] | None, settings: Settings) -> Suggestion:
-    """Choose tr for ``td``, or both in ``window``; UsageError unless one of them is given."""
+    """Choose tr for ``td``, or both in ``window``; UsageError with what the record tells when neither is given."""
     from d2rpick.choice import suggest
     from d2rpick.window import advice, suggest_in_window
 
-    if td is not None and window:
-        raise click.UsageError("--td and --td-window exclude each other")
     if window:
-        if not window[0] < window[1]:
-            raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
         return suggest_in_window(history, window, settings)
     if td is None:
         raise click.UsageError(advice(history, settings))

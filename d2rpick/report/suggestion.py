@@ -25,13 +25,15 @@ def as_table(answer: Suggestion, limit: int) -> str:
     if left > 0:
         lines.append(f"... and {left} more (--limit)")
     lines += ["", f"recommended  {_pair(answer.recommended)}", f"better pair  {_pair(answer.better_td)}"]
+    lines += [f"{name.ljust(11)}  {text}" for name, text in outlook(answer)]
     return "\n".join(lines)
 
 
 def as_markdown(answer: Suggestion, limit: int) -> str:
     """The candidates as a Markdown table, and the two pairs below it."""
     table = tables.as_markdown(HEAD, rows(answer, limit))
-    return f"{table}\n\nrecommended: {_pair(answer.recommended)}\n\nbetter pair: {_pair(answer.better_td)}"
+    lines = [("recommended", _pair(answer.recommended)), ("better pair", _pair(answer.better_td)), *outlook(answer)]
+    return "\n\n".join([table, *(f"{name}: {text}" for name, text in lines)])
 
 
 def as_csv(answer: Suggestion) -> str:
@@ -57,6 +59,21 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
             "better_td": {"td": better.td, "tr": better.tr, "residual": better.residual} if better else None,
         }
     )
+
+
+def outlook(answer: Suggestion) -> list[tuple[str, str]]:
+    """What can be expected of the recommended pair, a name and a sentence each."""
+    lines = []
+    best = next((c for c in answer.candidates if c.recommended), None)
+    if best and best.run_time_share is not None:
+        rigid = f"rigid for {best.rigid_fraction:.0%} of the record"
+        lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's, {rigid}"))
+    expected = answer.expected
+    if expected:
+        at_level = f"{expected.ratio_at_level:.0%} with the energy of td"
+        own = "" if expected.ratio is None else f"about {expected.ratio:.0%} of the reference's, "
+        lines.append(("mean after", f"{own}{at_level}; mean in flight {expected.mean_energy:.6g} (estimate)"))
+    return lines
 
 
 def as_value(answer: Suggestion) -> str:
