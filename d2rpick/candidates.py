@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.situation import Situation
 
 
+# Of a radian: below, a time is the same but for rounding.
+_ZERO = 1e-9
 # Why a tr has no measures although the situation has a basis for them.
 _UNDESCRIBED = {
     "parts": "the signs of the parts cannot be followed from here to td",
@@ -122,9 +124,10 @@ def _from_mode(situation: Situation) -> list[Found]:
     if not mode or not situation.span:
         return []
     start = situation.span.start
-    times = np.array(mode.level_crossings(td, start))
+    before = start - _ZERO / mode.fastest  # the first sample counts like any other
+    times = np.maximum(mode.level_crossings(td, before), start)
     slopes = mode.energy_slopes(times)[0]
-    turns = np.array([t for t in mode.extrema(start, td) if situation.measured(t)])
+    turns = np.array([t for t in np.maximum(mode.extrema(before, td), start) if situation.measured(t)])
     near = measures.lock_in_error(situation.vibration or mode, turns, td) <= situation.settings.tolerance
     return [
         *(Found(t, "crossing", bool(up > 0)) for t, up in zip(times.tolist(), slopes, strict=True)),

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from d2rpick.history import Samples
 
 _EPS = float(np.finfo(np.float64).eps)
+# Of the amplitude: below, a deformation is zero but for rounding.
+_ZERO = 1e-9
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,9 @@ class Mode:
     def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
         """Find the times in (start, td), ascending, where the energy passes its level at ``td`` [time]."""
         level = float(self.deformation(td))
-        return tuple(sorted({t for q in (level, -level) for t in self.crossings(q, start, td)}))
+        # a level of zero is met once by each passage, whatever rounding makes of its sign
+        levels = {level, -level} if abs(level) > _ZERO * np.sqrt(self.vibration_energy(td)) else {0.0}
+        return tuple(sorted(t for q in levels for t in self.crossings(q, start, td)))
 
     def _roots(self, level_q: float, low: Samples, high: Samples, above_low: Samples) -> Samples:
         """Root of q = level_q in each bracket: Newton, and halving where Newton leaves the bracket."""

@@ -16,8 +16,8 @@ from d2rpick.flight import Flight, Span, described_span, energy_flight, identify
 from d2rpick.identify import Identification, assess, identify_several
 from d2rpick.modes import Modes
 from d2rpick.momentum import FreeFlight, flight_around
-from d2rpick.parts import Parts, PartVibration, read_parts
 from d2rpick.profile import Profile
+from d2rpick.signs import Parts, PartVibration, read_parts
 
 if TYPE_CHECKING:
     from d2rpick.history import History, Samples

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.command import ENERGY, GLSTAT, ROOT, run
+from tests.shared import shared
 
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
 NASTY = '<script>alert("1")</script>&<b>'
@@ -99,6 +100,20 @@ def test_parts_version_flight_and_health_are_told(tmp_path: Path) -> None:
     ):
         assert text in page.text
     assert "266 more" in page.text
+
+
+def test_a_pair_that_cannot_be_bettered_is_shown_once(tmp_path: Path) -> None:
+    page = page_of(tmp_path, "--td-window", "0.06", "0.07", ENERGY)
+    assert "Recommended" in page.text
+    assert "Better pair" not in page.text
+    assert page.source.count("<figure>") == 1
+
+
+def test_each_part_and_the_saving_are_told(tmp_path: Path) -> None:
+    chain = str(shared("openradioss/chain_referenceT01.gz"))
+    page = page_of(tmp_path, "--td", "0.13505", "--part", "spring1,spring2", "--cost-share", "0.9", chain)
+    for text in ("Parts at the recommended pair", "share of the mismatch", "run time", "2 modes"):
+        assert text in page.text
 
 
 def test_a_title_of_html_stays_text(tmp_path: Path) -> None:

@@ -109,10 +109,10 @@ def _answer(history: History, td: float | None, window: tuple[float, float] | No
 def _page(answer: Suggestion, run: Run, command: tuple[str, ...]) -> str:
     """Draw the figures, wide and narrow, and write the page around them."""
     from d2rpick import plots
-    from d2rpick.report.page import as_page
+    from d2rpick.report.page import as_page, better_pair
 
     drawings = {"Internal energy with its level at td, and the choice": plots.draw_suggestion}
-    if answer.better_td:
+    if better_pair(answer):
         drawings["The better pair"] = plots.draw_better
     figures = {
         caption: (

@@ -60,8 +60,9 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | Non
 
 
 def pairs(rows: Iterable[tuple[str, str]]) -> Markup:
-    """Give a list of names, each with what it stands for."""
-    return tag("dl", *(tag("div", tag("dt", name), tag("dd", text)) for name, text in rows))
+    """Give a list of names, each with what it stands for; nothing where there are none."""
+    listed = [tag("div", tag("dt", name), tag("dd", text)) for name, text in rows]
+    return tag("dl", *listed) if listed else Markup()
 
 
 def _text(cell: Cell) -> str:

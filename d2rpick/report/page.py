@@ -10,13 +10,14 @@ from d2rpick import __version__
 from d2rpick.report.health import measures_of
 from d2rpick.report.html import Markup, join, pairs, table, tag
 from d2rpick.report.situation import heading
-from d2rpick.report.suggestion import HEAD, rows
+from d2rpick.report.suggestion import HEAD, outlook, rows
 from d2rpick.report.tables import measure, short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.choice import Pair, Suggestion
+    from d2rpick.history import History
     from d2rpick.readers import Run
 
 # More rows than one compares by eye; csv and json hold all.
@@ -62,6 +63,7 @@ def _sections(
     yield _choice(answer)
     yield join(_figure(caption, *svg) for caption, svg in figures.items())
     yield _section("Candidates", *_candidates(answer))
+    yield _parts(answer)
     yield _section("What was read", _read(answer, run))
     yield _section("Health of the reference run", *_health(answer))
     yield _section("Method and limits", _resource("method.html"))
@@ -74,25 +76,49 @@ def _section(title: str, *content: str) -> Markup:
     return tag("section", tag("h2", title), *content)
 
 
+def better_pair(answer: Suggestion) -> Pair | None:
+    """Give the better pair where it is another one than that recommended, to the digits that people read."""
+    better, chosen = answer.better_td, answer.recommended
+    same = (
+        better and chosen and [short(t) for t in (better.tr, better.td)] == [short(t) for t in (chosen.tr, chosen.td)]
+    )
+    return None if same else better
+
+
 def _choice(answer: Suggestion) -> Markup:
-    unit = answer.situation.history.time_unit
-    cards = [_pair("Recommended", answer.recommended, unit, class_="card chosen")]
-    if answer.better_td:
-        cards.append(_pair("Better pair: td at the nearest peak", answer.better_td, unit, class_="card"))
+    history, better = answer.situation.history, better_pair(answer)
+    cards = [_pair("Recommended", answer.recommended, history, class_="card chosen")]
+    if better:
+        cards.append(_pair("Better pair: td at the nearest peak", better, history, class_="card"))
     warnings = [tag("li", tag("b", caution.code), f": {caution.message}") for caution in answer.cautions]
     listed = tag("ul", *warnings, class_="warnings") if warnings else Markup()
-    return tag("section", tag("div", *cards, class_="choice"), listed)
+    return tag("section", tag("div", *cards, class_="choice"), listed, pairs(outlook(answer)))
 
 
-def _pair(title: str, pair: Pair | None, unit: str, class_: str) -> Markup:
+def _pair(title: str, pair: Pair | None, history: History, class_: str) -> Markup:
     if pair is None:
         return tag("div", tag("h3", title), tag("p", "No tr can be recommended for this td."), class_=class_)
-    times = (tag("span", tag("i", n), f"{short(t)} {unit}".strip()) for n, t in (("tr", pair.tr), ("td", pair.td)))
+    unit = f" {history.time_unit}" if history.time_unit else ""
+    times = (tag("span", tag("i", name), f"{short(time)}{unit}") for name, time in (("tr", pair.tr), ("td", pair.td)))
     residual = "residual unknown" if pair.residual is None else f"residual {measure(pair.residual)}"
-    text = f"{residual}, rigid for {short(pair.td - pair.tr)} {unit}".strip()
+    share = (pair.td - pair.tr) / float(history.time[-1] - history.time[0])
+    text = f"{residual}, rigid for {short(pair.td - pair.tr)}{unit}, {share:.0%} of the record"
     exact = f"in full: tr = {pair.tr!r}, td = {pair.td!r}"
     lines = (tag("p", text), tag("p", exact, class_="soft"))
     return tag("div", tag("h3", title), tag("div", *times, class_="times"), *lines, class_=class_)
+
+
+def _parts(answer: Suggestion) -> Markup:
+    """Show what each part has of the mismatch at the recommended pair."""
+    best = next((candidate for candidate in answer.candidates if candidate.recommended), None)
+    if best is None or not best.parts:
+        return Markup()
+    sign = {True: "same", False: "opposite", None: "unknown"}
+    listed = [
+        (one.name, sign[one.sign_match], "-" if one.share is None else f"{one.share:.0%}", one.reason or "")
+        for one in best.parts
+    ]
+    return _section("Parts at the recommended pair", table(("part", "sign", "share of the mismatch", ""), listed))
 
 
 def _figure(caption: str, wide: str, narrow: str) -> Markup:

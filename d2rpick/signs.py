@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from d2rpick.envelope import Envelope
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.envelope import Envelope
     from d2rpick.history import Samples
     from d2rpick.mode import Mode
     from d2rpick.modes import Modes
@@ -103,24 +104,26 @@ def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Parts:
     >>> bool(np.abs(np.abs(found.deformation[0] @ one) - one @ one) < 1e-9)
     True
     """
-    signed, unsigned, unclear = [], [], []
+    signed: list[tuple[str, Samples]] = []
+    unsigned: list[Unsigned] = []
+    unclear: list[Samples] = []
     roots = np.sqrt(np.maximum(energies, 0.0)).T
     for name, root in zip(names, roots, strict=True):
-        zeros, doubts = _zeros(time, root)
-        deformation = np.where(np.searchsorted(zeros, time) % 2, -root, root)
-        reason = _no_sign(time, deformation, zeros)
+        zeros = _zeros(time, root)
+        deformation = np.where(np.searchsorted(zeros.sure, time) % 2, -root, root)
+        reason = _no_sign(time, deformation, zeros.sure)
         if reason:
             unsigned.append(Unsigned(name, reason))
         else:
             signed.append((name, deformation))
-            unclear += doubts.tolist()
+            unclear += [zeros.doubtful, zeros.unseen]
     total = float(np.sum(roots**2))
     held = sum(float(np.sum(column**2)) for _, column in signed)
     return Parts(
         names=tuple(name for name, _ in signed),
         time=time,
         deformation=np.array([column for _, column in signed]),
-        unclear=np.sort(np.array(unclear)),
+        unclear=np.sort(np.concatenate(unclear)) if unclear else np.zeros(0),
         unsigned=tuple(unsigned),
         unsigned_share=1 - held / total if total > 0 else 1.0,
     )
@@ -137,23 +140,29 @@ def _no_sign(time: Samples, deformation: Samples, zeros: Samples) -> str | None:
     return None
 
 
-def _zeros(time: Samples, root: Samples) -> tuple[Samples, Samples]:
-    """Times at which the deformation passes zero, and those at which it may or may not.
+class _Zeros(NamedTuple):
+    """Times at which a deformation passes zero, at which it may or may not, and, near the ends, cannot be seen to."""
 
-    Of the samples every one is taken, or every other, and so on: as many as leave the fewest doubts.
-    """
+    sure: Samples
+    doubtful: Samples
+    unseen: Samples
+
+
+def _zeros(time: Samples, root: Samples) -> _Zeros:
+    """Find the zeros from every sample, or every other, and so on: what leaves the fewest doubts."""
     best, stride = _zeros_of(time, root), 2
-    while best[1].size and _spacing(root[::stride]) >= _LEAST_APART:
+    while best.doubtful.size and _spacing(root[::stride]) >= _LEAST_APART:
         coarser = _zeros_of(time[::stride], root[::stride])
-        best, stride = min(best, coarser, key=lambda found: found[1].size), 2 * stride
+        best, stride = min(best, coarser, key=lambda found: found.doubtful.size), 2 * stride
     return best
 
 
-def _zeros_of(time: Samples, root: Samples) -> tuple[Samples, Samples]:
-    """Zeros and doubts from just these samples."""
+def _zeros_of(time: Samples, root: Samples) -> _Zeros:
+    """Zeros from just these samples."""
     at = _minima(root)
     # two samples to either side tell how the root bends; of a minimum nearer to an end nothing is known
-    inner = at[(at >= 2) & (at < root.size - 2)]
+    early, late = at < 2, at >= root.size - 2
+    inner = at[~early & ~late]
     around = inner[:, np.newaxis] + np.arange(-2, 3)
     times, roots = time[around], root[around]
     plain = _bend(times, roots)
@@ -165,14 +174,15 @@ def _zeros_of(time: Samples, root: Samples) -> tuple[Samples, Samples]:
     left = np.where(before < after, inner - 1, inner)[zero]
     weight = root[left] + root[left + 1]
     share = np.divide(root[left], weight, out=np.full(left.shape, 0.5), where=weight > 0)
-    outer = at[(at < 2) | (at >= root.size - 2)]
-    doubts = np.concatenate([time[inner[doubt]], time[outer]])
-    return time[left] + share * (time[left + 1] - time[left]), np.sort(doubts)
+    # a zero beside a minimum near an end may lie one sample further inwards
+    unseen = np.concatenate([time[at[early] + 1], time[at[late] - 1]])
+    return _Zeros(time[left] + share * (time[left + 1] - time[left]), time[inner[doubt]], unseen)
 
 
 def _minima(values: Samples) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Indices of local minima, of a flat one the first."""
-    return np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1
+    """Indices of local minima, of a flat one the first; an end below its neighbour counts."""
+    around = np.concatenate([[np.inf], values, [np.inf]])
+    return np.flatnonzero((values < around[:-2]) & (values <= around[2:]))
 
 
 def _spacing(values: Samples) -> float:
@@ -197,10 +207,15 @@ class PartVibration:
         """Signed deformations of the parts, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
         return self.parts.amplitudes(t)
 
-    def vibration_energy(self, t: Samples | float) -> Samples:
-        """Energy of the vibration, V = E + T, not below the E of the parts [energy]."""
-        return np.asarray(np.maximum(self.whole.vibration_energy(t), np.sum(self.amplitudes(t) ** 2, axis=0)))
-
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Kinetic energy of the vibration, T = V - E [energy]."""
-        return np.asarray(self.vibration_energy(t) - np.sum(self.amplitudes(t) ** 2, axis=0))
+        """Kinetic energy of the vibration, T: of the model, or what the estimate leaves beside E [energy]."""
+        if isinstance(self.whole, Envelope):
+            return np.maximum(self.whole.vibration_energy(t) - self._energy(t), 0.0)
+        return self.whole.kinetic_energy(t)
+
+    def vibration_energy(self, t: Samples | float) -> Samples:
+        """Energy of the vibration, V = E + T [energy]."""
+        return self._energy(t) + self.kinetic_energy(t)
+
+    def _energy(self, t: Samples | float) -> Samples:
+        return np.asarray(np.sum(self.amplitudes(t) ** 2, axis=0))

@@ -14,8 +14,8 @@ from d2rpick.choice import suggest
 from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threads
 from d2rpick.envelope import upper_envelope
 from d2rpick.history import History
-from d2rpick.parts import MOST_UNSIGNED, read_parts
 from d2rpick.readers import Selection, open_run
+from d2rpick.signs import MOST_UNSIGNED, read_parts
 from d2rpick.situation import Settings, Situation, examine
 from tests import chain
 from tests.records import printed
