@@ -76,7 +76,7 @@ def survey(run: Run, selection: Selection) -> Overview:
         channels=tuple(dict.fromkeys(name for database in run.databases for name in database.channels)),
         parts=tuple(_overviews(run)),
         flights=_flights(run, selection),
-        notes=tuple(dict.fromkeys(note for database in run.databases for note in database.notes)),
+        notes=run.notes,
     )
 
 

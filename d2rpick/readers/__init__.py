@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from d2rpick.errors import FormatError
 from d2rpick.readers import binout, csv_table, glstat, hdf5_file, matsum, radioss_th
+from d2rpick.readers.companions import check_companions
 from d2rpick.readers.database import Legs
 from d2rpick.readers.run import Run
 from d2rpick.readers.selection import Selection
@@ -71,14 +72,21 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
     for source in map(open_source, files):
         kinds.setdefault(input_format if input_format != "auto" else _format(source), []).append(source)
     ordered = [kind for kind in READERS if kind in kinds]
+    _refuse_time_of_solver(ordered, selection.time)
     databases = tuple(Legs(READERS[kind].open_legs(kinds[kind], selection)) for kind in ordered)
-    _check_companions(databases)
+    check_companions(databases)
     return Run(files, databases)
 
 
 def read_history(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> History:
     """Read one energy history; arguments and errors as of ``open_run``."""
     return open_run(names, selection, input_format).history(selection)
+
+
+def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
+    """Refuse ``--time`` where it would be passed over: solvers have one time and call it so."""
+    if time is not None and time.strip().casefold() != "time" and not {"csv", "hdf5"} & {*kinds}:
+        raise FormatError(f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave --time out")
 
 
 def _format(source: Source) -> str:
@@ -90,13 +98,3 @@ def _format(source: Source) -> str:
         f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected; "
         "export the energy history as text"
     )
-
-
-def _check_companions(databases: Sequence[Legs]) -> None:
-    """Refuse companions that cannot be of one run."""
-    for one in databases[1:]:
-        own, other = one.span, databases[0].span
-        if own[0] > other[1] or other[0] > own[1]:
-            raise FormatError(
-                f"{databases[0].source} and {one.source} have no time in common, files of one run were expected"
-            )

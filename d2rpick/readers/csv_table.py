@@ -41,9 +41,6 @@ _UTF8 = b"\xef\xbb\xbf"
 # How many rows from the start, the end and between are looked at to judge the printed format.
 _SAMPLE = 100
 
-# A restart steps back once; a column that does so in more than this share of its rows is no time.
-_MOST_BACK = 0.1
-
 
 def recognises(head: bytes) -> bool:
     """Whether this is text: what it says is seen when it is read."""
@@ -84,7 +81,7 @@ class Table:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of all columns but the time."""
+        """Names of all columns but the time, as far as they are sure."""
         return tuple(self._columns)
 
     @property
@@ -100,24 +97,17 @@ class Table:
 
     def find(self, wanted: str) -> str:
         """Name of a column that is meant by its name or 1-based number; FormatError with what there is."""
-        if wanted in self._columns:
+        if wanted in self._columns and wanted not in self._layout.names:
             return wanted
         column = _named_column(self.source, self._layout, wanted)
         if column == self._time:
-            raise FormatError(f"{self.source}: {wanted!r} is the time column; name the time and each energy once")
+            raise FormatError(f"{self.source}: {wanted!r} is the time column, not to be used twice; name an energy")
         return next(label for label, own in self._columns.items() if own == column)
 
     @property
     def time(self) -> Samples:
-        """Times as they stand in the file, shape (n,) [time]; FormatError when they step back all the time."""
-        time = self._values(self._time)
-        back, steps = int(np.count_nonzero(np.diff(time) < 0)), time.size - 1
-        if back > 1 and back > _MOST_BACK * steps:
-            raise FormatError(
-                f"{self.source}: time steps back at {back} of {steps} states, increasing times were expected; "
-                "name the time column with --time"
-            )
-        return time
+        """Times as they stand in the file, shape (n,) [time]."""
+        return self._values(self._time)
 
     @property
     def part_time(self) -> Samples:
@@ -126,6 +116,8 @@ class Table:
 
     def channel(self, name: str) -> Samples:
         """One column, shape (n,); FormatError with the line of a value that is no number."""
+        if name not in self._columns:
+            raise FormatError(f"{self.source}: no column {name!r}, only {listing(self.channels)}")
         return self._values(self._columns[name])
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:  # noqa: ARG002  as a Database
@@ -147,10 +139,7 @@ class Table:
             if selection.energy:
                 raise
             return [self._time, *self._columns.values()]
-        columns = [self._time, *(self._columns[name] for name in names)]
-        if len(set(columns)) < len(columns):
-            raise FormatError(f"{self.source}: a column is asked for twice; name the time and each energy once")
-        return columns
+        return [self._time, *(self._columns[name] for name in names)]
 
     def _values(self, column: int) -> Samples:
         if self._whole is not None and np.isfinite(self._whole[:, column]).all():
@@ -177,7 +166,7 @@ class Table:
 
 def _labelled(layout: Layout, time: int) -> dict[str, int]:
     """Columns beside the time by the name they are called by, with their number where a name is not theirs alone."""
-    names = [layout.channel(column) for column in range(layout.columns)]
+    names = [layout.channel(column) for column in range(layout.trusted)]
     return {
         name if names.count(name) == 1 else f"{name} (column {column + 1})": column
         for column, name in enumerate(names)
