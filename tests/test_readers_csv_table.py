@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
 from d2rpick.history import EXACT, Precision
-from d2rpick.readers import Run, Selection, csv_table
-from d2rpick.readers.database import Legs
-from d2rpick.readers.source import Source
+from d2rpick.readers import Selection, csv_table
+from tests.reading import history_of
 
 if TYPE_CHECKING:
     from d2rpick.history import History
@@ -24,8 +23,7 @@ ENERGIES = [1.5, 2.75, -3.125]
 
 def read(text: str | bytes, *energy: str, time: str | None = None) -> History:
     data = text if isinstance(text, bytes) else text.encode()
-    selection = Selection(time, energy)
-    return Run(("table",), (Legs(csv_table.open_legs([Source("table", data)], selection)),)).history(selection)
+    return history_of(csv_table, data, selection=Selection(time, energy), name="table")
 
 
 def table(separator: str = ",", decimal: str = ".", end: str = "\n", tail: str = "") -> str:
@@ -166,7 +164,7 @@ def test_the_time_by_name_and_number() -> None:
         (FOUR, ["5"], "no column '5'"),
         (FOUR, ["0"], "no column '0'"),
         (FOUR, ["KE", "ke"], "asked for twice"),
-        (FOUR, ["1"], "asked for twice"),
+        (FOUR, ["1"], "'1' is the time column, not to be used twice"),
         ("time,IE,ie\n0,1,2\n1,2,3\n", ["Ie"], "'Ie' may be any of these columns: 2 'IE', 3 'ie'"),
         ("time,IE,IE\n0,1,2\n1,2,3\n", [], "2 columns are named"),
         ("time,3,2\n0,1,2\n1,2,3\n", ["2"], "may be any of these"),

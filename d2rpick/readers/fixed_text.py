@@ -11,7 +11,7 @@ from __future__ import annotations
 from array import array
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ Addresses = NDArray[np.int64]
 UNSURE: Final = -1  # in place of an offset: the field is cut, or stands in the block twice
 
 _CHUNK: Final = 1 << 20  # bytes compared at a time: they stay in the cache between the two passes
-_FOLD: Final = 16  # short blocks compared as one: saves half the time
+_FOLD: Final = 16  # blocks side by side compared as one row: saves half the time
 _BATCH: Final = 1 << 14  # numbers converted at a time, for the same reason
 _RECENT: Final = 4  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
@@ -50,7 +50,7 @@ class Layout:
     follows in place of the next block.
     """
 
-    fields: Mapping[Hashable, int]
+    fields: Mapping[Any, int]
     literal: Bytes
     last: Hashable
     broken_off: bool
@@ -286,10 +286,10 @@ class Blocks:
             step = min(step, run.repeats - done)
             first = run.start + done * run.stride + offset
             rows: Bytes = np.ndarray((step, size), np.uint8, self._data, first, (run.stride, 1))
-            # A column is constant where its AND and its OR agree: two passes, nothing stored.
-            for together in (np.bitwise_and, np.bitwise_or):
-                if np.any(_reduced(together, rows) & literal != template):
-                    return done + int(np.argmax(np.any(rows & literal != template, axis=1)))
+            if step < _FOLD or not _all_like(template, literal, rows):
+                differs = (rows & literal != template).any(axis=1)
+                if differs.any():
+                    return done + int(differs.argmax())
             done += step
             if 2 * step * size <= _CHUNK:
                 step *= 2
@@ -353,13 +353,19 @@ class Blocks:
         return 0
 
 
-def _reduced(together: np.ufunc, rows: Bytes) -> Bytes:
-    """``together.reduce(rows, axis=0)``, with rows that lie side by side taken as fewer, longer ones."""
+def _all_like(template: Bytes, literal: Bytes, rows: Bytes) -> bool:
+    """Tell whether the literal bytes of all rows are those of the template, without storing anything.
+
+    A column is constant where its AND and its OR agree.
+    """
     count, size = rows.shape
-    if count % _FOLD or not rows.flags.c_contiguous:
-        return np.asarray(together.reduce(rows, axis=0))
-    folded = together.reduce(rows.reshape(count // _FOLD, _FOLD * size), axis=0)
-    return np.asarray(together.reduce(folded.reshape(_FOLD, size), axis=0))
+    if count % _FOLD == 0 and rows.flags.c_contiguous:
+        rows = rows.reshape(count // _FOLD, _FOLD * size)
+    for together in (np.bitwise_and, np.bitwise_or):
+        constant = together.reduce(rows, axis=0).reshape(-1, size)
+        if np.any(constant & literal != template):
+            return False
+    return True
 
 
 def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: int, behind: int) -> None:

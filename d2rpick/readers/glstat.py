@@ -27,10 +27,11 @@ if TYPE_CHECKING:
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
 _START: Final = b" time".ljust(32, b".")
+_WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
 _LAST: Final = "time per zone cycle.(nanosec)"  # in every glstat seen; mass scaling may add lines behind it
 _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTILINE)
-_VALUE: Final = re.compile(rb".{14}(?=([ \t].*)?$)")
+_VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")  # there is a line for each wall
 
 # In lines other than these: numbers, and what controls the time step.
 _CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*|(?<= is controlled by )[^\r\n]{1,40}")
@@ -118,9 +119,9 @@ def _describe(block: bytes) -> Layout:
         if value is None:
             fields[name] = UNSURE
             continue
-        if value[1] and value[1].strip():  # "wall# 1": there is a line for each wall
-            name += " " + " ".join(value[1].decode("latin-1").split())
-        literal[line.start(2) : line.start(2) + value.end()] = 0
+        if value[1]:
+            name += " " + " ".join(value[1].decode().split())
+        literal[line.start(2) : line.start(2) + _WIDTH] = 0
         fields[name] = UNSURE if name in fields else line.start(2)
     release(literal, block, _CHANGING, behind, len(block))
     return Layout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
@@ -130,4 +131,4 @@ def _is_whole(layout: Layout) -> bool:
     return _LAST in layout.fields
 
 
-_GRAMMAR: Final = Grammar(_START, _describe, _is_whole, width=14, decimals=5, compare_all=True)
+_GRAMMAR: Final = Grammar(_START, _describe, _is_whole, _WIDTH, decimals=5, compare_all=True)

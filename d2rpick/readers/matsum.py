@@ -20,7 +20,7 @@ from d2rpick.readers.database import SolverFile
 from d2rpick.readers.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.history import Samples
     from d2rpick.readers.selection import Selection
@@ -37,7 +37,7 @@ QUANTITIES: Final[Mapping[str, str]] = {
 }
 
 _START: Final = b" time ="
-_TIME: Final = (None, "time")
+_TIME: Final[tuple[int | None, str]] = (None, "time")
 _MAT: Final = "mat.#"  # the line a part begins with
 _LUMPED: Final = 0  # "mat.#=    0" holds the kinetic energy of lumped masses
 _UNREADABLE: Final = -1  # in place of a part number that is damaged or has overflowed
@@ -51,7 +51,7 @@ _LINE: Final = re.compile(
 )
 _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
 # A part number has 5 or, from 100000 on, 8 columns; a longer one, where it is printed, pushes the line.
-_ID: Final = re.compile(rb"(?=[ \d]{5} {13}i|[ \d]{8} {10}i|\d{9,} {10}i) *(\d+) +inten=")
+_ID: Final = re.compile(rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,}) {10}i) *(0|[1-9]\d*) +inten=")
 _CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")  # numbers in other lines
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
@@ -153,16 +153,18 @@ class Matsum(SolverFile):
     def _describe(self, block: bytes) -> Layout:
         literal = np.full(len(block), 255, np.uint8)
         behind = 0
-        fields: dict[Hashable, int] = {}
+        fields: dict[tuple[int | None, str], int] = {}
         part: int | None = None
         doubled = False
-        name: Hashable = None
+        name = _TIME
         for line in _LINE.finditer(block):
             release(literal, block, _CHANGING, behind, line.start())
             first, behind = line.span()
             if line[1] is not None:
                 part = self._part_number(line[1], block)
                 doubled = (part, _MAT) in fields
+                if doubled:  # two groups of lines: neither is sure
+                    fields.update({field: UNSURE for field in fields if field[0] == part})
                 fields[part, _MAT] = UNSURE if doubled else first - 1  # with the line end before it
             for field in _FIELD.finditer(block, first, behind):
                 name = (part, field[1].decode())
