@@ -7,7 +7,7 @@ attached to it and vibrates against it, so the set of parts that flies is looked
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,11 +20,18 @@ if TYPE_CHECKING:
 # Misfit that free flight may leave, as a share of the largest component's range over the record: contact shows at once,
 # a solver's own error is a tenth of it.
 TOLERANCE = 1e-3
-# Any smooth motion is straight for a moment.  Such a moment shrinks by the root of a tighter tolerance, free flight
-# hardly does: at a tenth of the tolerance at least half of the window must remain ...
-_TIGHTER, _REMAINS = 0.1, 0.5
-# ... and no window is shorter than this share of the record, or holds fewer states.
+# Any smooth motion obeys the law for a moment; what is left of it there grows with the cube of time or faster.  At a
+# tenth of the tolerance such a moment shrinks by the cube root, free flight hardly does: the limit lies halfway.
+_TIGHTER = 0.1
+# No window is shorter than this share of the record, or holds fewer states.
 _SHORTEST, _FEWEST = 0.05, 12
+# A momentum that changes by less than this share of itself is constant: single precision keeps seven digits.
+_CONSTANT = 1e-6
+# Where it is constant as far as the printed digits tell, the chosen parts must move this many times what these hide.
+_VISIBLE = 100
+# A set with more parts is preferred when its window is longer by this factor.  Some samples more prove nothing: parts
+# with a large momentum of their own, a sled, loosen the tolerance for the others.
+_LONGER = 1.1
 # Parts that may be attached are looked for in this share of the record before td, on so many states at most.
 _LOOK_BACK, _LOOK_STATES = 0.1, 200
 # Parts that are added to the chosen ones, at most, before all parts are tried.
@@ -78,7 +85,7 @@ class FreeFlight:
 
 
 def flight_around(momenta: Momenta, td: float) -> FreeFlight | None:
-    """Find the set of parts that flies freely around ``td`` for the longest time, and when.
+    """Find the set of parts that flies freely around ``td`` for clearly the longest time, and when.
 
     Unless the set is known, tried are the chosen parts, these with the parts that move most against them, and all.
 
@@ -96,7 +103,7 @@ def flight_around(momenta: Momenta, td: float) -> FreeFlight | None:
     best: FreeFlight | None = None
     for members in [momenta.flying] if momenta.flying else _sets(momenta, td):
         found = flight_of(momenta, members, td)
-        if found and (best is None or found.end - found.start > best.end - best.start):
+        if found and (best is None or found.end - found.start > _LONGER * (best.end - best.start)):
             best = found
     return best
 
@@ -108,19 +115,13 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float) -> FreeFlight
         return None
     extent = float(np.ptp(momentum, axis=0).max())
     noise = momenta.noise(members)
-    room = TOLERANCE * extent + noise
-    if extent == 0 or noise > TOLERANCE * extent:
-        return None
-    fit = _Fit(time, momentum)
-    first, last = fit.window(td, room)
-    length = time[last] - time[first]
-    if last - first + 1 < _FEWEST or length < _SHORTEST * (time[-1] - time[0]):
-        return None
-    tight_first, tight_last = fit.window(td, _TIGHTER * TOLERANCE * extent + noise)
-    if time[tight_last] - time[tight_first] < _REMAINS * length:
-        return None
     parts = None if momenta.parts is None else tuple(momenta.parts[i] for i in members)
-    return FreeFlight(float(time[first]), float(time[last]), parts, bool(last < time.size - 1))
+    if extent <= max(2 * noise, _CONSTANT * float(np.abs(momentum).max())):
+        return FreeFlight(float(time[0]), float(time[-1]), parts, False) if _moves(momenta, noise) else None
+    if noise > TOLERANCE * extent:
+        return None
+    window = _lasting_window(_Fit(time, momentum), td, extent, noise)
+    return window and FreeFlight(*window, parts, window[1] < time[-1])
 
 
 def all_flights(momenta: Momenta) -> tuple[FreeFlight, ...]:
@@ -130,9 +131,34 @@ def all_flights(momenta: Momenta) -> tuple[FreeFlight, ...]:
     for moment in np.linspace(time[0], time[-1], round(1 / _SHORTEST) + 1):
         if not found or moment > found[-1].end:
             flight = flight_around(momenta, float(moment))
-            if flight and (not found or flight.start >= found[-1].end):
-                found.append(flight)
+            if flight:  # the tolerance may let it begin some samples before the last one has ended
+                found.append(replace(flight, start=max(flight.start, found[-1].end)) if found else flight)
     return tuple(found)
+
+
+def _moves(momenta: Momenta, noise: float) -> bool:
+    """Whether a constant momentum that is known up to ``noise`` tells that the chosen parts fly: not of parts at rest.
+
+    Large parts print coarse numbers, behind which a load on the chosen ones may hide.
+    """
+    chosen = momenta.values[:, list(momenta.chosen)]
+    change = float(np.ptp(chosen, axis=0).max())
+    if change <= 2 * momenta.noise(momenta.chosen):
+        return bool(np.abs(chosen).max() > _VISIBLE * noise)
+    return change >= _VISIBLE * noise
+
+
+def _lasting_window(fit: _Fit, td: float, extent: float, noise: float) -> tuple[float, float] | None:
+    """Find the window around ``td`` with a misfit within the tolerance that a tighter one does not shrink, or None."""
+    time, room, tight = fit.time, TOLERANCE * extent + noise, _TIGHTER * TOLERANCE * extent + noise
+    first, last = fit.window(td, room)
+    length = time[last] - time[first]
+    if last - first + 1 < _FEWEST or length < _SHORTEST * (time[-1] - time[0]):
+        return None
+    tight_first, tight_last = fit.window(td, tight)
+    if time[tight_last] - time[tight_first] < (1 + np.cbrt(tight / room)) / 2 * length:
+        return None
+    return float(time[first]), float(time[last])
 
 
 class _Fit:
