@@ -117,7 +117,7 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float) -> FreeFlight
     noise = momenta.noise(members)
     parts = None if momenta.parts is None else tuple(momenta.parts[i] for i in members)
     if extent <= max(2 * noise, _CONSTANT * float(np.abs(momentum).max())):
-        return FreeFlight(float(time[0]), float(time[-1]), parts, False) if _moves(momenta, noise) else None
+        return FreeFlight(float(time[0]), float(time[-1]), parts, False) if _moves(momenta, members, noise) else None
     if noise > TOLERANCE * extent:
         return None
     window = _lasting_window(_Fit(time, momentum), td, extent, noise)
@@ -136,16 +136,17 @@ def all_flights(momenta: Momenta) -> tuple[FreeFlight, ...]:
     return tuple(found)
 
 
-def _moves(momenta: Momenta, noise: float) -> bool:
+def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
     """Whether a constant momentum that is known up to ``noise`` tells that the chosen parts fly: not of parts at rest.
 
-    Large parts print coarse numbers, behind which a load on the chosen ones may hide.
+    Large parts print coarse numbers, behind which a load on the chosen ones may hide.  Where these have no mass, as
+    springs, the members of the set count instead.
     """
-    chosen = momenta.values[:, list(momenta.chosen)]
-    change = float(np.ptp(chosen, axis=0).max())
-    if change <= 2 * momenta.noise(momenta.chosen):
-        return bool(np.abs(chosen).max() > _VISIBLE * noise)
-    return change >= _VISIBLE * noise
+    parts = momenta.chosen if momenta.values[:, list(momenta.chosen)].any() else members
+    values = momenta.values[:, list(parts)]
+    change = float(np.ptp(values, axis=0).max())
+    size = change if change > 2 * momenta.noise(parts) else float(np.abs(values).max())
+    return size > _VISIBLE * noise
 
 
 def _lasting_window(fit: _Fit, td: float, extent: float, noise: float) -> tuple[float, float] | None:

@@ -106,9 +106,8 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
     RangeError when td, --after or the fit window lie outside the record, or it has fewer than 3 states.
     """
     if history.time.size < 3:
-        raise RangeError(
-            f"{', '.join(history.source)}: {history.time.size} states were found, choosing needs at least 3"
-        )
+        found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
+        raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
     history.energy_at(td)
     if settings.after is not None:
         _inside(history, settings.after, "--after")

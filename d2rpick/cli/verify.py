@@ -10,6 +10,10 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.history import Part
+    from d2rpick.momentum import Track
     from d2rpick.readers import Run
     from d2rpick.situation import Situation
     from d2rpick.switched import Comparison
@@ -67,13 +71,19 @@ def _comparison(run: Run, situation: Situation, options: dict[str, Any]) -> Comp
 
     selection = shared.selection(options)
     other = open_run(options["switched"], selection, options["input_format"])
-    parts = situation.history.parts
-    together = situation.flight.parts or parts
+    flight, parts = situation.flight, situation.history.parts
+    together = flight.parts if flight.source == "momentum" else flight.parts or parts
     return compare(
         situation.history,
         other.history(selection),
         situation.td,
-        situation.latest_td,
-        momenta=(run.momentum(together), other.momentum(together)),
+        situation.latest_td if situation.latest_td > situation.td else float("inf"),
+        momenta=(run.momentum(together), _momentum(other, together)),
         centres=(run.centre(parts), other.centre(parts)) if parts else (None, None),
     )
+
+
+def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:
+    """Momentum of some parts, None also where the run does not have them all."""
+    missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
+    return None if missing else run.momentum(parts)
