@@ -53,6 +53,7 @@ def t01(
     code: int = 3040,
     title: int = 40,
     subset_variables: int = 2,
+    start: int = 0,
 ) -> T01Writer:
     made = T01Writer()
     made.record(struct.pack(">i", code) + b"made for tests".ljust(80))
@@ -76,7 +77,7 @@ def t01(
     for node in (5, 6, 7):
         made.record(struct.pack(">i", node) + b"corner".ljust(title))
     made.integers(*range(1, 7))
-    for state in range(states):
+    for state in range(start, start + states):
         made.reals([state / 8])
         made.reals([value(state, 0, code) for code in range(1, globals_ + 1)])
         made.reals([value(state, part.id, code) for part in parts for code in part.codes])

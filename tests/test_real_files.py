@@ -28,6 +28,9 @@ FOLDER = Path(os.environ.get("D2RPICK_REAL_FILES", Path(__file__).parents[2] / "
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no real files in {FOLDER}; set D2RPICK_REAL_FILES")
 
 
+FLOOR = 1.999999936531045e-20  # 2e-20 in single precision
+
+
 class Readable(NamedTuple):
     channel: str
     states: int
@@ -169,7 +172,7 @@ READABLE = {
     ),
     "ansys-example-data__result_files-binout-binout_glstat": Readable(
         "internal_energy", 251,
-        ((0.0, 1.999999936531045e-20), (0.0002490814949851483, 134183.59375), (0.0004991799360141158, 1540881.25)),
+        ((0.0, FLOOR), (0.0002490814949851483, 134183.59375), (0.0004991799360141158, 1540881.25)),
     ),
     "ansys-example-data__result_files-binout-binout_glstat.l2a-glstat": Readable(
         "internal energy", 251, ((0.0, 2e-20), (0.000249081, 134184.0), (0.00049918, 1540880.0)),
@@ -194,7 +197,7 @@ READABLE = {
     ),
     "lasso-python__sph_models-R12_2_1-binout": Readable(
         "internal_energy", 88,
-        ((0.0, 1.999999936531045e-20), (0.017561689019203186, 2.214533567428589), (0.03475764021277428, 2.214017152786255)),
+        ((0.0, FLOOR), (0.017561689019203186, 2.214533567428589), (0.03475764021277428, 2.214017152786255)),
     ),
     "lasso-python__sph_models-R12_2_1-binout.l2a-glstat": Readable(
         "internal energy", 88, ((0.0, 2e-20), (0.0175617, 2.21453), (0.0347576, 2.21402)),
@@ -205,7 +208,7 @@ READABLE = {
     ),
     "lasso-python__sph_models-R7_1_2-binout": Readable(
         "internal_energy", 88,
-        ((0.0, 1.999999936531045e-20), (0.01757276989519596, 2.353053331375122), (0.03478036820888519, 2.3515756130218506)),
+        ((0.0, FLOOR), (0.01757276989519596, 2.353053331375122), (0.03478036820888519, 2.3515756130218506)),
     ),
     "lasso-python__sph_models-R7_1_2-binout.l2a-glstat": Readable(
         "internal energy", 88, ((0.0, 2e-20), (0.0175728, 2.35305), (0.0347804, 2.35158)),
@@ -216,19 +219,19 @@ READABLE = {
     ),
     "lasso_ansys_glstat.h5": Readable(
         "internal_energy", 251,
-        ((0.0, 1.999999936531045e-20), (0.0002490814949851483, 134183.59375), (0.0004991799360141158, 1540881.25)),
+        ((0.0, FLOOR), (0.0002490814949851483, 134183.59375), (0.0004991799360141158, 1540881.25)),
     ),
     "pandas_fixed.h5": Readable(
         "glstat/internal_energy", 251,
-        ((0.0, 1.999999936531045e-20), (0.0002490814949851483, 134183.59375), (0.0004991799360141158, 1540881.25)),
+        ((0.0, FLOOR), (0.0002490814949851483, 134183.59375), (0.0004991799360141158, 1540881.25)),
     ),
     "pandas_fixed_rangeindex.h5": Readable(
         "glstat/internal_energy", 251,
-        ((0.0, 1.999999936531045e-20), (0.0002490814949851483, 134183.59375), (0.0004991799360141158, 1540881.25)),
+        ((0.0, FLOOR), (0.0002490814949851483, 134183.59375), (0.0004991799360141158, 1540881.25)),
     ),
     "pandas_table.h5": Readable(
         "glstat/internal_energy", 251,
-        ((0.0, 1.999999936531045e-20), (0.0002490814949851483, 134183.59375), (0.0004991799360141158, 1540881.25)),
+        ((0.0, FLOOR), (0.0002490814949851483, 134183.59375), (0.0004991799360141158, 1540881.25)),
     ),
 }  # fmt: skip
 
