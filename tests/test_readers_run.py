@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import READERS, Run, Selection, binout, csv_table, glstat, matsum, open_run, radioss_th
+from d2rpick.readers import READERS, Run, Selection, binout, csv_table, glstat, matsum, open_run, radioss_th, reader
 from d2rpick.readers.companions import check_companions
 from d2rpick.readers.database import Legs
 from d2rpick.readers.source import Source
@@ -35,9 +35,7 @@ def opened(files: Mapping[str, bytes], selection: Selection | None = None) -> Ru
         for kind in READERS
         if any(name.startswith(kind) for name in files)
     }
-    databases = tuple(
-        Legs(READERS[kind].open_legs(sources, selection or Selection())) for kind, sources in legs.items()
-    )
+    databases = tuple(Legs(reader(kind).open_legs(sources, selection or Selection())) for kind, sources in legs.items())
     check_companions(databases)
     return Run(tuple(files), databases)
 
