@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from d2rpick.history import Part, Precision, Samples
+    from d2rpick.history import Momenta, Part, Samples
 
 # Misfit that free flight may leave, as a share of the largest component's range over the record: contact shows at once,
 # a solver's own error is a tenth of it.
@@ -36,39 +36,6 @@ _LONGER = 1.1
 _LOOK_BACK, _LOOK_STATES = 0.1, 200
 # Parts that are added to the chosen ones, at most, before all parts are tried.
 _MOST_ATTACHED = 12
-
-
-@dataclass(frozen=True, eq=False)
-class Momenta:
-    """Momentum of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); None for parts: the whole model.
-
-    ``precision`` is that of the printed numbers; ``chosen`` are the indices of the parts to be switched, ``flying``
-    those of the set that is known to fly together, if it is.
-    """
-
-    time: Samples
-    values: Samples
-    parts: tuple[Part, ...] | None
-    precision: Precision
-    chosen: tuple[int, ...]
-    flying: tuple[int, ...] | None = None
-
-    def of(self, members: Sequence[int]) -> Samples:
-        """Sum over the parts with these indices, shape (n, 3)."""
-        return np.asarray(self.values[:, list(members)].sum(axis=1))
-
-    def noise(self, members: Sequence[int]) -> float:
-        """What the printed digits of these parts leave open in their sum [momentum]."""
-        largest = np.abs(self.values[:, list(members)]).max(axis=(0, 2), initial=0.0)
-        return sum(self.precision.quantum(float(value)) for value in largest) / 2
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """Vectors over time: ``time`` of shape (n,), ``values`` of shape (n, 3); a momentum, or the place of a part."""
-
-    time: Samples
-    values: Samples
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ import numpy as np
 from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
-    from d2rpick.history import History, Samples
-    from d2rpick.momentum import Track
+    from d2rpick.history import History, Samples, Track
 
 # A deviation of the momentum after td beyond this share of it is worth an objection: the motion is another one.
 MOST_MOMENTUM_ERROR = 0.05

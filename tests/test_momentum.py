@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.history import EXACT, Part, Precision
-from d2rpick.momentum import FreeFlight, Momenta, all_flights, flight_around, flight_of
+from d2rpick.history import EXACT, Momenta, Part, Precision
+from d2rpick.momentum import FreeFlight, all_flights, flight_around, flight_of
 from d2rpick.readers import open_run
 from tests.command import answer
 from tests.records import printed

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import RangeError
-from d2rpick.history import History
-from d2rpick.momentum import Track
+from d2rpick.history import History, Track
 from d2rpick.switched import MOST_MOMENTUM_ERROR, Comparison, compare
 from tests.command import OSCILLATOR, answer, run
 from tests.shared import shared

@@ -8,6 +8,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
+from d2rpick.cli.progress import reading
 
 EXAMPLES = """\b
 Examples:
@@ -39,9 +40,10 @@ def command(ctx: click.Context, /, td: float, limit: int, output_format: str, ex
     from d2rpick.choice import suggest
     from d2rpick.report import suggestion as report
 
-    run = shared.open_run(options)
-    output = Output.of(options, *run.sources)
-    history = run.history(shared.selection(options), with_momenta=True)
+    with reading(options["history"], quiet=options["quiet"]):
+        run = shared.open_run(options)
+        output = Output.of(options, *run.sources)
+        history = run.history(shared.selection(options), with_momenta=True)
     answer = suggest(history, td, shared.settings(options))
     output.notes(history.notes, answer.cautions)
     if options["plot"]:

@@ -8,12 +8,12 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
+from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.history import Part
-    from d2rpick.momentum import Track
+    from d2rpick.history import Part, Track
     from d2rpick.readers import Run
     from d2rpick.situation import Situation
     from d2rpick.switched import Comparison
@@ -43,12 +43,14 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
     from d2rpick.choice import verify, with_comparison
     from d2rpick.report import verdict as report
 
-    run = shared.open_run(options)
-    output = Output.of(options, *run.sources)
-    history = run.history(shared.selection(options), with_momenta=True)
+    with reading(options["history"], quiet=options["quiet"]):
+        run = shared.open_run(options)
+        output = Output.of(options, *run.sources)
+        history = run.history(shared.selection(options), with_momenta=True)
     answer = verify(history, tr, td, shared.settings(options))
     if options["switched"]:
-        answer = with_comparison(answer, _comparison(run, answer.situation, options))
+        with reading(options["switched"], quiet=options["quiet"]):
+            answer = with_comparison(answer, _comparison(run, answer.situation, options))
     output.notes(history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick import plots

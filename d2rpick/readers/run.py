@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.history import History
-from d2rpick.momentum import Momenta, Track
+from d2rpick.history import History, Momenta, Track
 from d2rpick.readers.companions import doubts
 from d2rpick.readers.names import listing, quantity_note
 from d2rpick.readers.selection import menu, select_parts
