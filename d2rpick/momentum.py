@@ -51,6 +51,11 @@ class FreeFlight:
     end_seen: bool
 
 
+def to_be_asked(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
+    """Give the momenta that may tell of flight, best first: all, or where a set was named to fly only that one's."""
+    return [one for one in momenta if one.flying] or momenta
+
+
 def flight_around(momenta: Momenta, td: float) -> FreeFlight | None:
     """Find the set of parts that flies freely around ``td`` for clearly the longest time, and when.
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.momentum import FreeFlight, all_flights
+from d2rpick.momentum import FreeFlight, all_flights, to_be_asked
+from d2rpick.readers.companions import doubts
 from d2rpick.readers.selection import select_parts
 
 if TYPE_CHECKING:
@@ -65,10 +66,13 @@ def survey(run: Run, selection: Selection) -> Overview:
     """Look at all databases of a run; of ``selection`` the parts matter, for the flights."""
     first = run.databases[0]
     notes = [note for database in run.databases for note in _notes(database)]
+    notes += doubts(run.databases)
+    states, time = None, np.empty(0)
     try:
-        time = first.time if first.channels else first.part_time
+        if first.span is not None:
+            time = first.time if first.channels else first.part_time
+        states = int(time.size)
     except FormatError as error:  # several columns may be the time: there is still a list of them
-        time = np.empty(0)
         notes.append(str(error))
     steps = np.diff(time)
     return Overview(
@@ -76,7 +80,7 @@ def survey(run: Run, selection: Selection) -> Overview:
         format=" + ".join(database.format for database in run.databases),
         version=next((d.version for d in run.databases if d.version), ""),
         title=next((d.title for d in run.databases if d.title), ""),
-        states=int(time.size) or None,
+        states=states,
         time_start=float(time[0]) if time.size else None,
         time_end=float(time[-1]) if time.size else None,
         time_unit=first.time_unit,
@@ -116,5 +120,5 @@ def _highest(run: Run, part: Part) -> float | None:
 def _flights(run: Run, selection: Selection) -> tuple[FreeFlight, ...]:
     parts = select_parts(selection.parts, run.parts, run.name) if selection.parts else None
     flying = select_parts(selection.flying, run.parts, run.name) if selection.flying else None
-    found = (all_flights(momenta) for momenta in run.momenta(parts, flying))
+    found = (all_flights(momenta) for momenta in to_be_asked(run.momenta(parts, flying)))
     return next(filter(None, found), ())
