@@ -42,7 +42,8 @@ class Overview:
     """What the files of a run hold.
 
     Times in the unit of the run, which ``time_unit`` gives only where a file names it.  ``sampling`` is None where
-    there is a single state; it, ``states`` and times are None where the time has to be chosen among several columns.
+    there is a single state; it and the times are None where there is no state, and they and ``states`` where the time
+    has to be chosen among several columns.
     ``flights`` are the windows in which the parts asked for, or all, fly freely by their momentum.
     """
 

@@ -12,6 +12,7 @@ from d2rpick.errors import FormatError
 from d2rpick.history import History, Precision
 from d2rpick.readers import Selection, glstat
 from tests.reading import history_of, run_of, states_of
+from tests.shared import shared_bytes
 
 HEAD = """\
  Internal energy of a time box, 1.0E+00
@@ -298,3 +299,23 @@ def test_no_bytes_raise_anything_else(data: bytes) -> None:
 )
 def test_recognised_by_content(head: str, expected: bool) -> None:
     assert glstat.recognises(head.encode()) is expected
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        "PILLARS-LSDyna__Bolt_B_Explicit-glstat",
+        "PILLARS-LSDyna__test_parachute-windflow_v1_thru_v10-glstat",
+        "ansys-example-data__result_files-binout-binout_glstat.l2a-glstat",
+    ],
+)
+def test_all_numbers_of_a_real_file_are_those_of_float(file: str) -> None:
+    data = shared_bytes(f"real/histories/{file}")
+    run = glstat.Glstat(data, file)
+    written: dict[str, list[float]] = {}
+    for text in data.decode("latin-1").split("\n"):
+        if text[31:32] == ".":
+            label = " ".join([text[1:32].rstrip(".").rstrip(), *text[46:].split()])
+            written.setdefault(label, []).append(float(text[32:46]))
+    assert run.time.tolist() == written.pop("time")
+    assert {name: run.channel(name).tolist() for name in run.channels} == written

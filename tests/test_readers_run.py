@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
+from d2rpick.overview import survey
 from d2rpick.readers import READERS, Run, Selection, binout, csv_table, glstat, matsum, open_run, radioss_th, reader
 from d2rpick.readers.companions import check_companions
 from d2rpick.readers.database import Legs
@@ -238,3 +239,14 @@ def test_a_time_column_is_no_choice_where_there_is_one_only(tmp_path: Path) -> N
     assert open_run([str(file)], Selection(time="Time")).history(Selection()).time.tolist() == TIMES.tolist()
     with pytest.raises(FormatError, match="no time 'cycle' in glstat, the time is 'time'; leave --time out"):
         open_run([str(file)], Selection(time="cycle"))
+
+
+def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
+    """No states, and curves of which none is the one that is meant."""
+    empty = survey(run_of(glstat, HEAD), Selection())
+    assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (0, None, None, ())
+    curves = survey(run_of(csv_table, "2\n1 'a IE'\n0,1\n1,2\n2 'b IE'\n0,1\n2,3\n3,4\n"), Selection())
+    assert (curves.states, curves.channels) == (None, ("a IE", "b IE"))
+    assert "2 curves are named like an internal energy; choose with --energy: 1 'a IE', 2 'b IE'" in curves.notes[0]
+    doubtful = opened({"glstat": GLSTAT, "matsum": matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))})
+    assert "are they of one run?" in survey(doubtful, Selection()).notes[0]

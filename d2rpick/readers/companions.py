@@ -29,7 +29,9 @@ def check_companions(databases: Sequence[Legs]) -> None:
 
 def doubts(databases: Sequence[Legs]) -> Iterator[str]:
     """Say which databases have hardly a state at the same time, within their printed digits."""
-    for one, other in combinations([database for database in databases if database.span], 2):
+    for one, other in combinations(databases, 2):
+        if not (one.span and other.span):
+            continue
         times = [_times(database) for database in (one, other)]
         room = sum(d.precisions(())[0].quantum(float(t[-1])) for d, t in zip((one, other), times, strict=True))
         coarse, fine = sorted(_common(*times), key=np.size)

@@ -99,8 +99,9 @@ class Legs:
     """
 
     def __init__(self, legs: Sequence[Database]) -> None:
-        self._files = sorted(legs, key=_start)
-        self._legs = [leg for leg in self._files if _start(leg) > -np.inf] or self._files
+        several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
+        self._files = sorted(legs, key=_start) if several else [*legs]
+        self._legs = [leg for leg in self._files if not several or _start(leg) > -np.inf] or self._files
 
     @property
     def source(self) -> str:
