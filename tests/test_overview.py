@@ -117,6 +117,27 @@ def test_hdf5_columns_are_listed(tmp_path: Path) -> None:
     assert {"a/internal_energy", "a/other"} <= set(found["channels"])
 
 
+def test_hdf5_columns_that_leave_the_choice_open_are_listed_with_the_reason(tmp_path: Path) -> None:
+    time = np.linspace(0, 1, 20)
+    file = tmp_path / "several.h5"
+    groups = ("a/time", "a/internal_energy", "b/time", "b/internal_energy")
+    file.write_bytes(table_hdf5(dict.fromkeys(groups, time)))
+    found = info(str(file))
+    assert set(groups) <= set(found["channels"])
+    assert (found["states"], found["time_start"], found["sampling"]) == (None, None, None)
+    assert any("2 columns for the internal energy" in note for note in found["notes"])
+    assert {run("info", str(file), "-f", name).exit_code for name in FORMATS} == {0}
+    assert info("--energy", "b/internal_energy", str(file))["states"] == 20
+
+
+def test_a_run_killed_before_its_first_state_has_none(matsum: Path) -> None:
+    head, *_ = matsum.read_text().split("\n time =")
+    matsum.write_text(head)
+    found = info(str(matsum))
+    assert (found["states"], found["time_start"], found["sampling"], found["flights"]) == (0, None, None, [])
+    assert found["title"] == "floating oscillator"
+
+
 def test_a_part_that_comes_and_goes_has_no_highest_energy(matsum: Path) -> None:
     head, *states = matsum.read_text().split("\n time =")
     gone = [re.sub(r" mat\.#=    2.*?(?= mat\.#=    3)", "", s, flags=re.DOTALL) if i > 5 else s for i, s in
