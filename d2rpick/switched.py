@@ -32,6 +32,7 @@ class Comparison:
     (standard deviations) are over the time from td to ``end``.  ``momentum_error`` is the largest deviation of the
     momentum behind the first state from td on, relative to the largest that the reference has there;
     ``displacement`` the largest distance there of the parts' centre from where the reference has it [length].
+    ``notes``: what was left out or assumed in reading the switched run and not the reference, and what is odd in it.
     """
 
     source: tuple[str, ...]
@@ -89,6 +90,7 @@ def compare(
     if before.size and after[0] == before[-1] and _reported_wrong(before[-1], after[1:]):
         after = after[1:]  # the switch comes at the first step from td on: this state was still rigid
     frozen, wanted = float(after[0]), reference.energy_at(td)
+    notes = tuple(note for note in switched.notes if note not in reference.notes)
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -101,7 +103,7 @@ def compare(
         spread_after_reference=float(reference_after.std()),
         momentum_error=_relative(*momenta, td, end),
         displacement=_distance(*centres, td, end),
-        notes=_reported(float(before[-1]), after) if before.size else (),
+        notes=(*notes, *(_reported(float(before[-1]), after) if before.size else ())),
     )
 
 

@@ -114,3 +114,11 @@ def test_an_oscillator_that_its_momentum_does_not_show_to_fly_is_said_so() -> No
     assert "no-free-flight" not in {c.code for c in cautions_of(examine(plain, 0.0687, Settings()))}
     given = {c.code for c in cautions_of(examine(history, 0.0687, Settings(after=0.001)))}
     assert "no-free-flight" not in given
+
+
+def test_where_nothing_can_be_chosen_the_table_says_so(tmp_path: Path) -> None:
+    file = tmp_path / "matsum"
+    run("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "-o", str(file))
+    result = run("suggest", "--td", "0.064", "--part", "frame", str(file))
+    assert result.exit_code == 1
+    assert "\nno candidates\n" in result.stdout

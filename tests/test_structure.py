@@ -111,8 +111,8 @@ def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
 
 
 def test_the_command_line_offers_the_formats_there_are() -> None:
-    assert options.FORMATS == tuple(READERS)
-    assert replay.FORMATS == tuple(TRAJECTORY_WRITERS)
+    assert tuple(READERS) == options.FORMATS
+    assert tuple(TRAJECTORY_WRITERS) == replay.FORMATS
 
 
 @pytest.mark.parametrize("name", ["py.typed", *(f"schemas/{name}-1.json" for name in ("suggest", "verify", "info"))])

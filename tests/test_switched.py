@@ -173,6 +173,13 @@ def test_a_wrong_energy_while_rigid_is_a_note_and_not_what_came_back(replayed: C
     assert f"note: {note}" in run("verify", *SWITCHES, "--part", "3", reference, "--switched", wrong).stdout
 
 
+def test_what_a_reader_has_to_say_of_the_switched_run_is_not_lost(replayed: Callable[..., str]) -> None:
+    cut = replayed("cut", *SWITCHES, change=lambda text: text[:-200])
+    found = verified(replayed("reference"), cut, "--part", "3")
+    assert any("stops inside" in note for note in found["switched"]["notes"])
+    assert found["history"]["notes"] == []
+
+
 def test_csv_and_markdown_hold_the_comparison_too(replayed: Callable[..., str]) -> None:
     args = ("verify", *SWITCHES, replayed("reference"), "--switched", replayed("switched", *SWITCHES))
     switched = answer(*args)["switched"]
