@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from d2rpick.situation import Situation
 
 
+# Of the amplitude, and of a radian: below, a deformation is zero and a time the same but for rounding.
+_ZERO = 1e-9
+
+
 @dataclass(frozen=True)
 class Candidate:
     """One tr for the td of a situation; fields are the keys of the JSON output, None where nothing can be said.
@@ -102,11 +106,14 @@ def _from_mode(situation: Situation) -> list[Found]:
     mode, td = situation.mode, situation.td
     if not mode or not situation.span:
         return []
-    start = situation.span.start
-    level = float(mode.deformation(td))
-    times = sorted({t for q in (level, -level) for t in mode.crossings(q, start, td)})
+    start, level = situation.span.start, float(mode.deformation(td))
+    # a level of zero is met once by each passage, whatever rounding makes of its sign
+    levels = {level, -level} if abs(level) > _ZERO * np.sqrt(mode.vibration_energy(td)) else {0.0}
+    # the first sample counts like any other: look from a little before it
+    before = start - _ZERO / mode.omega
+    times = sorted(max(t, start) for q in levels for t in mode.crossings(q, before, td))
     slope = mode.deformation(np.array(times)) * mode.velocity(np.array(times))
-    turns = np.array(mode.extrema(start, td))
+    turns = np.maximum(mode.extrema(before, td), start)
     near = measures.lock_in_error(mode, turns, td) <= situation.settings.tolerance
     return [
         *(Found(t, "crossing", bool(up > 0)) for t, up in zip(times, slope, strict=True)),
@@ -185,9 +192,13 @@ def _objections(situation: Situation, tr: float, of_mode: _OfMode | None, level_
     if earliest is None:
         yield "unknown: nothing shows when the load is over"
     elif tr < earliest:
-        yield f"before the end of the load at {earliest:.6g}"
+        yield f"before {situation.end_of_load}"
     if situation.td > situation.latest_td:
-        yield f"td after the end of the flight at {situation.latest_td:.6g}"
+        yield f"td after {situation.end_of_flight}"
+    if situation.drowned:
+        yield "the level at td has sunk into the scatter of the record"
+    if situation.prescribed and situation.mode is None:
+        yield "the prescribed oscillator does not describe the record at td"
     if situation.mode and of_mode is None:
         yield "not described by the oscillator"
     elif of_mode and not of_mode.sign_match:

@@ -58,6 +58,6 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
     if earliest is None:
         yield Caution("no-flight", "nothing in the record shows when the load is over; give that time with --after")
     elif td <= earliest:
-        yield Caution("td-in-load", f"td = {td:.6g} lies before the end of the load, {earliest:.6g}")
+        yield Caution("td-in-load", f"td = {td:.6g} lies before {situation.end_of_load}")
     if td > situation.latest_td:
-        yield Caution("td-after-contact", f"td = {td:.6g} lies after the end of the flight, {situation.latest_td:.6g}")
+        yield Caution("td-after-contact", f"td = {td:.6g} lies after {situation.end_of_flight}")

@@ -85,7 +85,8 @@ def verify(history: History, tr: float, td: float, settings: Settings) -> Verdic
     known = situation.flight.start is not None
     share = situation.kinetic_share
     limit = POOR_KINETIC_SHARE if settings.max_kinetic_share is None else settings.max_kinetic_share
-    td_ok = False if td > situation.latest_td else None if share is None else share <= limit
+    outside = td > situation.latest_td or (situation.earliest_tr is not None and td <= situation.earliest_tr)
+    td_ok = False if outside else None if share is None else share <= limit
     over = _over_limits(situation, candidate)
     reasons = (*candidate.notes, *over)
     return Verdict(
@@ -148,6 +149,8 @@ def _better_td(situation: Situation) -> Pair | None:
     """Give the nearest peak of the energy in the flight that has an acceptable tr, and the best one there."""
     for td in sorted(_peaks(situation), key=lambda peak: abs(peak - situation.td)):
         there = situation.at(td)
+        if situation.fitted and not there.mode:
+            continue  # the oscillator has sunk into the scatter there
         best = _best(there, rank(find_candidates(there)))
         if best:
             return Pair(best.tr, td, best.residual)
@@ -159,10 +162,9 @@ def _peaks(situation: Situation) -> list[float]:
     start, history = situation.earliest_tr, situation.history
     if start is None:
         return []
-    if situation.mode and situation.span:
-        return list(
-            situation.mode.peaks(max(start, situation.span.start), min(situation.latest_td, situation.span.end))
-        )
+    mode, span = situation.fitted, situation.span
+    if mode and span:
+        return list(mode.peaks(max(start, span.start), min(situation.latest_td, span.end)))
     extrema = find_extrema(history.time, history.energy)
     return [e.time for e in extrema if e.peak and start < e.time <= min(situation.latest_td, situation.td)]
 

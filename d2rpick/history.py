@@ -177,7 +177,11 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     if equal:
         notes.append(f"{equal} states have the same printed time as the next one; of equal times the last counts")
     if back:
-        notes.append(f"time steps back {back} times (restart); where legs overlap the newer one counts")
+        steps = "once" if back == 1 else f"{back} times"
+        lost = int(np.count_nonzero(~keep)) - equal
+        notes.append(
+            f"time steps back {steps} (restart); where legs overlap the newer one counts, {lost} older states gave way"
+        )
     return keep, tuple(notes)
 
 

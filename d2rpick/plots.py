@@ -25,6 +25,8 @@ _REFERENCE, _SWITCHED, _GOOD, _FLIGHT = "#000000", "#d55e00", "#009e73", "#56b4e
 # Beyond this ratio of the highest energy to the level, the level would vanish on a linear axis.
 _LOGARITHMIC = 20.0
 _DECADES_BELOW_LEVEL = 2.0
+# Up to so many candidates their marks leave the curve visible.
+_FEW = 40
 
 
 def format_of(name: str) -> str:
@@ -72,7 +74,7 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
 
 def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | None) -> Figure:
     with_motion = tr is not None and situation.described(tr)
-    figure = Figure(figsize=(9, 6.5 if with_motion else 4), layout="constrained")
+    figure = Figure(figsize=(10, 6.5 if with_motion else 4), layout="constrained")
     axes = figure.subplots(2 if with_motion else 1, 1, sharex=True, squeeze=False)[:, 0]
     _draw_energy(axes[0], situation, candidates, tr)
     if with_motion and tr is not None:
@@ -87,7 +89,8 @@ def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | N
 def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, ...], tr: float | None) -> None:
     history, level, flight = situation.history, situation.energy_td, situation.flight
     if flight.start is not None:
-        end = history.time[-1] if flight.end is None else flight.end
+        known = situation.span.end if situation.span else situation.td  # without a contact, as far as it was seen
+        end = known if flight.end is None else flight.end
         axes.axvspan(flight.start, end, color=_FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
     axes.plot(history.time, history.energy, color=_REFERENCE, linewidth=1, label=history.channel)
     axes.axhline(level, color=_SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
@@ -95,7 +98,10 @@ def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, 
         some = [c for c in candidates if c.acceptable == acceptable]
         if some:
             times, energies = [c.tr for c in some], [c.energy for c in some]
-            axes.scatter(times, energies, s=28, facecolors=fill, edgecolors=_GOOD, zorder=3, label=name)
+            size = 28 if len(candidates) <= _FEW else 8
+            axes.scatter(
+                times, energies, s=size, linewidths=0.7, facecolors=fill, edgecolors=_GOOD, zorder=3, label=name
+            )
     _mark(axes, tr, situation.td)
     if level > 0 and float(history.energy.max()) > _LOGARITHMIC * level:
         axes.set_yscale("log")
@@ -133,4 +139,4 @@ def _mark(axes: Axes, tr: float | None, td: float) -> None:
 def _finish(axes: Axes) -> None:
     axes.grid(visible=True, linewidth=0.3)
     axes.margins(x=0)
-    axes.legend(fontsize="small", loc="upper right")
+    axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from d2rpick import measures
 from d2rpick.errors import RangeError
 from d2rpick.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
-from d2rpick.identify import Identification, assess
+from d2rpick.identify import Identification, assess, identify
 from d2rpick.momentum import FreeFlight, flight_around, to_be_asked
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 # Where the scatter of the last period exceeds this share of the vibration energy at td, the vibration has sunk
 # into it: its sign is no longer certain.
 _DROWNED = 0.2
+# Beyond, squares of energies are no numbers any more; no unit system comes near.
+_LARGEST = 1e150
 
 
 @dataclass(frozen=True)
@@ -47,8 +50,7 @@ class Settings:
 class Situation:
     """A history seen from one td [time].
 
-    ``fit`` is None only where no oscillator was looked for; ``mode`` is its mode where it can be relied on at td,
-    else None, and then ``no_mode`` says why.  ``span`` is the window in which it describes the record.
+    ``fit`` is None only where no oscillator was looked for; ``span`` is the window in which it describes the record.
     """
 
     history: History
@@ -56,9 +58,39 @@ class Situation:
     settings: Settings
     flight: Flight
     fit: Identification | None
-    mode: Mode | None
     span: Span | None
-    no_mode: str | None
+
+    @cached_property
+    def mode(self) -> Mode | None:
+        """Mode of the oscillator where it can be relied on at td."""
+        return None if self.no_mode else self.fitted
+
+    @property
+    def fitted(self) -> Mode | None:
+        """Mode of the oscillator that describes the span, whatever it is worth at td."""
+        return self.fit.mode if self.fit and self.span else None
+
+    @cached_property
+    def no_mode(self) -> str | None:
+        """Why there is no mode to rely on at td."""
+        if self.fit is None:
+            return "no oscillator was looked for (--no-verify)"
+        if self.fit.reason:
+            what = (
+                "the given oscillator does not describe"
+                if self.settings.oscillator
+                else "no single oscillator describes"
+            )
+            return f"{what} the record: {self.fit.reason}"
+        if not self._in_span(self.td):
+            return "the oscillator does not describe the record at td"
+        assert self.fitted is not None  # there is a span
+        return _drowned(self.history, self.td, self.fitted, self.span)
+
+    @property
+    def drowned(self) -> bool:
+        """Whether an oscillator describes the record at td, but has sunk into its scatter there."""
+        return self.mode is None and self.fitted is not None and self._in_span(self.td)
 
     @property
     def basis(self) -> str:
@@ -76,9 +108,26 @@ class Situation:
         return measures.kinetic_share(self.mode, self.td) if self.mode else None
 
     @property
+    def prescribed(self) -> bool:
+        """Whether the user gave the oscillator, or the window to identify it in."""
+        return bool(self.settings.oscillator or self.settings.fit_window)
+
+    @property
     def earliest_tr(self) -> float | None:
         """Start of the flight with the margin, or None when unknown [time]."""
         return None if self.flight.start is None else self.flight.start + self.settings.margin
+
+    @property
+    def end_of_load(self) -> str:
+        """Words for ``earliest_tr``: the start of the flight, and the margin where one is kept."""
+        margin = f" with the margin {self.settings.margin:.6g}" if self.settings.margin else ""
+        return f"the end of the load at {self.flight.start:.6g}{margin}"
+
+    @property
+    def end_of_flight(self) -> str:
+        """Words for ``latest_td``: the end of the flight, and the margin where one is kept."""
+        margin = f" with the margin {self.settings.margin:.6g}" if self.settings.margin else ""
+        return f"the end of the flight at {self.flight.end:.6g}{margin}"
 
     @property
     def latest_td(self) -> float:
@@ -86,8 +135,11 @@ class Situation:
         return float("inf") if self.flight.end is None else self.flight.end - self.settings.margin
 
     def described(self, time: float) -> bool:
-        """Whether the oscillator describes the record at ``time``."""
-        return self.mode is not None and self.span is not None and self.span.start <= time <= self.span.end
+        """Whether there is an oscillator to rely on that describes the record at ``time``."""
+        return self.mode is not None and self._in_span(time)
+
+    def _in_span(self, time: float) -> bool:
+        return self.span is not None and self.span.start <= time <= self.span.end
 
     def energy_at(self, time: float) -> float:
         """Energy at ``time``: of the oscillator where it describes the record, of the samples elsewhere [energy]."""
@@ -109,13 +161,14 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
         found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
         raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
     history.energy_at(td)
+    largest = float(np.abs(history.energy).max())
+    if largest > _LARGEST:
+        raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
     if settings.after is not None:
         _inside(history, settings.after, "--after")
     seen = next(filter(None, (flight_around(momenta, td) for momenta in to_be_asked(history.momenta))), None)
     fit, span = _oscillator(history, td, settings, seen)
-    mode, no_mode = _reliable_mode(history, td, fit, span, given=settings.oscillator is not None)
-    flight = _flight(history, td, settings.after, seen, span)
-    return Situation(history, td, settings, flight, fit, mode, span, no_mode)
+    return Situation(history, td, settings, _flight(history, td, settings.after, seen, span), fit, span)
 
 
 def _oscillator(
@@ -124,14 +177,17 @@ def _oscillator(
     """Find the oscillator, given or identified, and the window around td that it describes."""
     if not settings.replay:
         return None, None
-    first, last = (seen.start, seen.end) if seen else (float(history.time[0]), float(history.time[-1]))
+    bounds = Span(seen.start, seen.end) if seen else Span(float(history.time[0]), float(history.time[-1]))
     if settings.after is not None:
-        first = min(settings.after, td)
-    fit = _given_fit(history, settings, first)
-    if fit is None:
-        span, fit = described_span(history, td, first, last)
-        return fit, span
-    return fit, span_of(history, td, fit, first, last) if fit.describes_record else None
+        bounds = bounds._replace(start=min(settings.after, td))
+    if settings.fit_window:
+        for bound in settings.fit_window:
+            _inside(history, bound, "--fit-window")
+        fit = identify_within(history, Span(*settings.fit_window))
+        return fit, span_of(history, td, fit, bounds) if fit.describes_record else None
+    fitter = partial(assess, settings.oscillator) if settings.oscillator else identify
+    span, fit = described_span(history, td, bounds, fitter, whole=seen is not None)
+    return fit, span
 
 
 def _flight(history: History, td: float, after: float | None, seen: FreeFlight | None, span: Span | None) -> Flight:
@@ -146,18 +202,6 @@ def _flight(history: History, td: float, after: float | None, seen: FreeFlight |
     return Flight(span.start, end, "oscillator") if span else energy_flight(history, td)
 
 
-def _given_fit(history: History, settings: Settings, first: float) -> Identification | None:
-    """Give the fit that the user prescribed, by an oscillator or by a window; None when it is to be searched."""
-    if settings.oscillator:
-        inside = history.time >= first
-        return assess(settings.oscillator, history.time[inside], history.energy[inside])
-    if settings.fit_window:
-        for bound in settings.fit_window:
-            _inside(history, bound, "--fit-window")
-        return identify_within(history, *settings.fit_window)
-    return None
-
-
 def _inside(history: History, time: float, option: str) -> None:
     if not history.time[0] <= time <= history.time[-1]:
         raise RangeError(
@@ -166,24 +210,15 @@ def _inside(history: History, time: float, option: str) -> None:
         )
 
 
-def _reliable_mode(
-    history: History, td: float, fit: Identification | None, span: Span | None, *, given: bool
-) -> tuple[Mode | None, str | None]:
-    """Give the mode of ``fit`` if it can be relied on at td, else None and why not."""
-    if fit is None:
-        return None, "no oscillator was looked for (--no-verify)"
-    if not fit.describes_record or fit.mode is None:
-        what = "the given oscillator does not describe" if given else "no single oscillator describes"
-        return None, f"{what} the record: {fit.reason}"
-    if span is None:
-        return None, "the oscillator does not describe the record at td"
-    period = 2 * np.pi / fit.mode.omega
-    last = (history.time >= max(td - period, span.start)) & (history.time <= max(td, span.start))
-    scatter = float(np.sqrt(np.mean((history.energy[last] - fit.mode.energy(history.time[last])) ** 2)))
-    vibration = float(fit.mode.vibration_energy(td))
-    if scatter > _DROWNED * vibration:
-        return None, (
-            f"at td the vibration energy {vibration:.3g} has sunk into the scatter of the record, {scatter:.3g}: "
-            "the sign of the deformation cannot be told"
-        )
-    return fit.mode, None
+def _drowned(history: History, td: float, mode: Mode, span: Span | None) -> str | None:
+    """Say so when the vibration at td is no more than the scatter of the record about it."""
+    assert span is not None  # td lies in it
+    last = (history.time >= max(td - 2 * np.pi / mode.omega, span.start)) & (history.time <= max(td, span.start))
+    scatter = float(np.sqrt(np.mean((history.energy[last] - mode.energy(history.time[last])) ** 2)))
+    vibration = float(mode.vibration_energy(td))
+    if scatter <= _DROWNED * vibration:
+        return None
+    return (
+        f"at td the vibration energy {vibration:.3g} has sunk into the scatter of the record, {scatter:.3g}: "
+        "the sign of the deformation cannot be told"
+    )

@@ -72,6 +72,19 @@ class _Group(click.Group):
 
                 click.echo(traceback.format_exc(), err=True, nl=False)
             raise click.ClickException(_one_line(error)) from error
+        except (
+            ArithmeticError,
+            AttributeError,
+            LookupError,
+            MemoryError,
+            RuntimeError,
+            TypeError,
+            ValueError,
+        ) as error:
+            if isinstance(error, click.exceptions.Exit | click.Abort) or ctx.meta.get("d2rpick.debug"):
+                raise
+            what = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            raise click.ClickException(f"a fault of this program, please report it with --debug ({what})") from error
 
     def main(self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any) -> NoReturn:  # type: ignore[override]
         extra["standalone_mode"] = False

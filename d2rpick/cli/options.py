@@ -45,6 +45,14 @@ class Number(click.ParamType[float]):
 # of d2rpick.readers, which is too heavy to be imported for --help; a test holds them together
 FORMATS = ("binout", "radioss-th", "glstat", "matsum", "hdf5", "csv")
 
+
+class Names(click.types.StringParamType):
+    """Names that an environment variable parts by semicolons, since labels hold blanks."""
+
+    envvar_list_splitter = ";"
+
+
+NAMES = Names()
 TIME = Number()
 POSITIVE = Number(0.0, above=True)
 NOT_NEGATIVE = Number(0.0)
@@ -69,14 +77,14 @@ def history_options(function: Decorated) -> Decorated:
         ),
         click.option("--time", metavar="NAME|NUMBER", help="Time column, by its name, number or HDF5 path."),
         click.option(
-            "--energy", metavar="NAME|NUMBER", multiple=True,
+            "--energy", metavar="NAME|NUMBER", multiple=True, type=NAMES,
             help="Energy column, label or HDF5 path; given several times, their sum.",
         ),
         click.option(
-            "--part", metavar="IDS", multiple=True,
+            "--part", metavar="IDS", multiple=True, type=NAMES,
             help="Parts to be switched, by number (3,7), range (10-19) or title; their energies are added.",
         ),
-        click.option("--flying", metavar="IDS", multiple=True, help="Parts that fly together with them."),
+        click.option("--flying", metavar="IDS", multiple=True, type=NAMES, help="Parts that fly together with them."),
     )(function)  # fmt: skip
 
 

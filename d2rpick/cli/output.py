@@ -31,13 +31,14 @@ class Output:
     @classmethod
     def of(cls, options: dict[str, Any], *inputs: str) -> Output:
         """Take the options of ``file_options``; D2RPickError when a file to be written may not be."""
-        output = cls(options["output_file"], options["overwrite"], options["quiet"], inputs)
+        file = None if options["output_file"] == "-" else options["output_file"]
+        output = cls(file, options["overwrite"], options["quiet"], inputs)
         plot = options.get("plot")
         if plot is not None:
             from d2rpick import plots
 
             plots.format_of(plot)
-        names = [name for name in (options["output_file"], plot) if name is not None]
+        names = [name for name in (file, plot) if name is not None]
         for name in names:
             output.claim(name)
         if len({os.path.realpath(name) for name in names}) < len(names):
