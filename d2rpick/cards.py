@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ WIDTH = 10
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17
 _NODES_PER_LINE = 10
+_COMMENT_WIDTH = 78
 _CAP_SHARE = 1000  # of the rigid window, per step: the release is at most a thousandth of it late
 
 _SET_HEAD = "$#   swset      code     time1     time2     time3     entno     relsw    paired"
@@ -37,7 +39,7 @@ _LS_DYNA = (
 )
 _UNCAPPED = (
     "DTMAX is 0: with nothing deformable left the step may grow without limit",
-    "  and the second switch comes late; a cap cures it.",
+    "  and the second switch comes late; --step-cap cures it.",
 )
 _UNMERGED = ("Parts that share nodes must be merged into one rigid body (LRB, --merge).",)
 _RADIOSS = (
@@ -190,8 +192,9 @@ def _ls_dyna_warnings(ids: Sequence[int], merge: int | None, step_cap: float) ->
 
 
 def _one_line(remarks: Sequence[str]) -> Iterator[str]:
-    """Remarks that cannot leave their comment line."""
-    return (" ".join(remark.split()) for remark in remarks)
+    """Remarks that cannot leave their comment lines, which are as long as those of the cards."""
+    for remark in remarks:
+        yield from textwrap.wrap(remark, _COMMENT_WIDTH, subsequent_indent="  ", break_long_words=False)
 
 
 def _header(swset: int, time: str, step_cap: str, counts: tuple[int, int]) -> Iterator[str]:

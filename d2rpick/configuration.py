@@ -48,9 +48,13 @@ class Configuration:
             exact = name in self.severity and name not in (*self.select, *self.ignore)
             if name in known or (not exact and name and any(rule.startswith(name) for rule in known)):
                 continue
-            near = difflib.get_close_matches(name.upper(), known, n=1)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise ConfigurationError(f"{where}no rule {name!r}, ids like D2R101 or their beginning were expected{hint}")
+            raise ConfigurationError(f"{where}no rule {name!r}, {expected_instead(name, known)}")
+
+
+def expected_instead(name: str, known: Collection[str]) -> str:
+    """What would have been a rule; the nearest one is named."""
+    near = difflib.get_close_matches(name.upper(), known, n=1)
+    return "an id like D2R101 or its beginning was expected" + (f"; did you mean {near[0]}?" if near else "")
 
 
 def find_configuration(folder: Path) -> Configuration:

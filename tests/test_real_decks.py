@@ -10,6 +10,7 @@ from collections import Counter
 
 import pytest
 
+from d2rpick.errors import DeckError
 from d2rpick.rules import Checked, check_deck
 from tests.shared import shared
 
@@ -35,11 +36,11 @@ FOUND: dict[str, dict[str, int]] = {
     "yaris/000_main.k": {"D2R003": 2},
     "yaris/fixed_ground.k": {},
     "yaris/implicit_control_cards_R9.k": {},
-    "radioss/HYPE_sensor_excerpt.rad": {},
-    "radioss/IDEL8_0000_rbody_excerpt.rad": {},
-    "radioss/IDEL8_0001.rad": {},
-    "radioss/IDEL8_0002.rad": {},
 }
+OF_RADIOSS = [
+    *("radioss/HYPE_sensor_excerpt.rad", "radioss/IDEL8_0000_rbody_excerpt.rad"),
+    *("radioss/IDEL8_0001.rad", "radioss/IDEL8_0002.rad"),
+]
 
 
 def check(name: str) -> Checked:
@@ -53,7 +54,14 @@ def test_findings(name: str) -> None:
 
 def test_all_decks_are_covered() -> None:
     folder = shared("real/decks")
-    assert {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()} == FOUND.keys()
+    files = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    assert files == FOUND.keys() | set(OF_RADIOSS)
+
+
+@pytest.mark.parametrize("name", OF_RADIOSS)
+def test_decks_of_another_solver_are_not_passed_silently(name: str) -> None:
+    with pytest.raises(DeckError, match="an LS-DYNA deck was expected"):
+        check(name)
 
 
 def test_the_disabled_card_is_shown_where_it_stands() -> None:

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
-from typing import TYPE_CHECKING
+import shlex
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from d2rpick.configuration import Configuration
 from d2rpick.errors import ConfigurationError, DeckError
-from d2rpick.rules import RULES, Case, Example, Rule, Severity, check_deck
+from d2rpick.rules import RULES, Example, Rule, Severity, check_deck
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
+from tests.command import answer, run
 from tests.decks import found, write
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from d2rpick.deck import Window
-    from d2rpick.rules.base import Objection
 
 PASSING = [(rule, example) for rule in RULES.values() for example in rule.passing]
 FAILING = [(rule, example) for rule in RULES.values() for example in rule.failing]
@@ -29,21 +28,36 @@ def names(examples: list[tuple[Rule, Example]]) -> list[str]:
     return [rule.id for rule, _ in examples]
 
 
+@cache
+def history(arguments: str) -> bytes:
+    """The energy history that ``d2rpick replay`` writes."""
+    return run("replay", *shlex.split(arguments)).stdout_bytes
+
+
+def findings(folder: Path, rule: Rule, example: Example) -> list[dict[str, Any]]:
+    """What the rule finds in an example, checked as `d2rpick rule` says."""
+    options = shlex.split(example.options)
+    if example.history:
+        (folder / "energy.csv").write_bytes(history(example.history))
+        options += ["--history", str(folder / "energy.csv")]
+    found = answer("check", write(folder, example.deck, example.files), *options)["findings"]
+    return [finding for finding in found if finding["rule"] == rule.id]
+
+
 @pytest.mark.parametrize(("rule", "example"), PASSING, ids=names(PASSING))
 def test_passing_examples(tmp_path: Path, rule: Rule, example: Example) -> None:
-    assert rule.id not in found(tmp_path, example.deck, example.files)
+    assert not findings(tmp_path, rule, example)
 
 
 @pytest.mark.parametrize(("rule", "example"), FAILING, ids=names(FAILING))
 def test_failing_examples(tmp_path: Path, rule: Rule, example: Example) -> None:
-    checked = check_deck(write(tmp_path, example.deck, example.files))
-    mine = [finding for finding in checked.findings if finding.rule == rule.id]
+    mine = findings(tmp_path, rule, example)
     assert mine
     for finding in mine:
-        assert finding.severity == rule.severity
-        assert "\n" not in finding.message
-        assert finding.line >= 1
-        assert finding.column >= 1
+        assert finding["severity"] == rule.severity
+        assert "\n" not in finding["message"]
+        assert finding["line"] >= 1
+        assert finding["column"] >= 1
 
 
 def test_every_rule_has_examples_and_an_explanation() -> None:
@@ -106,23 +120,6 @@ def test_decks_are_judged_apart(tmp_path: Path) -> None:
     assert [finding.deck for findings in alone for finding in findings if finding.rule == "D2R101"] == decks
     with pytest.raises(DeckError):
         check_deck(str(tmp_path / "absent.k"))
-
-
-def test_a_rule_may_ask_the_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def energy(case: Case) -> Iterator[Objection]:
-        for window in case.windows.windows:
-            if case.judge and (message := case.judge(window).get("D2R201")):
-                yield window.opened.by.time_field, message
-
-    def judge(window: Window) -> Mapping[str, str]:
-        return {"D2R201": f"too much energy at {window.tr}"}
-
-    rule = replace(RULES["D2R101"], id="D2R201", check=energy)
-    monkeypatch.setattr("d2rpick.rules.RULES", {**RULES, "D2R201": rule})
-    coarse = write(tmp_path, GOOD.replace("    0.0001", "      0.01"))
-    assert {finding.rule for finding in check_deck(coarse).findings} == {"D2R111"}
-    (finding,) = check_deck(coarse, judge=judge).findings
-    assert finding.message == "too much energy at 0.02"
 
 
 def test_one_wrong_id_does_not_hide_another(tmp_path: Path) -> None:

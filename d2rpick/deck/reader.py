@@ -70,9 +70,11 @@ def read_deck(path: str) -> Deck:
     Raises
     ------
     DeckError
-        If the deck itself cannot be read, or includes multiply without end.
+        If the deck itself cannot be read or is none, or includes multiply without end.
     """
     deck = Deck(path)
+    if next(SourceFile(path).blocks(), None) is None:
+        raise DeckError(f"{path}: no keyword was found (a line that begins with *), an LS-DYNA deck was expected")
     _Reader(deck).read(path, _Context(deck.scope))
     return deck
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck import Window
-    from d2rpick.rules import Checked, Finding
+    from d2rpick.rules import Checked, Finding, Unreadable
 
 SCHEMA: Final = "d2rpick/check/1"
 SARIF_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
@@ -28,28 +28,39 @@ _SARIF: Final = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.
 _NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def as_table(results: Sequence[Checked], root: Path) -> str:
-    """Findings and windows of each deck, one per line, and how many there are."""
+def as_table(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable] = ()) -> str:
+    """Findings and windows of each deck, one per line, and how many there are; decks that ``failed`` are counted."""
     lines: list[str] = []
     for result in results:
         lines.append(_shown(result.deck, root))
+        if not result.cards:
+            lines.append("  no switching cards")
         lines += [f"  {line}" for line in _window_lines(result.windows, root)]
         lines += [
             f"  {_shown(f.file, root)}:{f.line}:{f.column}: {f.severity} {f.rule} {f.message}" for f in result.findings
         ]
-    return "\n".join([*lines, "", _summary_line(results)])
+    left_out = f", {len(failed)} not checked" if failed else ""
+    return "\n".join([*lines, "", _summary_line(results) + left_out])
 
 
 def as_json(
-    results: Sequence[Checked], root: Path, command: Sequence[str], warnings: Sequence[Mapping[str, str]] = ()
+    results: Sequence[Checked],
+    root: Path,
+    command: Sequence[str],
+    warnings: Sequence[Mapping[str, str]] = (),
+    history: Sequence[str] | None = None,
 ) -> str:
-    """Give everything by schema d2rpick/check/1; paths are relative to ``root`` where they lie below it."""
+    """Give everything by schema d2rpick/check/1; paths are relative to ``root`` where they lie below it.
+
+    ``history`` are the files the windows were judged by, None without any.
+    """
     content = {
         "schema": SCHEMA,
         "tool_version": __version__,
         "command": list(command),
         "warnings": [dict(warning) for warning in warnings],
         "decks": [_shown(result.deck, root) for result in results],
+        "history": None if history is None else [_shown(name, root) for name in history],
         "windows": [_window(result, window, root) for result in results for window in result.windows],
         "findings": [_finding(finding, root) for result in results for finding in result.findings],
         "summary": {**_counts(results), "decks": len(results)},
@@ -57,19 +68,31 @@ def as_json(
     return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
 
 
-def as_github(results: Sequence[Checked], root: Path) -> str:
+def as_github(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable] = ()) -> str:
     """Workflow commands that GitHub Actions shows beside the lines of a deck."""
-    return "\n".join(
+    found = [
         f"::{_GITHUB[f.severity]} file={_escaped(_shown(f.file, root), ',:')},line={f.line},col={f.column},"
         f"title={f.rule}::{_escaped(f.message)}"
         for result in results
         for f in result.findings
-    )
+    ]
+    found += [f"::error file={_escaped(_shown(one.deck, root), ',:')}::{_escaped(one.reason)}" for one in failed]
+    return "\n".join(found)
 
 
-def as_junit(results: Sequence[Checked], root: Path, fail_on: Severity = Severity.ERROR) -> str:
+def as_junit(
+    results: Sequence[Checked],
+    root: Path,
+    fail_on: Severity = Severity.ERROR,
+    failed: Sequence[Unreadable] = (),
+) -> str:
     """One suite per deck, one case per finding; those lighter than ``fail_on`` pass and only say their message."""
     suites = ET.Element("testsuites", name="d2rpick check")
+    for one in failed:
+        name = _xml(_shown(one.deck, root))
+        suite = ET.SubElement(suites, "testsuite", name=name, tests="1", failures="0", errors="1")
+        case = ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
+        ET.SubElement(case, "error", type="unreadable-deck", message=_xml(one.reason))
     for result in results:
         failures = sum(finding.severity.rank <= fail_on.rank for finding in result.findings)
         suite = ET.SubElement(
@@ -94,7 +117,7 @@ def as_junit(results: Sequence[Checked], root: Path, fail_on: Severity = Severit
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(suites, encoding="unicode")
 
 
-def as_sarif(results: Sequence[Checked], root: Path) -> str:
+def as_sarif(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable] = ()) -> str:
     """SARIF 2.1.0 with all rules; ids are stable."""
     ids = list(RULES)
     driver = {
@@ -128,7 +151,20 @@ def as_sarif(results: Sequence[Checked], root: Path) -> str:
         for result in results
         for f in result.findings
     ]
-    run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": found}
+    messages = [
+        {
+            "level": "error",
+            "message": {"text": one.reason},
+            "locations": [{"physicalLocation": {"artifactLocation": {"uri": _uri(one.deck, root)}}}],
+        }
+        for one in failed
+    ]
+    run = {
+        "tool": {"driver": driver},
+        "columnKind": "unicodeCodePoints",
+        "invocations": [{"executionSuccessful": not failed, "toolExecutionNotifications": messages}],
+        "results": found,
+    }
     return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2, ensure_ascii=False)
 
 

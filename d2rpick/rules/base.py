@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from d2rpick.deck import Deck, Parts, SwitchSet, Window, Windows, find_windows, read_parts, read_switching
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
     from d2rpick.deck.card import Card
     from d2rpick.deck.rows import Field, Value
 
-Judge = Callable[[Window], Mapping[str, str]]
-"""Judges a window by an energy history: the objections, by the id of the rule they belong to."""
+
+class Fault(NamedTuple):
+    """What an energy history has against a window: the rule it belongs to, at which end, and why."""
+
+    rule: str
+    at_td: bool
+    message: str
+
+
+class Judge(Protocol):
+    """Judges windows by an energy history."""
+
+    @property
+    def end(self) -> float:
+        """Last time of the history."""
+
+    def faults(self, window: Window) -> Sequence[Fault]:
+        """Everything that speaks against a window; nothing when it is a good one."""
 
 
 class Severity(StrEnum):
@@ -42,6 +59,14 @@ class Finding:
     file: str
     line: int
     column: int
+
+
+@dataclass(frozen=True)
+class Unreadable:
+    """A deck that could not be checked, and why."""
+
+    deck: str
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +118,16 @@ Objection = tuple["Field", str]
 
 @dataclass(frozen=True)
 class Example:
-    """A deck, and the files it includes by name."""
+    """A deck, and the files it includes by name.
+
+    ``history`` are arguments of ``d2rpick replay`` that write the energy history it is checked with, ``options``
+    further ones of ``d2rpick check``.
+    """
 
     deck: str
     files: Mapping[str, str] = field(default_factory=dict)
+    history: str = ""
+    options: str = ""
 
 
 @dataclass(frozen=True)
