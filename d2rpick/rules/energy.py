@@ -71,7 +71,7 @@ RULES: Final = (
         "error where an oscillator describes the record, else by the level error.",
         partial(_faults, "D2R201"),
         (*_PASSING, Example(GOOD)),
-        (_pair("0.01", "0.07"), _pair("0.012", ".0687534", "--tolerance 0.05")),
+        (_pair("0.017", ".0687534"), _pair("0.0135", ".0687534", "--tolerance 0.05")),
     ),
     Rule(
         "D2R202",
