@@ -63,12 +63,13 @@ class SourceFile:
         """Return the number of the line, from 1, that holds the byte at ``offset``."""
         known = bisect_right(self._counted, (offset, 1 << 62)) - 1
         position, line = self._counted[known]
-        while position < offset:
-            piece = self.read(position, min(offset, position + _CHUNK))
-            if not piece:
-                break
-            line += piece.count(b"\n")
-            position += len(piece)
+        buffer = bytearray(min(_CHUNK, max(0, offset - position)))
+        with self._open() as stream:
+            stream.seek(position)
+            while position < offset and (count := stream.readinto(buffer)):
+                count = min(count, offset - position)
+                line += buffer.count(b"\n", 0, count)
+                position += count
         if known == len(self._counted) - 1 and position > self._counted[-1][0]:
             self._counted.append((position, line))
         return line
