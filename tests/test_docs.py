@@ -5,14 +5,18 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick import __version__
 from d2rpick.cli import COMMANDS
+from d2rpick.configuration import read_configuration
 from d2rpick.readers import READERS
-from tests.command import ROOT, run
+from d2rpick.rules import RULES
+from tests.command import DECK, GLSTAT, ROOT, run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -58,7 +62,7 @@ def test_the_sessions_in_the_readme_show_what_the_commands_print(
         printed = f"{result.stderr}{result.stdout}".rstrip("\n")
         assert f"{line}\n{rounded(printed)}" == f"{line}\n{rounded(shown)}"
         ran.add(args[0])
-    assert {"suggest", "verify"} <= ran
+    assert {"suggest", "verify", "check", "card"} <= ran
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -94,6 +98,31 @@ def test_ci_runs_the_test_command_of_the_readme_and_nothing_else() -> None:
     assert len(own) == 1
     assert "pytest" in own[0]
     assert f"{own[0]}\n" in blocks("sh")
+
+
+def test_the_jobs_in_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(DECK, "main.k")
+    shutil.copy(GLSTAT, "glstat")
+    calls = re.findall(r"- (?:run: )?d2rpick (.*)", "".join(blocks("yaml")))
+    assert len(calls) == 2
+    assert [run(*shlex.split(call)).exit_code for call in calls] == [1, 1]
+    (report,) = re.findall(r"junit: (.*)", README)
+    assert "<failure" in Path(report).read_text("utf-8")
+
+
+def test_the_configuration_in_the_readme_is_one() -> None:
+    (block,) = blocks("toml")
+    read_configuration(tomllib.loads(block)).verify(RULES)
+
+
+def test_the_pre_commit_hook_is_the_one_of_the_readme() -> None:
+    hook = dict(re.findall(r"(\w+): (.*)", (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8")))
+    assert f"      - id: {hook['id']}\n" in README
+    assert hook["entry"].split() == ["d2rpick", "check"]
+    assert [bool(re.search(hook["files"], name)) for name in ("a/run.k", "RUN.KEY", "x.dyn", "k.py", "glstat")] == [
+        *(True, True, True, False, False)
+    ]
 
 
 def test_the_two_commands_of_the_readme_are_one_line_each() -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.command import ENERGY, GLSTAT, ROOT
+from tests.command import DECK, ENERGY, GLSTAT, ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,14 +20,20 @@ PACKAGE = ROOT / "d2rpick"
 
 # Each module imports only from those above it.
 ORDER = (
-    "d2rpick", "errors", "history",
+    "d2rpick", "errors", "configuration", "cards",
+    "deck.source", "deck.expression", "deck.rows", "deck.parameters", "deck.card", "deck.includes", "deck.reader",
+    "deck.parts", "deck.elements", "deck.switching", "deck.windows", "deck",
+    "rules.base", "rules.example_decks", "rules.reading", "rules.pairs", "rules.times", "rules.switched_parts",
+    "rules.energy", "rules.scope", "rules",
+    "history",
     "readers.source", "readers.names", "readers.printed", "readers.layout", "readers.csv_table", "readers.glstat",
     "readers",
     "crossings", "oscillator", "mode", "fitting", "identify", "measures", "replay", "flight", "situation",
-    "cautions", "uncertainty", "choice",
-    "report", "report.tables", "report.situation", "report.suggestion", "report.verdict",
+    "cautions", "uncertainty", "choice", "rules.judgement", "judged_card",
+    "report", "report.findings", "report.rules",
+    "report.tables", "report.situation", "report.suggestion", "report.verdict",
     "writers", "plots",
-    "cli", "cli.options", "cli.output", "cli.suggest", "cli.verify", "cli.replay",
+    "cli", "cli.options", "cli.output", "cli.check", "cli.rule", "cli.card", "cli.suggest", "cli.verify", "cli.replay",
     "__main__",
 )  # fmt: skip
 # The only modules that may import these.
@@ -96,6 +102,19 @@ def test_help_and_version_load_no_numbers(args: tuple[str, ...]) -> None:
     assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.history", "d2rpick.choice"})
 
 
+@pytest.mark.parametrize(
+    "args",
+    [
+        ("check", "-f", "json", DECK),
+        ("rule", "D2R201"),
+        ("card", "--tr", "0.02", "--td", "0.09", "--part", "1"),
+        ("card", "--solver", "radioss", "--tr", "0.02", "--td", "0.09", "--node", "1", "--end", "1"),
+    ],
+)
+def test_decks_and_cards_need_no_numbers_without_a_history(args: tuple[str, ...]) -> None:
+    assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.history", "d2rpick.choice"})
+
+
 @pytest.mark.parametrize("source", [ENERGY, GLSTAT])
 def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
     modules = loaded("suggest", "-q", "--td", "0.064", source)
@@ -103,6 +122,8 @@ def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
     assert not modules & HEAVY
 
 
-@pytest.mark.parametrize("name", ["py.typed", "schemas/suggest-1.json", "schemas/verify-1.json"])
+@pytest.mark.parametrize(
+    "name", ["py.typed", "schemas/suggest-1.json", "schemas/verify-1.json", "schemas/check-1.json"]
+)
 def test_the_package_ships_what_is_not_code(name: str) -> None:
     assert files("d2rpick").joinpath(name).is_file()
