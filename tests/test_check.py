@@ -244,14 +244,32 @@ def test_the_check_objects_where_verify_does(td: float, options: tuple[str, ...]
         assert ("D2R204" in rules(found)) == any("end of the load" in reason for reason in judged["reasons"])
 
 
-def test_each_part_is_judged_by_its_own_energy() -> None:
-    parts = answer("info", BOX)["parts"]
-    box = next(part["id"] for part in parts if part["title"] == "box")
-    for tr in (0.05, 0.0886, 0.15, 0.2):
-        found = answer("check", place("main.k", deck_of(tr, 0.37, box)), "--history", BOX)
-        judged = answer("verify", "--tr", str(tr), "--td", "0.37", "--part", str(box), BOX)
-        assert bool([f for f in found["findings"] if f["severity"] == "error"]) != judged["verified"]
-    assert "energy-only" in {warning["code"] for warning in found["warnings"]}
+@pytest.mark.parametrize("tr", [0.05, 0.0886, 0.15])
+def test_each_part_is_judged_by_its_own_energy_and_flight(tr: float) -> None:
+    parts = {str(part["id"]): part["energy_max"] for part in answer("info", BOX)["parts"]}
+    both = automatic(1, str(tr), rigid=[*parts]) + automatic(2, "0.37", deformable=[*parts])
+    found = answer("check", place("main.k", both), "--history", BOX)["findings"]
+    blamed = {
+        part
+        for finding in found
+        if finding["severity"] == "error"
+        for part in finding["message"].partition(":")[0].removeprefix("part").lstrip("s ").split(", ")
+    }
+    expected = set()
+    for part, energy in parts.items():
+        judged = answer("verify", "--tr", str(tr), "--td", "0.37", "--part", part, BOX)
+        in_load = any("before the end of the load" in reason for reason in judged["reasons"])
+        if in_load if energy == 0 else not judged["verified"]:  # without energy there is nothing to lock in
+            expected.add(part)
+    assert blamed == expected
+    assert 0.0 in parts.values()
+
+
+def test_what_verify_warns_of_is_told_for_each_part() -> None:
+    box = next(part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box")
+    found = answer("check", place("main.k", deck_of(0.15, 0.37, box)), "--history", BOX)
+    (told,) = (w["message"] for w in found["warnings"] if w["code"] == "energy-only")
+    assert told.startswith(f"part {box}: no single oscillator")
 
 
 def test_a_part_that_the_history_does_not_have_is_not_passed() -> None:

@@ -197,7 +197,8 @@ def test_a_chain_of_includes_ends(tmp_path: Path) -> None:
     assert "deeper" in unread.reason
 
 
-def test_includes_that_multiply_are_an_error(tmp_path: Path) -> None:
+def test_includes_that_multiply_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("d2rpick.deck.reader._MOST_FILES", 500)
     files = {f"{n}.k": f"*INCLUDE\n{n + 1}.k\n{n + 1}.k\n" for n in range(20)} | {"20.k": ""}
     with pytest.raises(DeckError, match="more than"):
         read(tmp_path, "*INCLUDE\n0.k\n", files)

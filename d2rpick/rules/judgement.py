@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck import Window
     from d2rpick.history import History
+    from d2rpick.momentum import Momenta
     from d2rpick.readers import Run, Selection
     from d2rpick.situation import Settings
 
@@ -60,7 +61,10 @@ class HistoryJudge:
         """Give the energy of a part, or of the whole model."""
         if part not in self._histories:
             selection = self.selection if part is None else replace(self.selection, parts=(str(part),))
-            self._histories[part] = self.run.history(selection, with_momenta=True)
+            known = next(iter(self._histories.values()), None)  # all parts share the momenta, which take long to read
+            history = self.run.history(selection, with_momenta=known is None)
+            momenta = history.momenta if known is None else known.momenta
+            self._histories[part] = replace(history, momenta=tuple(_seen_from(part, one) for one in momenta))
         return self._histories[part]
 
     def faults(self, window: Window) -> tuple[Fault, ...]:
@@ -92,15 +96,26 @@ class HistoryJudge:
                 f"{name} = {time:.6g} lies outside the history, {first:.6g} to {last:.6g}; correct it or run longer"
             )
             yield Fault("D2R205", at_td, message)
-        # a part that never has energy has nothing to lock in; the reader's note names it
-        if outside or (part is not None and not history.energy.any()):
+        if outside:
             return
         verdict = verify(history, tr, td, self.settings)
+        if part is not None and not history.energy.any():
+            # nothing to lock in, as the reader's note says; when it may be switched is known by momentum alone
+            yield from _of_flight(verdict) if verdict.situation.flight.start is not None else ()
+            return
         for caution in verdict.cautions:
             if caution.code in _KEPT:
                 parts = self._cautions.setdefault(caution, [])
                 parts += [] if part is None else [part]
         yield from faults_of(verdict)
+
+
+def _seen_from(part: int | None, momenta: Momenta) -> Momenta:
+    """The same momenta, of which a part, or None for all, is to be switched."""
+    if momenta.parts is None:
+        return momenta
+    chosen = tuple(at for at, one in enumerate(momenta.parts) if part in (None, one.id))
+    return replace(momenta, chosen=chosen)
 
 
 def faults_of(verdict: Verdict) -> Iterator[Fault]:

@@ -37,13 +37,9 @@ def _fields(case: Case) -> Iterator[Objection]:
 def _includes(case: Case) -> Iterator[Objection]:
     for missing in case.deck.unread:
         if missing.reason:
-            yield (
-                missing.name,
-                (
-                    f"include {missing.name.text!r} was not read ({missing.reason}); "
-                    "switching cards may hide in it: add the file or its *INCLUDE_PATH"
-                ),
-            )
+            cure = "add the file or its *INCLUDE_PATH" if missing.reason == "no such file" else "correct it"
+            found = f"include {missing.name.text!r} was not read ({missing.reason})"
+            yield missing.name, f"{found}; switching cards may hide in it: {cure}"
 
 
 def _ambiguous(case: Case) -> Iterator[Objection]:
