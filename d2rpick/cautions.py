@@ -49,6 +49,9 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
 
 def _of_flight(situation: Situation) -> Iterator[Caution]:
     flight, td, earliest = situation.flight, situation.td, situation.earliest_tr
+    if situation.history.momenta and flight.source in ("oscillator", "energy"):
+        found = f"the momentum shows no free flight around td = {td:.6g}"
+        yield Caution("no-free-flight", f"{found}; its start was read off the {flight.source} instead")
     if flight.source == "energy":
         found = f"the end of the load, {flight.start:.6g}, was read off the energy alone"
         yield Caution("flight-from-energy", f"{found}; give it with --after where it is known")

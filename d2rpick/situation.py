@@ -11,7 +11,7 @@ from d2rpick import measures
 from d2rpick.errors import RangeError
 from d2rpick.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
 from d2rpick.identify import Identification, assess
-from d2rpick.momentum import FreeFlight, flight_around
+from d2rpick.momentum import FreeFlight, flight_around, to_be_asked
 
 if TYPE_CHECKING:
     from d2rpick.history import History
@@ -106,13 +106,12 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
     RangeError when td, --after or the fit window lie outside the record, or it has fewer than 3 states.
     """
     if history.time.size < 3:
-        raise RangeError(
-            f"{', '.join(history.source)}: {history.time.size} states were found, choosing needs at least 3"
-        )
+        found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
+        raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
     history.energy_at(td)
     if settings.after is not None:
         _inside(history, settings.after, "--after")
-    seen = next(filter(None, (flight_around(momenta, td) for momenta in history.momenta)), None)
+    seen = next(filter(None, (flight_around(momenta, td) for momenta in to_be_asked(history.momenta))), None)
     fit, span = _oscillator(history, td, settings, seen)
     mode, no_mode = _reliable_mode(history, td, fit, span, given=settings.oscillator is not None)
     flight = _flight(history, td, settings.after, seen, span)

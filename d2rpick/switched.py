@@ -13,12 +13,14 @@ import numpy as np
 from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
-    from d2rpick.history import History, Samples
-    from d2rpick.momentum import Track
+    from d2rpick.history import History, Samples, Track
 
 # A deviation of the momentum after td beyond this share of it is worth an objection: the motion is another one.
 MOST_MOMENTUM_ERROR = 0.05
-# Some solvers report a wrong energy for rigid solid elements; beyond this share that is worth a note.
+# Momentum below this share of the largest of the run is hardly any: a body that has come to rest cannot be off by much.
+_AT_REST = 0.01
+# Some solvers report a wrong energy for rigid solid elements; beyond this share, and beyond what the energy changes
+# from state to state anyway, that is worth a note.
 _REPORTED_OFF = 0.01
 
 
@@ -27,9 +29,10 @@ class Comparison:
     """Measures of a switched run; fields are the keys of the JSON output, None where the files lack the quantity.
 
     ``energy_frozen`` is the energy that came back at td, ``energy_td`` that of the reference there.  Means and spreads
-    (standard deviations) are over the time from td to ``end``.  ``momentum_error`` is the largest deviation after td
-    relative to the largest momentum of the reference, ``displacement`` the largest distance of the parts' centre from
-    where the reference has it [length].
+    (standard deviations) are over the time from td to ``end``.  ``momentum_error`` is the largest deviation of the
+    momentum behind the first state from td on, relative to the largest that the reference has there;
+    ``displacement`` the largest distance there of the parts' centre from where the reference has it [length].
+    ``notes``: what was left out or assumed in reading the switched run and not the reference, and what is odd in it.
     """
 
     source: tuple[str, ...]
@@ -75,13 +78,19 @@ def compare(
     Raises
     ------
     RangeError
-        If the switched run holds fewer than two states in that window.
+        If a run holds fewer than three states in that window.
     """
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
     after, reference_after = _between(switched, td, end), _between(reference, td, end)
-    if min(after.size, reference_after.size) < 2:
-        raise RangeError(f"{', '.join(switched.source)}: fewer than two states between td {td:g} and {end:g}")
+    if min(after.size, reference_after.size) < 3:
+        short = min(reference, switched, key=lambda history: history.time[-1])
+        found = f"fewer than 3 states from td {td:g} to {end:g}"
+        raise RangeError(f"{', '.join(short.source)}: {found}; nothing can be compared there")
+    before = switched.energy[switched.time < td]
+    if before.size and after[0] == before[-1] and _reported_wrong(before[-1], after[1:]):
+        after = after[1:]  # the switch comes at the first step from td on: this state was still rigid
     frozen, wanted = float(after[0]), reference.energy_at(td)
+    notes = tuple(note for note in switched.notes if note not in reference.notes)
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -94,7 +103,7 @@ def compare(
         spread_after_reference=float(reference_after.std()),
         momentum_error=_relative(*momenta, td, end),
         displacement=_distance(*centres, td, end),
-        notes=_reported(switched, td, frozen),
+        notes=(*notes, *(_reported(float(before[-1]), after) if before.size else ())),
     )
 
 
@@ -102,12 +111,17 @@ def _between(history: History, start: float, end: float) -> Samples:
     return history.energy[(history.time >= start) & (history.time <= end)]
 
 
-def _reported(switched: History, td: float, frozen: float) -> tuple[str, ...]:
+def _reported_wrong(rigid: float, after: Samples) -> bool:
+    """Whether the energy reported while rigid is not the one that comes back."""
+    usual = np.abs(np.diff(after)).max()
+    return bool(abs(rigid - after[0]) > max(usual, _REPORTED_OFF * abs(after[0])))
+
+
+def _reported(rigid: float, after: Samples) -> tuple[str, ...]:
     """Note an energy that the solver reports just before td otherwise than it comes back."""
-    before = switched.energy[switched.time < td]
-    if not before.size or abs(before[-1] - frozen) <= _REPORTED_OFF * abs(frozen):
+    if not _reported_wrong(rigid, after):
         return ()
-    found = f"while rigid the run reports an energy of {before[-1]:.6g}, at td {frozen:.6g} came back"
+    found = f"while rigid the run reports an energy of {rigid:.6g}, at td {after[0]:.6g} came back"
     return (f"{found}; some solvers report rigid solid elements wrongly",)
 
 
@@ -115,14 +129,21 @@ def _relative(reference: Track | None, other: Track | None, td: float, end: floa
     distance = _distance(reference, other, td, end)
     if reference is None or distance is None:
         return None
-    largest = float(np.linalg.norm(reference.values, axis=1).max(initial=0.0))
+    sizes = np.linalg.norm(reference.values, axis=1)
+    there = sizes[(reference.time >= td) & (reference.time <= end)]
+    largest = max(float(there.max(initial=0.0)), _AT_REST * float(sizes.max()))
     return distance / largest if largest > 0 else None
 
 
 def _distance(reference: Track | None, other: Track | None, td: float, end: float) -> float | None:
-    """Largest distance of the second track from the first between two times; None where one is missing."""
+    """Largest distance of the second track from the first between two times; None where one is missing.
+
+    The first state from td on is left out, since it may still be rigid.
+    """
     if reference is None or other is None:
         return None
-    inside = (other.time >= td) & (other.time <= end)
+    inside = np.flatnonzero((other.time >= td) & (other.time <= end))[1:]
+    if not inside.size:
+        return None
     there = [np.interp(other.time[inside], reference.time, column) for column in reference.values.T]
-    return float(np.linalg.norm(other.values[inside] - np.stack(there, axis=1), axis=1).max(initial=0.0))
+    return float(np.linalg.norm(other.values[inside] - np.stack(there, axis=1), axis=1).max())

@@ -56,7 +56,7 @@ FILES = {
     "a cell too few": (with_line(7, "0.05"), (), ["input:7: 1 value", "2 were expected"]),
     "a time that is none": (with_line(7, "later,1"), (), ["input:7: 'time' is 'later'", "a number was expected"]),
     "damaged gzip": (gzip.compress(table(math.cos))[:-9], (), ["input: gzip", "copy the file again"]),
-    "not glstat": (table(math.cos), ("-F", "glstat"), ["input: ", "time line"]),
+    "not glstat": (table(math.cos), ("-F", "glstat"), ["input:1: ", "this is no glstat"]),
     "no state of glstat": (
         b" title\n                         ls-dyna smp.1 d\n\n\n", (), ["input: no states", "first output"]
     ),
@@ -95,7 +95,10 @@ def test_a_file_that_cannot_be_used_is_named_with_what_is_wrong(
     ("args", "parts"),
     [
         (("absent.csv",), ["absent.csv: no such file", "check the name"]),
-        ((str(Path(ENERGY).parent),), [f"{Path(ENERGY).parent}: this is a folder", "a file in it"]),
+        (
+            (str(Path(__file__).parent),),
+            [f"{Path(__file__).parent}: no glstat, matsum, binout or T01", "name the file"],
+        ),
         ((GLSTAT, "-F", "csv"), [f"{GLSTAT}:1: ", "a table of time and energy"]),
         ((GLSTAT, "--energy", "internal enrgy"), ["did you mean 'internal energy'", "kinetic energy"]),
         ((GLSTAT, "--time", "cycle"), ["no time 'cycle'", "leave --time out"]),
@@ -122,14 +125,15 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         ("suggest x", ["--td"]),
         ("verify --td 1 x", ["--tr"]),
         ("suggest --td 1", ["HISTORY"]),
-        ("suggest --td 1 x y", ["y"]),
+        ("suggest --td 1 x y", ["x: no such file"]),
+        ("suggest --td 1 --part 1 --energy 2 x", ["--energy and --part exclude each other"]),
         ("suggest --td 64ms x", ["--td", "'64ms' is not a number"]),
         ("suggest --td 0,064 x", ["--td", "'0,064' is not a number"]),
         ("suggest --td nan x", ["--td", "finite"]),
         ("suggest --td inf x", ["--td", "finite"]),
         ("suggest --td 1 -f jsno x", ["'jsno'", "'json'"]),
         ("verify --tr 1 --td 2 -f value x", ["'value'", "'markdown'"]),
-        ("suggest --td 1 -F hdf5 x", ["'hdf5'", "'glstat'"]),
+        ("suggest --td 1 -F d3plot x", ["'d3plot'", "'hdf5'", "'glstat'"]),
         ("suggest --td 1 --limit 0 x", ["--limit", "1"]),
         ("suggest --td 1 --margin -1 x", ["--margin", "-1 was found", "at least 0 was expected"]),
         ("suggest --td 1 --tolerance -1 x", ["--tolerance", "at least 0 was expected"]),
@@ -154,7 +158,7 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         (f"{ONE_COMMAND} --tr 0.006", ["--tr and --td go together"]),
         (f"{ONE_COMMAND} --td 0.006", ["--tr and --td go together"]),
         (f"{ONE_COMMAND} --tr 0.006 --td 0.005", ["--tr 0.006 is not before --td 0.005"]),
-        (f"{ONE_COMMAND} -o motion.txt", ["motion.txt", "--write-as csv or glstat"]),
+        (f"{ONE_COMMAND} -o motion.txt", ["motion.txt", "--write-as csv, hdf5, glstat, matsum"]),
         # files to be written; all of them are known to be wrong before anything is computed
         (f"suggest --td 0.064 -o absent/result.txt {ENERGY}", ["absent/result.txt: there is no folder 'absent'"]),
         (f"suggest --td 0.064 -o . {ENERGY}", [".: this is a folder"]),

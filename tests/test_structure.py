@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from d2rpick.cli import options, replay
+from d2rpick.readers import READERS
+from d2rpick.writers import TRAJECTORY_WRITERS
 from tests.command import DECK, ENERGY, GLSTAT, ROOT
 
 if TYPE_CHECKING:
@@ -26,14 +29,18 @@ ORDER = (
     "rules.base", "rules.example_decks", "rules.reading", "rules.pairs", "rules.times", "rules.switched_parts",
     "rules.energy", "rules.scope", "rules",
     "history",
-    "readers.source", "readers.names", "readers.printed", "readers.layout", "readers.csv_table", "readers.glstat",
-    "readers",
-    "crossings", "oscillator", "mode", "fitting", "identify", "measures", "replay", "flight", "situation",
-    "cautions", "uncertainty", "choice", "rules.judgement", "judged_card",
-    "report", "report.findings", "report.rules",
-    "report.tables", "report.situation", "report.suggestion", "report.verdict",
+    "readers.names", "readers.source", "readers.selection", "readers.printed", "readers.layout", "readers.columns",
+    "readers.curves", "readers.csv_table", "readers.database", "readers.fortran", "readers.fixed_text",
+    "readers.glstat", "readers.matsum", "readers.repeat", "readers.lsda", "readers.binout_states",
+    "readers.binout_branch", "readers.binout", "readers.hdf5_columns", "readers.hdf5_file", "readers.radioss_th",
+    "readers.companions", "readers.run", "readers",
+    "momentum", "crossings", "oscillator", "mode", "fitting", "identify", "measures", "replay", "flight", "situation",
+    "cautions", "uncertainty", "candidates", "switched", "choice", "overview", "rules.judgement", "judged_card",
+    "report", "report.findings", "report.rules", "report.tables", "report.situation", "report.suggestion",
+    "report.verdict", "report.overview",
     "writers", "plots",
-    "cli", "cli.options", "cli.output", "cli.check", "cli.rule", "cli.card", "cli.suggest", "cli.verify", "cli.replay",
+    "cli", "cli.options", "cli.output", "cli.progress", "cli.check", "cli.rule", "cli.card",
+    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract",
     "__main__",
 )  # fmt: skip
 # The only modules that may import these.
@@ -97,7 +104,7 @@ def loaded(*args: str) -> set[str]:
     return set(result.stderr.split())
 
 
-@pytest.mark.parametrize("args", [("--help",), ("--version",), ("suggest", "--help")])
+@pytest.mark.parametrize("args", [("--help",), ("--version",), ("suggest", "--help"), ("info", "--help")])
 def test_help_and_version_load_no_numbers(args: tuple[str, ...]) -> None:
     assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.history", "d2rpick.choice"})
 
@@ -122,8 +129,14 @@ def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
     assert not modules & HEAVY
 
 
-@pytest.mark.parametrize(
-    "name", ["py.typed", "schemas/suggest-1.json", "schemas/verify-1.json", "schemas/check-1.json"]
-)
+def test_the_command_line_offers_the_formats_there_are() -> None:
+    assert tuple(READERS) == options.FORMATS
+    assert tuple(TRAJECTORY_WRITERS) == replay.FORMATS
+
+
+SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check")]
+
+
+@pytest.mark.parametrize("name", ["py.typed", *SCHEMAS])
 def test_the_package_ships_what_is_not_code(name: str) -> None:
     assert files("d2rpick").joinpath(name).is_file()

@@ -9,6 +9,7 @@ import click
 from d2rpick.cli import options as shared
 from d2rpick.cli.card import all_cautions
 from d2rpick.cli.output import Output, finish
+from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
     from d2rpick.choice import Suggestion
@@ -46,9 +47,10 @@ def command(ctx: click.Context, /, td: float, limit: int, output_format: str, ex
 
     if output_format == "card" and not options["part"]:
         raise click.UsageError("-f card needs --part, the parts that are switched")
-    run = shared.open_run(options)
-    output = Output.of(options, *run.sources)
-    history = run.history(shared.selection(options), with_momenta=True)
+    with reading(options["history"], quiet=options["quiet"]):
+        run = shared.open_run(options)
+        output = Output.of(options, *run.sources)
+        history = run.history(shared.selection(options), with_momenta=True)
     answer = suggest(history, td, shared.settings(options))
     output.notes(history.notes, answer.cautions)
     if options["plot"]:

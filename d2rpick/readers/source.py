@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from d2rpick.errors import FormatError
+from d2rpick.readers.names import listing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +19,7 @@ STDIN = "-"
 Content = bytes | mmap.mmap
 
 # What solvers call their databases in the folder of a run.
-_DATABASE = re.compile(r"(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d(?:\.gz)?")
+_DATABASE = re.compile(r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?")
 
 # Standard input can be read only once; its bytes stay here for a later sha256("-").
 _stdin = b""
@@ -76,16 +77,20 @@ def sha256(name: str) -> str:
 
 def _files(name: str) -> Sequence[str]:
     path = Path(name)
-    if name == STDIN or path.is_file():
+    try:
+        is_file, is_folder = path.is_file(), path.is_dir()
+    except OSError:  # a name too long; what is wrong with it shows when it is opened
         return [name]
-    if path.is_dir():
+    if name == STDIN or is_file:
+        return [name]
+    if is_folder:
         return _databases(path)
     if any(sign in name for sign in "*?["):
         found = sorted(str(file) for file in Path(path.anchor).glob(name.removeprefix(path.anchor)) if file.is_file())
         if not found:
             raise FormatError(f"{name}: no file has such a name; check the folder")
         return found
-    return [name]  # what is wrong with it shows when it is opened
+    return [name]
 
 
 def _databases(folder: Path) -> list[str]:
@@ -93,10 +98,12 @@ def _databases(folder: Path) -> list[str]:
     found = {file: match["root"] for file, match in matches.items() if match}
     if not found:
         raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; name the file")
-    roots = sorted({root for root in found.values() if root is not None})
-    if len(roots) > 1:
-        runs = ", ".join(f"{root}T01" for root in roots[:5])
-        raise FormatError(f"{folder}: this folder holds several runs ({runs}), one was expected; name the files of one")
+    runs = sorted({"one of LS-DYNA" if root is None else f"{root}T01" for root in found.values()})
+    if len(runs) > 1:
+        raise FormatError(
+            f"{folder}: this folder holds several runs ({listing(runs, most=5)}), one was expected; "
+            "name the files of one"
+        )
     return [str(file) for file in found]
 
 

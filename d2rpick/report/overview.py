@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from d2rpick.overview import Overview
 
 SCHEMA = "d2rpick/info/1"
+_PARTS_HEAD = ("part", "title", "highest internal energy")
+# Keys of the JSON output with a single value.
+_PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "time_unit", "complete")
 
 
 def as_table(overview: Overview) -> str:
@@ -23,20 +26,30 @@ def as_table(overview: Overview) -> str:
     width = max(len(name) for name, _ in rows)
     lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in rows]
     if overview.parts:
-        parts = [[one.part.id, one.part.title, one.energy_max] for one in overview.parts]
-        lines += ["", tables.as_text(("part", "title", "highest internal energy"), parts)]
+        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview))]
     return "\n".join([*lines, *(f"note: {note}" for note in overview.notes)])
 
 
 def as_markdown(overview: Overview) -> str:
-    """The facts as a Markdown table of two columns."""
-    return tables.as_markdown(("what", "value"), _rows(overview))
+    """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
+    facts = tables.as_markdown(("what", "value"), _rows(overview))
+    parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
+    return "\n\n".join([facts, *parts, *(f"* {note}" for note in overview.notes)])
 
 
 def as_csv(overview: Overview) -> str:
-    """One row of facts."""
-    rows = _rows(overview)
-    return tables.as_csv([name for name, _ in rows], [[value for _, value in rows]]).rstrip("\n")
+    """One row, a column for each key of the JSON output, what is a list there with semicolons."""
+    sampling = overview.sampling
+    row: dict[str, tables.Cell] = {
+        "source": "; ".join(overview.source),
+        **{name: getattr(overview, name) for name in _PLAIN},
+        **{f"sampling_{name}": getattr(sampling, name) if sampling else None for name in ("min", "median", "max")},
+        "channels": "; ".join(overview.channels),
+        "parts": "; ".join(f"{one.part.id} {one.part.title}".rstrip() for one in overview.parts),
+        "flights": "; ".join(map(_flight, overview.flights)),
+        "notes": "; ".join(overview.notes),
+    }
+    return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
 
 
 def as_json(overview: Overview, command: Sequence[str]) -> str:
@@ -73,6 +86,10 @@ def _rows(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("channels", ", ".join(overview.channels) or None),
     ]
     return rows + [("flight", _flight(flight)) for flight in overview.flights]
+
+
+def _parts(overview: Overview) -> list[list[tables.Cell]]:
+    return [[one.part.id, one.part.title, one.energy_max] for one in overview.parts]
 
 
 def _flight(flight: FreeFlight) -> str:

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck import Window
-    from d2rpick.history import History
-    from d2rpick.momentum import Momenta
+    from d2rpick.history import History, Momenta
     from d2rpick.readers import Run, Selection
     from d2rpick.situation import Settings
 
