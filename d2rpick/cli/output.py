@@ -63,7 +63,8 @@ class Output:
 
     def result(self, text: str) -> None:
         """Give out the result; on a terminal the line of the recommended candidate stands out."""
-        text = text and f"{text}\n"
+        # bytes of file names that are no text come as lone surrogates, which no encoding can write
+        text = text and f"{text}\n".encode(errors="surrogateescape").decode(errors="replace")
         if self.file is not None:
             self.write(self.file, text.encode())
             return

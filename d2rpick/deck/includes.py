@@ -1,0 +1,108 @@
+"""Includes: which files a deck asks for, where they are looked for, and how they are transformed."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from d2rpick.deck.card import Transform
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from d2rpick.deck.card import Card
+    from d2rpick.deck.rows import Field, Row
+
+_CONTINUED = " +"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A file an ``*INCLUDE`` card asks for: its name as written, and the transform of the card."""
+
+    name: Field
+    transform: Transform
+
+
+@dataclass(frozen=True)
+class Unread:
+    """An include that was not read: its name as written, and why."""
+
+    name: Field
+    reason: str
+
+
+def asked_by(card: Card) -> Iterator[Asked]:
+    """Files named by ``*INCLUDE`` (one per line) or ``*INCLUDE_TRANSFORM`` (one, and its numbers)."""
+    names = _names(card.rows)
+    if card.name == "INCLUDE":
+        yield from (Asked(name, card.transform) for name, _ in names)
+    elif first := next(names, None):
+        name, rest = first
+        yield Asked(name, _transform(card, rest).inside(card.transform))
+
+
+def _names(rows: Iterable[Row]) -> Iterator[tuple[Field, list[Row]]]:
+    """Every file name, joined over lines that end in blank-plus, and the rows below it."""
+    waiting = list(rows)
+    while waiting:
+        first = waiting.pop(0)
+        if first.blank:
+            continue
+        text = first.text.rstrip()
+        while text.endswith(_CONTINUED) and waiting:
+            text = text.removesuffix(_CONTINUED).rstrip() + waiting.pop(0).text.strip()
+        yield replace(first.field(0), text=text.strip().strip('"')), waiting
+
+
+def _transform(card: Card, rows: list[Row]) -> Transform:
+    """Numbers of ``*INCLUDE_TRANSFORM``; a row left out, a blank and a factor 0 mean no change."""
+
+    def at(row: int, position: int) -> int:
+        return card.integer(rows[row], position).value if row < len(rows) else 0
+
+    factor = card.real(rows[2], 1, 1.0).value if len(rows) > 2 else 1.0
+    return Transform(
+        node=at(0, 0),
+        part=at(0, 2),
+        material=at(0, 3),
+        set_=at(0, 4),
+        rest=at(1, 0),
+        time=factor or 1.0,
+    )
+
+
+class Folders:
+    """Where includes are looked for: folder of the main deck, *INCLUDE_PATH in order, the including file's.
+
+    Readers of decks differ in this order; all of these are tried, the first that has the file counts.
+    """
+
+    def __init__(self, main: str) -> None:
+        self._main = Path(main).parent
+        self._paths: list[Path] = []
+
+    def add(self, card: Card) -> None:
+        """Take over ``*INCLUDE_PATH``, or ``_RELATIVE`` to the main deck's folder."""
+        for name, _ in _names(card.rows):
+            self._paths.append(self._main / _portable(name.text))
+
+    def find(self, name: Field) -> str | None:
+        """Path of the include as messages should show it, or None."""
+        for folder in (self._main, *self._paths, Path(name.file).parent):
+            for spelling in (name.text, _portable(name.text), _recoded(name.text)):
+                path = str(folder / spelling)
+                if spelling and os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises on names too long
+                    return path
+        return None
+
+
+def _portable(name: str) -> str:
+    return name.replace("\\", "/")
+
+
+def _recoded(name: str) -> str:
+    """Return the name with its bytes taken as the file system takes them, not as Latin-1."""
+    return os.fsdecode(name.encode("latin-1", "replace"))
