@@ -91,6 +91,10 @@ class Database(Protocol):
         """How finely the times and these channels were written; of no channels: those of the parts."""
 
 
+# An interval so many times the median one is no output interval.
+_LONG = 30.0
+
+
 class Legs:
     """Legs of one run as one `Database`: in the order of their start, and where they overlap the newer counts.
 
@@ -223,7 +227,7 @@ class Legs:
             for leg, here in zip(self._legs, np.split(keep, behind[:-1]), strict=True)
             if here.size and not here.any()
         ]
-        return keep, (*notes, *unused)
+        return keep, (*notes, *unused, *_holes(np.concatenate(times)[keep]))
 
     def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
         whole = columns[0] if len(columns) == 1 else np.concatenate(columns)
@@ -242,6 +246,13 @@ def _start(leg: Database) -> float:
 
 def _digits(precision: Precision) -> int:
     return precision.digits if precision.decimals is None else precision.decimals
+
+
+def _holes(time: Samples) -> tuple[str, ...]:
+    """Say where output stops for long, as it does where a leg is missing."""
+    steps = np.diff(time)
+    holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2]) if steps.size > 2 else ()
+    return tuple(f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a leg missing?" for i in holes[:3])
 
 
 # Significant digits by bytes per number: 24 bits hold 7 digits; 17 digits restore every double.
