@@ -102,7 +102,8 @@ class Legs:
     state count only where all are so.
     """
 
-    def __init__(self, legs: Sequence[Database]) -> None:
+    def __init__(self, legs: Sequence[Database], cut: Sequence[str] = ()) -> None:
+        self._cut = tuple(cut)  # files whose packed data ends early
         several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
         self._files = sorted(legs, key=_start) if several else [*legs]
         self._legs = [leg for leg in self._files if not several or _start(leg) > -np.inf] or self._files
@@ -140,7 +141,7 @@ class Legs:
     @property
     def complete(self) -> bool:
         """Whether all legs are."""
-        return all(leg.complete for leg in self._files)
+        return all(leg.complete for leg in self._files) and not self._cut
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
@@ -155,7 +156,8 @@ class Legs:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and what was left out between them."""
-        notes = [note for leg in self._files for note in leg.notes]
+        notes = [f"{name}: the packed data ends early; what it holds up to there was read" for name in self._cut]
+        notes += [note for leg in self._files for note in leg.notes]
         if self._passing:
             notes.append(f"{self.source}: only some legs have part {listing(self._passing)}, which was left out")
         if self.channels:
