@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.rows import Field, Row
 
 _CONTINUED = " +"
+UNKNOWN_KIND = "this kind of include is not read"
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from d2rpick.deck.card import Card, Transform
-from d2rpick.deck.includes import Folders, Unread, asked_by
+from d2rpick.deck.includes import UNKNOWN_KIND, Folders, Unread, asked_by
 from d2rpick.deck.parameters import Scope
 from d2rpick.deck.rows import LONG, STANDARD
 from d2rpick.deck.source import Block, SourceFile
@@ -21,6 +21,7 @@ _KEPT: Final = (
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
 _PATHS: Final = ("INCLUDE_PATH", "INCLUDE_PATH_RELATIVE")
 _LONG = re.compile(r"\bLONG\s*=\s*([YSK])", re.IGNORECASE)
+SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)  # keywords meant to switch
 _SUFFIXES: Final = "+-%"
 _DEEPEST = 60  # includes in includes
 _MOST_FILES = 10_000
@@ -121,12 +122,12 @@ class _Reader:
         elif card.name.startswith("INCLUDE"):
             self.deck.included.append(card)
             self.include(card, context, width)
-        elif card.name.startswith(_KEPT):
+        elif card.name.startswith(_KEPT) or SWITCHING.match(card.block.head):
             self.deck.cards.append(card)
 
     def include(self, card: Card, context: _Context, width: int) -> None:
         if card.name not in _READ_INCLUDES:
-            self.deck.unread.append(Unread(card.here, ""))
+            self.deck.unread.append(Unread(card.here, UNKNOWN_KIND))
             return
         for asked in asked_by(card):
             path = self.folders.find(asked.name)

@@ -6,10 +6,13 @@ sources; which of the D2R and R2D lines hold PTYPE in which column is a trap sev
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal
 
+from d2rpick.deck.reader import SWITCHING
 from d2rpick.deck.rows import Value
 
 if TYPE_CHECKING:
@@ -116,6 +119,14 @@ def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
         for card in deck.cards
         if (kind := _KINDS.get(card.name)) is not None
     )
+
+
+def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
+    """Cards that look like switching cards but are none, and the keyword that was probably meant."""
+    for card in deck.cards:
+        if card.name not in _KINDS and SWITCHING.match(card.block.head):
+            name = re.sub(r"\W+", "_", card.block.head.upper()).strip("_")
+            yield card, f"*{get_close_matches(name, _KINDS, n=1, cutoff=0)[0]}"
 
 
 def _simple(card: Card, kind: Kind) -> SwitchSet:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.deck.includes import UNKNOWN_KIND
 from d2rpick.deck.rows import Field
+from d2rpick.deck.switching import misspelt
 from d2rpick.rules.base import Example, Rule, Severity
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
@@ -25,6 +27,9 @@ def _counts(case: Case) -> Iterator[Objection]:
 
 
 def _fields(case: Case) -> Iterator[Objection]:
+    for unknown, near in misspelt(case.deck):
+        head = unknown.block.head.strip()
+        yield unknown.here, f"{head!r} is no keyword that switches, so its lines were not read; did you mean {near}?"
     for card in case.sets:
         for field, problem in card.problems:
             yield field, f"{problem}; check its columns and its parameters"
@@ -34,12 +39,17 @@ def _fields(case: Case) -> Iterator[Objection]:
                 yield value.field, f"{value.problem}; *{support.name} is needed to judge the switching times"
 
 
+_CURES: Final = {
+    "no such file": "add the file or its *INCLUDE_PATH",
+    UNKNOWN_KIND: "check its file by itself",
+}
+
+
 def _includes(case: Case) -> Iterator[Objection]:
     for missing in case.deck.unread:
-        if missing.reason:
-            cure = "add the file or its *INCLUDE_PATH" if missing.reason == "no such file" else "correct it"
-            found = f"include {missing.name.text!r} was not read ({missing.reason})"
-            yield missing.name, f"{found}; switching cards may hide in it: {cure}"
+        cure = _CURES.get(missing.reason, "correct it")
+        found = f"include {missing.name.text!r} was not read ({missing.reason})"
+        yield missing.name, f"{found}; switching cards may hide in it: {cure}"
 
 
 def _ambiguous(case: Case) -> Iterator[Objection]:
@@ -114,9 +124,10 @@ RULES: Final = (
     Rule(
         "D2R002",
         Severity.ERROR,
-        "a field that is not a number, or a &parameter that is not defined",
+        "a switching keyword, number or &parameter that cannot be read",
         "Fields are 10 columns wide (20 in long format) unless the line has commas. A text in a number's "
         "columns, or a parameter nobody defines, stops the run or, worse, is read as something else. "
+        "So is a keyword that begins like a switching card but is none. "
         "ENDTIM and the DT of *DATABASE_GLSTAT and _MATSUM are looked at too: the switching times are "
         "judged by them.",
         _fields,
@@ -124,19 +135,21 @@ RULES: Final = (
         (
             Example(HEAD + _BY_NAME),
             Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
+            Example(GOOD.replace("_AUTOMATIC", "_AUTOMATC")),
+            Example(GOOD.replace("*DEFORM", "* DEFORM")),
             Example("*DEFORMABLE_TO_RIGID\n         1         0      WALL\n"),
         ),
     ),
     Rule(
         "D2R003",
         Severity.ERROR,
-        "an include file is missing",
+        "an include file is missing or cannot be read",
         "Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's "
         "folder. A file that includes itself or cannot be read is reported too. Switching cards, parts or "
         "parameters may be in it, so the other findings are not the whole truth.",
         _includes,
         (Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}),),
-        (Example(HEAD + "*INCLUDE\nnowhere.k\n" + END),),
+        (Example(HEAD + "*INCLUDE\nnowhere.k\n" + END), Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END)),
     ),
     Rule(
         "D2R109",
