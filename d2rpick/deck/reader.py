@@ -10,7 +10,7 @@ from typing import Final
 from d2rpick.deck.card import Card, Transform
 from d2rpick.deck.includes import UNKNOWN_KIND, Folders, Unread, asked_by
 from d2rpick.deck.parameters import Scope
-from d2rpick.deck.rows import LONG, STANDARD
+from d2rpick.deck.rows import LONG, STANDARD, Problem
 from d2rpick.deck.source import Block, SourceFile
 from d2rpick.errors import DeckError
 
@@ -29,7 +29,10 @@ _MOST_FILES = 10_000
 
 @dataclass(eq=False)
 class Deck:
-    """A deck as read: ``cards`` that matter, ``disabled`` ones (*COMMENT), encrypted blocks, includes."""
+    """A deck as read: ``cards`` that matter, ``disabled`` ones (*COMMENT), encrypted blocks, includes.
+
+    ``problems`` are numbers of includes that could not be read.
+    """
 
     path: str
     cards: list[Card] = field(default_factory=list)
@@ -37,6 +40,7 @@ class Deck:
     encrypted: list[Block] = field(default_factory=list)
     included: list[Card] = field(default_factory=list)
     unread: list[Unread] = field(default_factory=list)
+    problems: list[Problem] = field(default_factory=list)
     scope: Scope = field(default_factory=Scope)
     files: int = 0
 
@@ -130,6 +134,7 @@ class _Reader:
             self.deck.unread.append(Unread(card.here, UNKNOWN_KIND))
             return
         for asked in asked_by(card):
+            self.deck.problems += asked.problems
             path = self.folders.find(asked.name)
             real = os.path.realpath(path) if path else ""
             if path is None:

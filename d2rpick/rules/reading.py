@@ -34,9 +34,18 @@ def _fields(case: Case) -> Iterator[Objection]:
         for field, problem in card.problems:
             yield field, f"{problem}; check its columns and its parameters"
     if case.sets:
+        for field, problem in (*case.parts.problems, *_unreadable_members(case)):
+            yield field, f"{problem}; it is needed to know which parts are switched"
         for support, value in case.supporting:
             if value.problem:
                 yield value.field, f"{value.problem}; *{support.name} is needed to judge the switching times"
+
+
+def _unreadable_members(case: Case) -> Iterator[Objection]:
+    used = dict.fromkeys(line.part.value for card in case.sets for line in card.switched if line.by_set)
+    for set_id in dict.fromkeys(reached for one in used for reached in case.parts.reached(one)):
+        content = case.parts.sets.get(set_id)
+        yield from content.problems if content else ()
 
 
 _CURES: Final = {
@@ -135,6 +144,9 @@ RULES: Final = (
         (
             Example(HEAD + _BY_NAME),
             Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
+            Example("*SET_PART\n         3\n     &door\n*DEFORMABLE_TO_RIGID\n         3         0      PSET\n"),
+            Example(GOOD.replace("         2         1         1", "       abc         1         1")),
+            Example(HEAD + "*INCLUDE_TRANSFORM\nall.k\n" + f"{'&off':>30s}\n", {"all.k": PARTS + THERE + BACK}),
             Example(GOOD.replace("_AUTOMATIC", "_AUTOMATC")),
             Example(GOOD.replace("*DEFORM", "* DEFORM")),
             Example("*DEFORMABLE_TO_RIGID\n         1         0      WALL\n"),
