@@ -122,12 +122,14 @@ RULES: Final = (
         "the rows after a card do not match its D2R/R2D counts",
         "The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC counts the D2R and R2D lines that follow it, "
         "one per part. With wrong counts the solver reads a part from the wrong line, or a line as the "
-        "next card.",
+        "next card. A card whose counts are both 0 switches nothing.",
         _counts,
         (Example(GOOD),),
         (
             Example(HEAD + PARTS + automatic(1, "0.02", rigid=["1"], counts=(2, 0)) + BACK + END),
             Example("*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1\n"),
+            Example(HEAD + PARTS + automatic(1, "0.02", rigid=["1"], counts=(2, -1)) + BACK + END),
+            Example(HEAD + PARTS + automatic(1, "0.02") + END),
         ),
     ),
     Rule(
@@ -144,6 +146,8 @@ RULES: Final = (
         (
             Example(HEAD + _BY_NAME),
             Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
+            Example(HEAD + PARTS + automatic(0, "0.02", rigid=["1"]) + END),
+            Example(GOOD.replace("      0.02       0.0", "    0.0135867    0.0")),
             Example("*SET_PART\n         3\n     &door\n*DEFORMABLE_TO_RIGID\n         3         0      PSET\n"),
             Example(GOOD.replace("         2         1         1", "       abc         1         1")),
             Example(HEAD + "*INCLUDE_TRANSFORM\nall.k\n" + f"{'&off':>30s}\n", {"all.k": PARTS + THERE + BACK}),
