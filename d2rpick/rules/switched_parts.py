@@ -172,6 +172,14 @@ def _both(*lines: str) -> Example:
     return Example(HEAD + PARTS + _TOUCHING + there + automatic(2, "0.09", deformable=["1", "2"]) + END)
 
 
+_LAYERS, _BEAMS = (
+    Example(_both("1", "2").deck.replace(_TOUCHING, text))
+    for text in (
+        _TOUCHING.replace("SHELL", "SHELL_COMPOSITE").replace("       4\n", "       4\n         1       0.5\n"),
+        "*ELEMENT_BEAM_ELFORM\n" + "".join(f"{one:8d}{one:8d}{one:8d}{one + 1:8d}\n{1:10d}\n" for one in (1, 2)),
+    )
+)
+
 RULES: Final = (
     Rule(
         "D2R103",
@@ -239,6 +247,6 @@ RULES: Final = (
         "share. Merge them: the lead part with LRB 0, the others with LRB = the lead.",
         _torn,
         (_both("1", "         2         1      PART"),),
-        (_both("1", "2"),),
+        (_both("1", "2"), _LAYERS, _BEAMS),
     ),
 )
