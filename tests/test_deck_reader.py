@@ -30,6 +30,7 @@ SAME = {
     "plain": GOOD,
     "lower case": GOOD.lower(),
     "mixed case": GOOD.title(),
+    "byte order mark": "\xef\xbb\xbf" + THERE + GOOD.replace(THERE, ""),
     "CRLF": GOOD.replace("\n", "\r\n"),
     "no line end": GOOD.removesuffix(END).rstrip("\n"),
     "no *KEYWORD, no *END": GOOD.replace("*KEYWORD\n", "").replace(END, ""),
@@ -202,6 +203,11 @@ def test_includes_that_multiply_are_an_error(tmp_path: Path, monkeypatch: pytest
     files = {f"{n}.k": f"*INCLUDE\n{n + 1}.k\n{n + 1}.k\n" for n in range(20)} | {"20.k": ""}
     with pytest.raises(DeckError, match="more than"):
         read(tmp_path, "*INCLUDE\n0.k\n", files)
+
+
+def test_lines_that_end_in_cr_alone_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(DeckError, match="CR alone"):
+        read(tmp_path, GOOD.replace("\n", "\r"))
 
 
 @pytest.mark.parametrize("name", ["absent.k", ".", "bad\0name"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.rows import LONG
@@ -18,7 +19,11 @@ _NODES: Final = {
     "TSHELL": 8,
     "BEAM": 2,
 }  # that hold the part; a beam's third orients it
-_OPTIONS: Final = {"THICKNESS", "BETA", "MCID", "OFFSET", "ORTHO", "ORIENTATION"}  # their lines hold reals
+_OPTIONS: Final = {  # their lines hold reals or words, or a single integer
+    *("THICKNESS", "BETA", "MCID", "OFFSET", "ORTHO", "ORIENTATION", "COMPOSITE", "LONG", "SCALAR", "SECTION"),
+    "ELFORM",
+}
+_INTEGERS = re.compile(r"[-+\d\s,]*\Z", re.ASCII)
 _WIDTH, _WIDTH_PERCENT = 8, 10
 
 
@@ -39,10 +44,8 @@ def first_shared_nodes(deck: Deck, bodies: Mapping[int, int]) -> dict[tuple[int,
     """
     owner: dict[int, int] = {}
     shared: dict[tuple[int, int], int] = {}
-    for card in deck.named(*(f"ELEMENT_{kind}" for kind in _NODES)):
-        kind, *options = card.name.split("_")[1:]
-        if not set(options) <= _OPTIONS:
-            continue
+    for card in _elements(deck, read=True):
+        kind = card.name.split("_")[1]
         for part, nodes in _connectivity(card, _NODES[kind], bodies):
             for node in nodes:
                 other = owner.setdefault(node, part)
@@ -51,15 +54,28 @@ def first_shared_nodes(deck: Deck, bodies: Mapping[int, int]) -> dict[tuple[int,
     return shared
 
 
+def unread_elements(deck: Deck) -> list[Card]:
+    """Cards of elements whose lines are not followed: nodes that their parts share are not found."""
+    return list(_elements(deck, read=False))
+
+
+def _elements(deck: Deck, *, read: bool) -> Iterator[Card]:
+    for card in deck.named(*(f"ELEMENT_{kind}" for kind in _NODES)):
+        if read == (set(card.name.split("_")[2:]) <= _OPTIONS):
+            yield card
+
+
 def _connectivity(card: Card, count: int, bodies: Mapping[int, int]) -> Iterator[tuple[int, set[int]]]:
     """Part and nodes (with their offsets) of the elements whose part is in question."""
     width = LONG if card.width == LONG else _WIDTH_PERCENT if "%" in card.block.head else _WIDTH
     part: int | None = None  # of an element whose nodes stand on the next line
     for _, line in card.block.lines():
-        if "." in line or not line.strip():
+        if not line.strip() or not _INTEGERS.match(line):
             continue
         cells = line.split(",") if "," in line else _cells(line, width, count + 2)
         if part is None:
+            if "ELFORM" in card.name and not any(cell.strip() for cell in cells[2:]):
+                continue
             part, cells = _integer(cells, 1) + card.transform.part, cells[2:]
             if not any(cell.strip() for cell in cells):
                 continue

@@ -13,17 +13,19 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from d2rpick.deck.card import Card
-    from d2rpick.deck.rows import Field, Row
+    from d2rpick.deck.rows import Field, Problem, Row
 
 _CONTINUED = " +"
+UNKNOWN_KIND = "this kind of include is not read"
 
 
 @dataclass(frozen=True)
 class Asked:
-    """A file an ``*INCLUDE`` card asks for: its name as written, and the transform of the card."""
+    """A file an ``*INCLUDE`` card asks for: its name as written, the transform of the card, its unreadable fields."""
 
     name: Field
     transform: Transform
+    problems: tuple[Problem, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,8 @@ def asked_by(card: Card) -> Iterator[Asked]:
         yield from (Asked(name, card.transform) for name, _ in names)
     elif first := next(names, None):
         name, rest = first
-        yield Asked(name, _transform(card, rest).inside(card.transform))
+        own, problems = _transform(card, rest)
+        yield Asked(name, own.inside(card.transform), problems)
 
 
 def _names(rows: Iterable[Row]) -> Iterator[tuple[Field, list[Row]]]:
@@ -57,21 +60,15 @@ def _names(rows: Iterable[Row]) -> Iterator[tuple[Field, list[Row]]]:
         yield replace(first.field(0), text=text.strip().strip('"')), waiting
 
 
-def _transform(card: Card, rows: list[Row]) -> Transform:
+def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, ...]]:
     """Numbers of ``*INCLUDE_TRANSFORM``; a row left out, a blank and a factor 0 mean no change."""
-
-    def at(row: int, position: int) -> int:
-        return card.integer(rows[row], position).value if row < len(rows) else 0
-
-    factor = card.real(rows[2], 1, 1.0).value if len(rows) > 2 else 1.0
-    return Transform(
-        node=at(0, 0),
-        part=at(0, 2),
-        material=at(0, 3),
-        set_=at(0, 4),
-        rest=at(1, 0),
-        time=factor or 1.0,
-    )
+    places = ((0, 0), (0, 2), (0, 3), (0, 4), (1, 0))
+    offsets = [card.integer(rows[row], position) if row < len(rows) else None for row, position in places]
+    factor = card.real(rows[2], 1, 1.0) if len(rows) > 2 else None
+    node, part, material, set_, rest = (value.value if value else 0 for value in offsets)
+    time = (factor.value if factor else 0.0) or 1.0
+    problems = tuple((value.field, value.problem) for value in (*offsets, factor) if value and value.problem)
+    return Transform(node, part, material, set_, rest, time), problems
 
 
 class Folders:

@@ -36,6 +36,10 @@ class Field:
         return self.block.line + self.distance
 
 
+Problem = tuple[Field, str]
+"""A field that says nothing usable, and why."""
+
+
 @dataclass(frozen=True)
 class Value(Generic[T]):
     """What a field says: ``problem`` is empty, or tells why ``value`` is only the default."""

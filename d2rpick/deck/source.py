@@ -19,6 +19,7 @@ _CHUNK = 256 * 1024
 _LOOKBACK = 32  # bytes of the chunk before, so that what stands in front of a hit is always at hand
 _PGP = b"-----BEGIN PGP MESSAGE"
 _ANCHOR = _PGP.index(b"G")  # a letter that mesh data never holds: looking for it alone costs nothing
+_MARK = b"\xef\xbb\xbf"  # byte order mark of UTF-8
 _HEAD = 1024  # longest keyword line that is looked at
 _BEFORE = 4096  # how far back comments belonging to a keyword are looked for
 _SILENCE = re.compile(r"\$\s*d2rpick:\s*ignore\s+(.*)", re.IGNORECASE)
@@ -81,12 +82,21 @@ class SourceFile:
         with self._open() as stream:
             while count := stream.readinto(memoryview(buffer)[_LOOKBACK:]):
                 end = _LOOKBACK + count
+                if base < 0:
+                    self._start(buffer, end)
                 for at in sorted([*_starred(buffer, end), *_encrypted(buffer, end)]):
                     cut = at + _HEAD > end
                     piece = self.read(base + at, base + at + _HEAD) if cut else bytes(buffer[at : at + _HEAD])
                     yield base + at, piece.partition(b"\n")[0].rstrip(b"\r").decode("latin-1")
                 buffer[:_LOOKBACK] = buffer[end - _LOOKBACK : end]
                 base += count
+
+    def _start(self, buffer: bytearray, end: int) -> None:
+        """Pass over a byte order mark; refuse lines that no reader of decks would see."""
+        if buffer.startswith(_MARK, _LOOKBACK):
+            buffer[_LOOKBACK : _LOOKBACK + len(_MARK)] = b"\n" * len(_MARK)
+        if buffer.find(b"\r", _LOOKBACK, end) >= 0 > buffer.find(b"\n", _LOOKBACK, end):
+            raise DeckError(f"{self.name}: lines end in CR alone, line ends LF or CR LF were expected")
 
     def _open(self) -> io.BufferedReader:
         try:
@@ -148,7 +158,7 @@ class Block:
     @cached_property
     def silenced(self) -> frozenset[str]:
         """Rules named by ``$ d2rpick: ignore`` in the comment lines directly before the keyword."""
-        before = self.source.read(max(0, self.start - _BEFORE), self.start).decode("latin-1")
+        before = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(_MARK).decode("latin-1")
         rules: set[str] = set()
         for line in reversed(before.split("\n")[:-1]):
             if not line.startswith("$"):

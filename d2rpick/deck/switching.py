@@ -6,10 +6,13 @@ sources; which of the D2R and R2D lines hold PTYPE in which column is a trap sev
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal
 
+from d2rpick.deck.reader import SWITCHING
 from d2rpick.deck.rows import Value
 
 if TYPE_CHECKING:
@@ -118,6 +121,14 @@ def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
     )
 
 
+def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
+    """Cards that look like switching cards but are none, and the keyword that was probably meant."""
+    for card in deck.cards:
+        if card.name not in _KINDS and SWITCHING.match(card.block.head):
+            name = re.sub(r"\W+", "_", card.block.head.upper()).strip("_")
+            yield card, f"*{get_close_matches(name, _KINDS, n=1, cutoff=0)[0]}"
+
+
 def _simple(card: Card, kind: Kind) -> SwitchSet:
     rows = [row for row in card.rows if not row.blank]
     if kind == "inertia":
@@ -144,8 +155,12 @@ def _automatic(card: Card) -> SwitchSet:
         return _with(card, "automatic", header, [])
     rigid, deformable = header.to_rigid.value, header.to_deformable.value
     problem = ""
-    if len(lines) != rigid + deformable:
+    if rigid < 0 or deformable < 0:
+        problem = f"D2R is {rigid} and R2D is {deformable}, counts from 0 on were expected"
+    elif len(lines) != rigid + deformable:
         problem = f"D2R is {rigid} and R2D is {deformable}, but {_lines(len(lines))} of parts follow"
+    elif not lines:
+        problem = "D2R and R2D are 0, so the card switches nothing"
     elif any(row.blank for row in lines):
         problem = "an empty line stands where a part was expected"
     rigid, deformable = max(rigid, 0), max(deformable, 0)
@@ -163,11 +178,18 @@ def _header(card: Card, first: Row, second: Row) -> Header:
     code = card.integer(first, 1)
     if not code.problem and not BY_TIME <= code.value <= BY_SENSOR:
         code = Value(code.value, code.field, f"CODE is {code.value}, {BY_TIME} to {BY_SENSOR} was expected")
+    swset = card.integer(first, 0)
+    if not swset.problem and swset.value <= 0:
+        swset = Value(swset.value, swset.field, f"SWSET is {swset.value}, a positive number was expected")
+    time1 = card.real(first, 2)
+    if code.value == BY_TIME and not time1.problem and _runs_over(first):
+        problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.field(3).text})"
+        time1 = Value(time1.value, time1.field, problem)
     others = [card.real(first, 3), card.real(first, 4), *(card.real(second, at) for at in (0, 1, 2, 3, 6))]
     return Header(
-        swset=_moved(card.integer(first, 0), card.transform.rest),
+        swset=_moved(swset, card.transform.rest),
         code=code,
-        time1=card.real(first, 2),
+        time1=time1,
         entno=card.integer(first, 5),
         relsw=_moved(card.integer(first, 6), card.transform.rest),
         paired=card.integer(first, 7),
@@ -175,6 +197,14 @@ def _header(card: Card, first: Row, second: Row) -> Header:
         to_deformable=card.integer(second, 5),
         others=tuple(others),
     )
+
+
+def _runs_over(row: Row) -> bool:
+    """Whether digits of TIME1 seem to go on as TIME2: a number of its own that fills its field has a point."""
+    border = 3 * row.width
+    rest = row.text[border : border + row.width].strip()
+    touching = row.text[border - 1 : border].isdigit() and row.text[border : border + 1].isdigit()
+    return touching and "," not in row.text and "." not in rest and rest.strip("0") != ""
 
 
 _Line = tuple[Switched, Value[str]]

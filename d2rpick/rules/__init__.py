@@ -43,7 +43,7 @@ def find_rules(name: str) -> tuple[Rule, ...]:
     Examples
     --------
     >>> [rule.id for rule in find_rules("d2r30")]
-    ['D2R301', 'D2R302', 'D2R303']
+    ['D2R301', 'D2R302', 'D2R303', 'D2R304']
     """
     found = tuple(rule for rule in RULES.values() if name and rule.id.startswith(name.upper()))
     if not found:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.deck.includes import UNKNOWN_KIND
 from d2rpick.deck.rows import Field
+from d2rpick.deck.switching import misspelt
 from d2rpick.rules.base import Example, Rule, Severity
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
@@ -25,21 +27,38 @@ def _counts(case: Case) -> Iterator[Objection]:
 
 
 def _fields(case: Case) -> Iterator[Objection]:
+    for unknown, near in misspelt(case.deck):
+        head = unknown.block.head.strip()
+        yield unknown.here, f"{head!r} is no keyword that switches, so its lines were not read; did you mean {near}?"
     for card in case.sets:
         for field, problem in card.problems:
             yield field, f"{problem}; check its columns and its parameters"
     if case.sets:
+        for field, problem in (*case.parts.problems, *_unreadable_members(case)):
+            yield field, f"{problem}; it is needed to know which parts are switched"
         for support, value in case.supporting:
             if value.problem:
                 yield value.field, f"{value.problem}; *{support.name} is needed to judge the switching times"
 
 
+def _unreadable_members(case: Case) -> Iterator[Objection]:
+    used = dict.fromkeys(line.part.value for card in case.sets for line in card.switched if line.by_set)
+    for set_id in dict.fromkeys(reached for one in used for reached in case.parts.reached(one)):
+        content = case.parts.sets.get(set_id)
+        yield from content.problems if content else ()
+
+
+_CURES: Final = {
+    "no such file": "add the file or its *INCLUDE_PATH",
+    UNKNOWN_KIND: "check its file by itself",
+}
+
+
 def _includes(case: Case) -> Iterator[Objection]:
     for missing in case.deck.unread:
-        if missing.reason:
-            cure = "add the file or its *INCLUDE_PATH" if missing.reason == "no such file" else "correct it"
-            found = f"include {missing.name.text!r} was not read ({missing.reason})"
-            yield missing.name, f"{found}; switching cards may hide in it: {cure}"
+        cure = _CURES.get(missing.reason, "correct it")
+        found = f"include {missing.name.text!r} was not read ({missing.reason})"
+        yield missing.name, f"{found}; switching cards may hide in it: {cure}"
 
 
 def _ambiguous(case: Case) -> Iterator[Objection]:
@@ -103,20 +122,23 @@ RULES: Final = (
         "the rows after a card do not match its D2R/R2D counts",
         "The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC counts the D2R and R2D lines that follow it, "
         "one per part. With wrong counts the solver reads a part from the wrong line, or a line as the "
-        "next card.",
+        "next card. A card whose counts are both 0 switches nothing.",
         _counts,
         (Example(GOOD),),
         (
             Example(HEAD + PARTS + automatic(1, "0.02", rigid=["1"], counts=(2, 0)) + BACK + END),
             Example("*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1\n"),
+            Example(HEAD + PARTS + automatic(1, "0.02", rigid=["1"], counts=(2, -1)) + BACK + END),
+            Example(HEAD + PARTS + automatic(1, "0.02") + END),
         ),
     ),
     Rule(
         "D2R002",
         Severity.ERROR,
-        "a field that is not a number, or a &parameter that is not defined",
+        "a switching keyword, number or &parameter that cannot be read",
         "Fields are 10 columns wide (20 in long format) unless the line has commas. A text in a number's "
         "columns, or a parameter nobody defines, stops the run or, worse, is read as something else. "
+        "So is a keyword that begins like a switching card but is none. "
         "ENDTIM and the DT of *DATABASE_GLSTAT and _MATSUM are looked at too: the switching times are "
         "judged by them.",
         _fields,
@@ -124,19 +146,26 @@ RULES: Final = (
         (
             Example(HEAD + _BY_NAME),
             Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
+            Example(HEAD + PARTS + automatic(0, "0.02", rigid=["1"]) + END),
+            Example(GOOD.replace("      0.02       0.0", "    0.0135867    0.0")),
+            Example("*SET_PART\n         3\n     &door\n*DEFORMABLE_TO_RIGID\n         3         0      PSET\n"),
+            Example(GOOD.replace("         2         1         1", "       abc         1         1")),
+            Example(HEAD + "*INCLUDE_TRANSFORM\nall.k\n" + f"{'&off':>30s}\n", {"all.k": PARTS + THERE + BACK}),
+            Example(GOOD.replace("_AUTOMATIC", "_AUTOMATC")),
+            Example(GOOD.replace("*DEFORM", "* DEFORM")),
             Example("*DEFORMABLE_TO_RIGID\n         1         0      WALL\n"),
         ),
     ),
     Rule(
         "D2R003",
         Severity.ERROR,
-        "an include file is missing",
+        "an include file is missing or cannot be read",
         "Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's "
         "folder. A file that includes itself or cannot be read is reported too. Switching cards, parts or "
         "parameters may be in it, so the other findings are not the whole truth.",
         _includes,
         (Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}),),
-        (Example(HEAD + "*INCLUDE\nnowhere.k\n" + END),),
+        (Example(HEAD + "*INCLUDE\nnowhere.k\n" + END), Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END)),
     ),
     Rule(
         "D2R109",

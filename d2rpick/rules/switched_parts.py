@@ -11,7 +11,8 @@ from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, aut
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from d2rpick.deck import SwitchSet
+    from d2rpick.deck import Parts, SwitchSet
+    from d2rpick.deck.switching import Switched
     from d2rpick.deck.windows import Event, Unit
     from d2rpick.rules.base import Case, Objection
 
@@ -72,16 +73,31 @@ def _exists(case: Case) -> Iterator[Objection]:
         missing: dict[str, list[int]] = {}
         for line in card.switched:
             if not line.part.problem:
-                kind, known = ("part set", case.parts.sets) if line.by_set else ("part", case.parts.materials)
-                if line.part.value not in known:
-                    missing.setdefault(kind, []).append(line.part.value)
+                for kind, absent in _absent(line, case.parts).items():
+                    missing.setdefault(kind, []).extend(absent)
             if line.lead and line.lead.value and line.lead.value not in case.parts.materials:
                 missing.setdefault("lead part", []).append(line.lead.value)
         for kind, ids in missing.items():
-            yield (
-                card.card.here,
-                f"{name_units(ids, kind)} not in the deck; check the ids and include offsets",
-            )
+            if ids:
+                yield card.card.here, f"{name_units(ids, kind)} not in the deck; check the ids and include offsets"
+        empty = [
+            line.part.value
+            for line in card.switched
+            if line.by_set and not line.part.problem and case.parts.members(line.part.value) == ()
+        ]
+        if empty:
+            yield card.card.here, f"{name_units(empty, 'part set')} without a part in the deck, so nothing is switched"
+
+
+def _absent(line: Switched, parts: Parts) -> dict[str, list[int]]:
+    """Part, part sets and members of part sets of a line that the deck does not have."""
+    if not line.by_set:
+        return {"part": [line.part.value] if line.part.value not in parts.materials else []}
+    members = parts.members(line.part.value) or ()
+    return {
+        "part set": [one for one in parts.reached(line.part.value) if one not in parts.sets],
+        "part": [part for part in members if part not in parts.materials],
+    }
 
 
 def _always_rigid(case: Case) -> Iterator[Objection]:
@@ -142,6 +158,7 @@ def _together(case: Case, one: Unit, other: Unit) -> bool:
     return any(a < d and c < b for a, b in spans[one] for c, d in spans[other])
 
 
+_LAYERED = "*PART_COMPOSITE\nroof\n         7         2\n         1       0.5\n"
 _RIGID = "*MAT_RIGID\n         1    7.8E-9     210.0       0.3\n"
 _TOUCHING = """\
 *ELEMENT_SHELL
@@ -154,6 +171,14 @@ def _both(*lines: str) -> Example:
     there = automatic(1, "0.02", rigid=lines)
     return Example(HEAD + PARTS + _TOUCHING + there + automatic(2, "0.09", deformable=["1", "2"]) + END)
 
+
+_LAYERS, _BEAMS = (
+    Example(_both("1", "2").deck.replace(_TOUCHING, text))
+    for text in (
+        _TOUCHING.replace("SHELL", "SHELL_COMPOSITE").replace("       4\n", "       4\n         1       0.5\n"),
+        "*ELEMENT_BEAM_ELFORM\n" + "".join(f"{one:8d}{one:8d}{one:8d}{one + 1:8d}\n{1:10d}\n" for one in (1, 2)),
+    )
+)
 
 RULES: Final = (
     Rule(
@@ -186,7 +211,8 @@ RULES: Final = (
         "D2R106",
         Severity.ERROR,
         "part or part set not in the deck (only when every include was read)",
-        "A switching card names a part, part set or lead part that no *PART or *SET_PART defines. Judged "
+        "A switching card names a part, part set or lead part that no *PART or *SET_PART defines, or a set "
+        "without parts. Judged "
         "only when all of the deck could be read and it has parts at all.",
         _exists,
         (
@@ -196,7 +222,11 @@ RULES: Final = (
         ),
         (
             Example(HEAD + PARTS + automatic(1, "0.02", rigid=["7"]) + END),
-            Example(HEAD + PARTS + "*DEFORMABLE_TO_RIGID\n         3         0      PSET\n" + END),
+            *(
+                Example(HEAD + PARTS + text + "*DEFORMABLE_TO_RIGID\n         3         0      PSET\n" + END)
+                for text in ("", "*SET_PART\n         3\n", "*SET_PART\n         3\n         1         7\n")
+            ),
+            Example(HEAD + PARTS + _LAYERED + automatic(1, "0.02", rigid=["8"]) + END),
         ),
     ),
     Rule(
@@ -217,6 +247,6 @@ RULES: Final = (
         "share. Merge them: the lead part with LRB 0, the others with LRB = the lead.",
         _torn,
         (_both("1", "         2         1      PART"),),
-        (_both("1", "2"),),
+        (_both("1", "2"), _LAYERS, _BEAMS),
     ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck.switching import BY_SENSOR
+from d2rpick.deck.switching import BY_SENSOR, BY_TIME
 from d2rpick.rules.base import Example, Rule, Severity, name_units
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
@@ -35,6 +35,10 @@ def _in_run(case: Case) -> Iterator[Objection]:
                     "correct one of them"
                 ),
             )
+        latest = header.others[0]  # TIME2
+        if header.code.value != BY_TIME and not latest.problem and 0 < latest.value < header.time1.value:
+            problem = f"TIME2 is {latest.value:g}, before TIME1 ({header.time1.value:g}), so nothing is ever switched"
+            yield latest.field, f"{problem}; a later time was expected, or 0 for no end"
 
 
 def _closed(case: Case) -> dict[tuple[SwitchSet, SwitchSet], list[Window]]:
@@ -129,10 +133,14 @@ RULES: Final = (
         Severity.ERROR,
         "switch time outside [0, ENDTIM)",
         "TIME1 is the switching time for CODE 0 and the earliest one for CODE 1 to 4. At or after ENDTIM of "
-        "*CONTROL_TERMINATION the switch never happens.",
+        "*CONTROL_TERMINATION the switch never happens, and with CODE 1 to 4 not after TIME2 either.",
         _in_run,
         (Example(GOOD),),
-        (_window("0.02", "0.2"), _window("-0.02", "0.09")),
+        (
+            _window("0.02", "0.2"),
+            _window("-0.02", "0.09"),
+            Example(PARTS + automatic(1, "0.02", rigid=["1"], code=2).replace("       0.0", "      0.01", 1) + END),
+        ),
     ),
     Rule(
         "D2R102",
