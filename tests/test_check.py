@@ -326,6 +326,17 @@ def test_windows_that_are_none_are_left_to_other_rules() -> None:
     assert rules(answer("check", place("main.k", HEAD + PARTS + THERE), "--history", ENERGY)) == ["D2R104"]
 
 
+@pytest.mark.parametrize(
+    ("tr", "options", "objections"),
+    [("0.19", (), {"D2R205"}), ("0.02", ("--after", "0.03"), {"D2R204"}), ("0.04", ("--after", "0.03"), set())],
+)
+def test_tr_is_judged_whatever_becomes_of_td(tr: str, options: tuple[str, ...], objections: set[str]) -> None:
+    there, back = automatic(1, tr, rigid=["1"]), automatic(2, "0.01", deformable=["1"])
+    for deck, other in ((there, "D2R104"), (there + back, "D2R102")):
+        found = answer("check", place("main.k", PARTS + deck), "--history", ENERGY, "--select", "D2R1,D2R2", *options)
+        assert set(rules(found)) - {other} == objections
+
+
 def test_what_the_readers_left_out_is_noted() -> None:
     data = Path(GLSTAT).read_bytes()
     Path("glstat").write_bytes(data[: len(data) - 200])
