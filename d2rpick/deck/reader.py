@@ -107,7 +107,7 @@ class _Reader:
             if name == "KEYWORD" and (found := _LONG.search(block.head)):
                 width = LONG if found[1].upper() == "Y" else STANDARD
             own = LONG if "+" in suffix else STANDARD if "-" in suffix else width
-            self.take(Card(name, block, context.scope, own, context.transform), context, width)
+            self.take(Card(name, block, context.scope.as_of_now(), own, context.transform), context, width)
 
     def take(self, card: Card, context: _Context, width: int) -> None:
         """Keep a card, or do what it asks the reader to do."""
@@ -115,7 +115,7 @@ class _Reader:
             if re.search(r"\*(DEFORMABLE_TO_RIGID|RIGID_DEFORMABLE)", card.block.head, re.IGNORECASE):
                 self.deck.disabled.append(card)
         elif card.name.startswith("PARAMETER"):
-            card.scope.define(card.name, card.rows)
+            context.scope.define(card.name, card.rows)
         elif card.name in _PATHS:
             self.folders.add(card)
         elif card.name.startswith("INCLUDE"):
@@ -141,7 +141,7 @@ class _Reader:
                 reason = "no permission to read it"
             else:
                 chain = (*context.chain, os.path.realpath(card.file))
-                self.read(path, _Context(Scope(card.scope), width, asked.transform, chain))
+                self.read(path, _Context(Scope(context.scope), width, asked.transform, chain))
                 continue
             self.deck.unread.append(Unread(asked.name, reason))
 
