@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import re
+from bisect import bisect_right
+from collections import defaultdict
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final
 
 from d2rpick.deck.card import Card, Transform
@@ -37,7 +40,7 @@ class Deck:
     included: list[Card] = field(default_factory=list)
     unread: list[Unread] = field(default_factory=list)
     scope: Scope = field(default_factory=Scope)
-    files: int = 0
+    files: list[str] = field(default_factory=list)
 
     def named(self, *names: str) -> list[Card]:
         """Cards whose keyword is one of ``names``, or one of them with an option behind ``_``."""
@@ -46,12 +49,24 @@ class Deck:
 
     def silences(self, rule: str, file: str, line: int) -> bool:
         """Whether a comment before the card that holds ``line`` of ``file`` silences ``rule``."""
-        holders = [card for card in self._all if card.file == file and card.line <= line]
-        return bool(holders) and rule in max(holders, key=lambda card: card.line).block.silenced
+        cards = self._by_line[file]
+        before = bisect_right(cards, line, key=lambda card: card.line)
+        named = cards[before - 1].block.silenced if before else ()
+        return rule.startswith(tuple(name for name in named if name.startswith("D2R")))
 
     @property
-    def _all(self) -> list[Card]:
-        return [*self.cards, *self.disabled, *self.included]
+    def silencing(self) -> list[Card]:
+        """Cards before which a comment silences rules."""
+        return [card for cards in self._by_line.values() for card in cards if card.block.silenced]
+
+    @cached_property
+    def _by_line(self) -> defaultdict[str, list[Card]]:
+        found: defaultdict[str, list[Card]] = defaultdict(list)
+        for card in (*self.cards, *self.disabled, *self.included):
+            found[card.file].append(card)
+        for cards in found.values():
+            cards.sort(key=lambda card: card.line)
+        return found
 
 
 def read_deck(path: str) -> Deck:
@@ -95,8 +110,8 @@ class _Reader:
         self.folders = Folders(deck.path)
 
     def read(self, path: str, context: _Context) -> None:
-        self.deck.files += 1
-        if self.deck.files > _MOST_FILES:
+        self.deck.files.append(path)
+        if len(self.deck.files) > _MOST_FILES:
             raise DeckError(f"{path}: more than {_MOST_FILES} includes were read; do the files include each other?")
         width = context.width
         for block in SourceFile(path).blocks():
