@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from d2rpick.deck import Window
     from d2rpick.history import History, Momenta
     from d2rpick.readers import Run, Selection
-    from d2rpick.situation import Settings, Situation
+    from d2rpick.situation import Settings
 
 # What verify warns of and no rule reports.
 _KEPT: Final = ("truncated-input", "energy-only", "no-free-flight", "flight-from-energy", "plastic-or-preload")
+_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time with --after"
 
 
 @dataclass
@@ -99,7 +100,7 @@ class HistoryJudge:
         if outside:
             return
         if td is None:
-            yield from _of_load(examine(history, last, self.settings), tr)
+            yield from _of_load(history, tr, self.settings)
             return
         verdict = verify(history, tr, td, self.settings)
         if part is not None and not history.energy.any():
@@ -135,11 +136,20 @@ def faults_of(verdict: Verdict) -> Iterator[Fault]:
         yield Fault("D2R203", True, f"{what} and cannot be kept by any tr; {way_out}")
 
 
-def _of_load(situation: Situation, tr: float) -> Iterator[Fault]:
-    """Judge a tr from which the part stays rigid to the end of the history."""
-    earliest = situation.earliest_tr
-    if earliest is not None and tr < earliest:
-        end = f"before the end of the load at {earliest:.6g} ({situation.flight.source})"
+def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]:
+    """Judge a tr of which no td is known: it should lie in the last flight of the history, or in one around it."""
+    last = examine(history, float(history.time[-1]), settings)
+    earliest = last.earliest_tr
+    if earliest is not None and tr >= earliest:
+        return
+    around = examine(history, tr, settings)
+    start = around.earliest_tr
+    if around.flight.source != "energy" and start is not None and start <= tr <= around.latest_td:
+        return
+    if earliest is None:
+        yield Fault("D2R204", False, _UNKNOWN)
+    else:
+        end = f"before the end of the load at {earliest:.6g} ({last.flight.source})"
         yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; switch after it")
 
 
@@ -147,7 +157,7 @@ def _of_flight(verdict: Verdict) -> Iterator[Fault]:
     situation, tr = verdict.situation, verdict.candidate.tr
     earliest, flight = situation.earliest_tr, situation.flight
     if earliest is None:
-        yield Fault("D2R204", False, "nothing in the history shows when the load is over; give that time with --after")
+        yield Fault("D2R204", False, _UNKNOWN)
     elif tr < earliest:
         end = f"before the end of the load at {earliest:.6g} ({flight.source})"
         yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; {_way_out(verdict)}")
