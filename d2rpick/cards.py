@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 WIDTH = 10
+_RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
 _POINT = re.compile(r"\d\.\d")
 _MOST_DIGITS = 17
 _NODES_PER_LINE = 10
@@ -39,9 +40,9 @@ _LS_DYNA = (
 )
 _UNCAPPED = (
     "DTMAX is 0: with nothing deformable left the step may grow without limit",
-    "  and the second switch comes late; --step-cap cures it.",
+    "  and the second switch comes late; d2rpick card --step-cap cures it.",
 )
-_UNMERGED = ("Parts that share nodes must be merged into one rigid body (LRB, --merge).",)
+_UNMERGED = ("Parts that share nodes must be merged into one rigid body (d2rpick card --merge).",)
 _RADIOSS = (
     "Ids are main nodes of /RBODY, not bodies; an unknown one is skipped silently.",
     "Gravity and damping act on a rigid body only if its main node is in their",
@@ -111,8 +112,10 @@ def ls_dyna(
     remarks : sequence of str
         Further comment lines.
     """
-    _check_times(tr, td)
+    tr = _check_times(tr, td)
     ids = _check_ids(parts)
+    if sets[0] == sets[1]:
+        raise DeckError(f"both switch sets are {sets[0]}, two different ids were expected")
     _check_ids([*sets, *([] if merge is None else [merge])])
     texts = shortest(tr), shortest(td)
     printed = float(texts[0]), float(texts[1])
@@ -158,7 +161,9 @@ def radioss(
     remarks : sequence of str
         Further comment lines.
     """
-    _check_times(tr, td)
+    tr = _check_times(tr, td)
+    if not _RUN_NAME.fullmatch(name):
+        raise DeckError(f"the name of the run is {name!r}, letters, digits, '.', '_' and '-' were expected")
     if not td < end < math.inf:
         raise DeckError(f"the run ends at {end:g}, a time after td = {td:g} was expected")
     ids = _check_ids(nodes)
@@ -216,9 +221,11 @@ def _roundings(asked: tuple[float, float], texts: tuple[str, str]) -> Iterator[s
             yield f"{name} is printed as {text}, {float(text) - value:+.1e} off {value!r}: nearest in {WIDTH} columns."
 
 
-def _check_times(tr: float, td: float) -> None:
+def _check_times(tr: float, td: float) -> float:
+    """Return tr, without the sign of a negative zero."""
     if not 0 <= tr < td < math.inf:
         raise DeckError(f"tr is {tr:g} and td is {td:g}, 0 <= tr < td was expected")
+    return tr + 0.0
 
 
 def _check_ids(ids: Sequence[int]) -> list[int]:

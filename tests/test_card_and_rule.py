@@ -105,6 +105,12 @@ def test_the_card_goes_to_a_file() -> None:
     assert run("card", *GOOD, "--part", "1", "-o", "card.k").exit_code == 2
 
 
+def test_a_negative_zero_is_printed_as_zero() -> None:
+    assert "-0" not in run("card", "--tr", "-0.0", "--td", "0.02", "--part", "1").stdout.split("*", 1)[1]
+    engine = run("card", "--solver", "radioss", "--tr", "-0.0", "--td", "0.02", "--node", "1", "--end", "1").stdout
+    assert "-0.0" not in engine
+
+
 # card, Radioss.
 
 
@@ -144,6 +150,14 @@ def test_what_a_real_solver_does_at_the_switches_is_told(solver: str) -> None:
         ("--solver radioss --node 1 --tr 0.01 --td 0.02", "needs --end"),
         ("--solver radioss --node 1 --end 0.015 --tr 0.01 --td 0.02", "the run ends at 0.015"),
         ("--solver radioss --node 1 --merge 1 --end 1 --tr 0.01 --td 0.02", "--merge is an option of --solver ls-dyna"),
+        ("--solver radioss --part 7 --node 1 --end 1 --tr 0.01 --td 0.02", "give a --history with parts"),
+        (f"--solver radioss --part 7 --node 1 --tr 0.01 --td 0.02 --history {ENERGY}", "give a --history with parts"),
+        ("--solver radioss --node 1 --end 1 --name a/b --tr 0.01 --td 0.02", "the name of the run is 'a/b'"),
+        ("--solver radioss --node 1 --end 1 --name '' --tr 0.01 --td 0.02", "the name of the run is ''"),
+        ("--part 1 --swset 5 5 --tr 0.01 --td 0.02", "both switch sets are 5"),
+        ("--part 1 --margin 0 --tr 0.01 --td 0.02", "--margin is about an energy history"),
+        ("--part 1 --tolerance 0.3 --tr 0.01 --td 0.02", "--tolerance is about an energy history"),
+        ("--part 1 -F csv --tr 0.01 --td 0.02", "--input-format is about an energy history"),
         ("--part 1 --after 0.01 --tr 0.01 --td 0.02", "name it with --history"),
         (f"--part 1 --tr 0.01 --td 7 --history {ENERGY}", "lies outside the record"),
     ],

@@ -92,6 +92,8 @@ def test_warnings_are_those_that_apply() -> None:
     assert "merged" not in ls_dyna(0.02, 0.09, [11]).text
     assert "already" in ls_dyna(0.02, 0.09, PARTS, merge=5).text
     assert "DTMAX is 0" in ls_dyna(0.02, 0.09, PARTS).text
+    assert "d2rpick card --step-cap" in ls_dyna(0.02, 0.09, PARTS).text
+    assert "d2rpick card --merge" in ls_dyna(0.02, 0.09, PARTS).text
     assert "DTMAX is 0" not in ls_dyna(0.02, 0.09, PARTS, step_cap=1e-5).text
     assert "$ a remark\n" in ls_dyna(0.02, 0.09, PARTS, remarks=["a\nremark"]).text
 

@@ -149,7 +149,9 @@ def test_an_unreadable_deck_is_an_error_of_its_own_in_reports() -> None:
 def test_no_readable_deck_is_no_answer(form: str) -> None:
     place("run.rad", "/RUN/Root/1\n 0.1\n")
     result = run("check", "absent.k", "run.rad", "-f", form, "--exit-zero")
-    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.exit_code == 2
+    assert ("absent.k" in result.stdout) == (form != "table")
+    valid(form, result.stdout)
     assert [line.split(": ")[1] for line in result.stderr.splitlines()] == ["absent.k", "run.rad"]
 
 
@@ -212,6 +214,42 @@ def test_a_wrong_configuration_names_its_file() -> None:
     result = run("check", "main.k", "--select", "D2R1")
     assert result.exit_code == 2
     assert f"{Path('d2rpick.toml').absolute()}: no rule 'D2R10l'" in result.stderr
+
+
+def test_a_broken_configuration_does_not_hide_other_decks() -> None:
+    decks = [place("a/main.k", GOOD), place("b/main.k", LATE)]
+    Path("a/d2rpick.toml").write_text("select = [\n")
+    result = run("check", *decks, "-f", "json")
+    assert result.exit_code == 1
+    assert rules(json.loads(result.stdout)) == ["D2R101"]
+    assert "a/d2rpick.toml" in result.stderr
+
+
+def test_two_spellings_of_a_deck_are_one(tmp_path: Path) -> None:
+    place("main.k", LATE)
+    Path("link.k").symlink_to("main.k")
+    assert answer("check", "main.k", "./main.k", str(tmp_path / "main.k"), "link.k")["decks"] == ["main.k"]
+
+
+def test_a_comment_that_names_no_rule_is_told() -> None:
+    deck = place("main.k", HEAD + PARTS + "$ d2rpick: ignore D2R1O4\n" + THERE + END)
+    assert [w["code"] for w in answer("check", deck)["warnings"]] == ["unknown-rule"]
+    assert (
+        "warning: unknown-rule: main.k: the comment before line 15 ignores no rule: 'D2R1O4'"
+        in run("check", deck).stderr
+    )
+
+
+@pytest.mark.parametrize("name", ["inner.k", "d2rpick.toml"])
+def test_the_result_never_replaces_what_a_deck_leads_to(name: str) -> None:
+    place("main.k", HEAD + PARTS + "*INCLUDE\ninner.k\n" + END)
+    place("inner.k", THERE)
+    place("d2rpick.toml", 'ignore = ["D2R104"]\n')
+    before = Path(name).read_bytes()
+    result = run("check", "main.k", "-o", name, "--overwrite", "--select", "D2R1")
+    assert result.exit_code == 2
+    assert "is an input" in result.stderr
+    assert Path(name).read_bytes() == before
 
 
 def test_the_result_never_replaces_an_input() -> None:
@@ -324,6 +362,17 @@ def test_windows_that_are_none_are_left_to_other_rules() -> None:
     swapped = automatic(1, "0.09", rigid=["1"]) + automatic(2, "0.02", deformable=["1"])
     assert rules(answer("check", place("main.k", HEAD + PARTS + swapped), "--history", ENERGY)) == ["D2R102"]
     assert rules(answer("check", place("main.k", HEAD + PARTS + THERE), "--history", ENERGY)) == ["D2R104"]
+
+
+@pytest.mark.parametrize(
+    ("tr", "options", "objections"),
+    [("0.19", (), {"D2R205"}), ("0.02", ("--after", "0.03"), {"D2R204"}), ("0.04", ("--after", "0.03"), set())],
+)
+def test_tr_is_judged_whatever_becomes_of_td(tr: str, options: tuple[str, ...], objections: set[str]) -> None:
+    there, back = automatic(1, tr, rigid=["1"]), automatic(2, "0.01", deformable=["1"])
+    for deck, other in ((there, "D2R104"), (there + back, "D2R102")):
+        found = answer("check", place("main.k", PARTS + deck), "--history", ENERGY, "--select", "D2R1,D2R2", *options)
+        assert set(rules(found)) - {other} == objections
 
 
 def test_what_the_readers_left_out_is_noted() -> None:

@@ -23,8 +23,9 @@ LONG_CARDS = (
     f"{2:20d}{0:20d}{'0.09':>20s}\n{'':100s}{1:20d}\n{1:20d}{'PART':>20s}\n"
 )
 COMMA = (
+    "*PARAMETER\nRa,0.01\n"
     "*DEFORMABLE_TO_RIGID_AUTOMATIC\n1,0,0.02\n,,,,1\n1,,PART\n"
-    "*DEFORMABLE_TO_RIGID_AUTOMATIC\n2,0,<max(0.09,&a)>\n,,,,,1\n1,PART\n*PARAMETER\nRa,0.01\n"
+    "*DEFORMABLE_TO_RIGID_AUTOMATIC\n2,0,<max(0.09,&a)>\n,,,,,1\n1,PART\n"
 )
 SAME = {
     "plain": GOOD,
@@ -147,6 +148,25 @@ INCLUDES = {
         "*INCLUDE\nlocal.k\n*PARAMETER\nR tr          0.02\n" + automatic(1, "&tr", rigid=["1"]) + BACK,
         {"local.k": "*PARAMETER_LOCAL\nR tr          0.05\n"}, WINDOW,
     ),
+    "local masks the deck's in the same file": (
+        "*PARAMETER\nR tr          0.05\n*PARAMETER_LOCAL\nR tr          0.02\n"
+        + automatic(1, "&tr", rigid=["1"]) + BACK, {}, WINDOW,
+    ),
+    "a local one below a card does not mask for it": (
+        "*PARAMETER\nR tr          0.02\n" + automatic(1, "&tr", rigid=["1"])
+        + "*PARAMETER_LOCAL\nR tr          0.05\n" + BACK, {}, WINDOW,
+    ),
+    "a mutable one changes between two cards": (
+        "*PARAMETER_MUTABLE\nR t           0.02\n" + automatic(1, "&t", rigid=["1"])
+        + "*PARAMETER_MUTABLE\nR t           0.09\n" + automatic(2, "&t", deformable=["1"]), {}, WINDOW,
+    ),
+    "a parameter names the file": (
+        "*PARAMETER\nCfile       cards\n*INCLUDE\n&file.k\n", {"cards.k": THERE + BACK}, WINDOW,
+    ),
+    "a parameter names the folder": (
+        "*PARAMETER\nCdir          sub\n*INCLUDE_PATH\n&dir\n*INCLUDE\ncards.k\n",
+        {"sub/cards.k": THERE + BACK}, WINDOW,
+    ),
     "the first definition counts": (
         "*PARAMETER\nR tr          0.02\n*PARAMETER\nR tr          0.05\n" + automatic(1, "&tr", rigid=["1"]) + BACK,
         {}, WINDOW,
@@ -223,3 +243,11 @@ def test_an_undefined_parameter_is_named(tmp_path: Path) -> None:
     assert place.text == "&a"
     assert "&b is not defined" in problem
     assert "main.k:2" in problem
+
+
+def test_a_parameter_defined_below_its_card_is_a_problem_with_both_places(tmp_path: Path) -> None:
+    deck = read(tmp_path, automatic(1, "&a", rigid=["1"]) + "*PARAMETER\nR a           0.02\n")
+    ((place, problem),) = (found for card in read_switching(deck) for found in card.problems)
+    assert place.text == "&a"
+    assert "defined only below, at" in problem
+    assert "main.k:8" in problem

@@ -131,3 +131,34 @@ def test_parts_without_end_are_one_finding_per_card(tmp_path: Path) -> None:
     deck = HEAD + automatic(1, "0.02", rigid=[str(part) for part in range(1, 40)]) + END
     (finding,) = check_deck(write(tmp_path, deck)).findings
     assert "parts 1-39" in finding.message
+
+
+@pytest.mark.parametrize(
+    ("comment", "silenced"),
+    [
+        ("ignore D2R1", True),
+        ("ignore D2R101 D2R102", True),
+        ("ignore D2R101 because D2R102 was annoying", False),
+        ("ignored D2R102", False),
+    ],
+)
+def test_only_the_list_behind_ignore_counts(tmp_path: Path, comment: str, silenced: bool) -> None:
+    checked = check_deck(write(tmp_path, before_the_second(f"$ d2rpick: {comment}")))
+    assert (not checked.findings) is silenced
+    assert checked.remarks == ()
+
+
+@pytest.mark.parametrize(
+    ("comment", "told"), [("ignore D2R10l", "did you mean D2R1"), ("ignore", "''"), ("ignore D", "'D'")]
+)
+def test_a_comment_that_names_no_rule_is_told(tmp_path: Path, comment: str, told: str) -> None:
+    checked = check_deck(write(tmp_path, before_the_second(f"$ d2rpick: {comment}")))
+    (remark,) = checked.remarks
+    assert told in remark
+    assert [finding.rule for finding in checked.findings] == ["D2R102"]
+
+
+def before_the_second(comment: str) -> str:
+    """A deck with one fault, and a comment before the card that has it."""
+    second = SWAPPED.rindex("*DEFORMABLE_TO_RIGID_AUTOMATIC")
+    return f"{SWAPPED[:second]}{comment}\n{SWAPPED[second:]}"

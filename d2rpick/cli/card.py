@@ -136,13 +136,15 @@ def _radioss(options: dict[str, Any], run: Run | None) -> Writer:
     nodes = _numbers("--node", options["node"])
     if not nodes:
         raise click.UsageError("--solver radioss needs --node, the main nodes of the rigid bodies")
+    if options["part"] and (run is None or not run.parts or options["energy"]):
+        raise click.UsageError("--part chooses by whose energy --solver radioss is judged; give a --history with parts")
     end = options["end"]
     if end is None and run is not None:
         end = max(float(database.time[-1]) for database in run.databases)
     if end is None:
         raise click.UsageError("--solver radioss needs --end, the end of the run, or a --history")
     write = partial(radioss, options["tr"], options["td"], end, nodes, step_cap=options["step_cap"])
-    if options["name"]:
+    if options["name"] is not None:
         write = partial(write, name=options["name"])
     return lambda remarks: write(remarks=remarks)
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
-from d2rpick.errors import DeckError
+from d2rpick.errors import ConfigurationError, DeckError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.cautions import Caution
     from d2rpick.configuration import Configuration
     from d2rpick.rules import Checked, Unreadable
     from d2rpick.rules.judgement import HistoryJudge
@@ -56,15 +58,16 @@ def command(
 
     judge = _judge(options)
     output = Output.of(options, *deck, *(judge.run.sources if judge else ()))
-    results, failed = _checked(deck, judge, options)
-    if judge:
-        output.notes(judge.notes, judge.cautions)
+    results, failed, inputs = _checked(deck, judge, options)
+    output.spare(inputs)
+    output.notes(judge.notes if judge else (), _cautions(results, judge))
     for one in failed:
         click.echo(f"d2rpick: {one.reason}", err=True)
+    limit = Severity(fail_on)
+    if results or output_format != "table":
+        output.result(_text(ctx, output_format, results, failed, judge, limit))
     if not results:
         ctx.exit(2)
-    limit = Severity(fail_on)
-    output.result(_text(ctx, output_format, results, failed, judge, limit))
     heavy = any(finding.severity.rank <= limit.rank for result in results for finding in result.findings)
     finish(ctx, objection=heavy or bool(failed), exit_zero=exit_zero)
 
@@ -81,22 +84,31 @@ def _judge(options: dict[str, Any]) -> HistoryJudge | None:
 
 def _checked(
     decks: Sequence[str], judge: HistoryJudge | None, options: dict[str, Any]
-) -> tuple[list[Checked], list[Unreadable]]:
-    """Check each deck by the configuration nearest to it; one that cannot be read does not hide the others."""
-    from d2rpick.rules import Unreadable, check_deck
+) -> tuple[list[Checked], list[Unreadable], list[str]]:
+    """Check each deck by the configuration nearest to it, and give all files that were read.
 
-    results, failed = [], []
-    for name in dict.fromkeys(decks):
-        configuration = _configuration(name, options)
+    A deck that cannot be read, or whose configuration cannot, does not hide the others.
+    """
+    from d2rpick.configuration import Configuration
+    from d2rpick.rules import RULES, Unreadable, check_deck
+
+    asked = Configuration(_ids(options["select"]), _ids(options["ignore"]))
+    asked.verify(RULES)
+    results, failed, inputs = [], [], []
+    first = {os.path.realpath(name): name for name in reversed(decks)}  # of several spellings
+    for name in (name for name in dict.fromkeys(decks) if name in first.values()):
         try:
+            configuration = _configuration(name, asked)
+            inputs.append(configuration.source)
             results.append(check_deck(name, configuration, judge))
-        except DeckError as error:
+            inputs += results[-1].files
+        except (ConfigurationError, DeckError) as error:
             failed.append(Unreadable(name, str(error)))
-    return results, failed
+    return results, failed, inputs
 
 
-def _configuration(deck: str, options: dict[str, Any]) -> Configuration:
-    """Take the configuration nearest to a deck; options overrule its keys."""
+def _configuration(deck: str, asked: Configuration) -> Configuration:
+    """Take the configuration nearest to a deck; what was asked for by options overrules its keys."""
     from dataclasses import replace
     from pathlib import Path
 
@@ -105,10 +117,14 @@ def _configuration(deck: str, options: dict[str, Any]) -> Configuration:
 
     found = find_configuration(Path(deck).parent)
     found.verify(RULES)
-    select, ignore = _ids(options["select"]), _ids(options["ignore"])
-    if not (select or ignore):
-        return found
-    return replace(found, select=select or found.select, ignore=ignore or found.ignore, source="")
+    return replace(found, select=asked.select or found.select, ignore=asked.ignore or found.ignore)
+
+
+def _cautions(results: Sequence[Checked], judge: HistoryJudge | None) -> list[Caution]:
+    from d2rpick.cautions import Caution
+
+    remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
+    return [*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)]
 
 
 def _ids(texts: Sequence[str]) -> tuple[str, ...]:
@@ -128,7 +144,7 @@ def _text(
     from d2rpick.report import findings as report
 
     root = Path.cwd()
-    warnings = [{"code": c.code, "message": c.message} for c in (judge.cautions if judge else ())]
+    warnings = [{"code": c.code, "message": c.message} for c in _cautions(results, judge)]
     warnings += [{"code": "unreadable-deck", "message": one.reason} for one in failed]
     sources = judge.run.sources if judge else None
     texts = {

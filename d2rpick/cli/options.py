@@ -192,9 +192,11 @@ def open_run(options: dict[str, Any]) -> Run:
 def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
     """Open what the options of ``reference_options`` name; UsageError when they say how to judge but not by what."""
     if not options["history"]:
-        lost = [name for name in ("time", "energy", "flying", "after") if options[name] not in (None, ())]
+        source = click.get_current_context().get_parameter_source
+        names = ("input_format", "time", "energy", "flying", "after", "margin", "tolerance")
+        lost = [name for name in names if source(name) is not click.core.ParameterSource.DEFAULT]
         if lost:
-            raise click.UsageError(f"--{lost[0]} is about an energy history; name it with --history")
+            raise click.UsageError(f"--{_dashed(lost[0])} is about an energy history; name it with --history")
         return None
     from d2rpick.situation import Settings
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -44,6 +44,11 @@ class Output:
         if len({os.path.realpath(name) for name in names}) < len(names):
             raise D2RPickError(f"{plot}: --plot and --output-file name the same file; name two")
         return output
+
+    def spare(self, inputs: Iterable[str]) -> None:
+        """Raise D2RPickError when the result would replace one of further inputs, known only since they were read."""
+        if self.file is not None:
+            replace(self, inputs=tuple(inputs)).claim(self.file)
 
     def claim(self, name: str) -> None:
         """Raise D2RPickError when ``name`` cannot be written, is an input, or exists and was not to be replaced."""

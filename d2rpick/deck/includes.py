@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from d2rpick.deck.card import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.rows import Field, Problem, Row
@@ -38,7 +38,7 @@ class Unread:
 
 def asked_by(card: Card) -> Iterator[Asked]:
     """Files named by ``*INCLUDE`` (one per line) or ``*INCLUDE_TRANSFORM`` (one, and its numbers)."""
-    names = _names(card.rows)
+    names = _names(card)
     if card.name == "INCLUDE":
         yield from (Asked(name, card.transform) for name, _ in names)
     elif first := next(names, None):
@@ -47,9 +47,9 @@ def asked_by(card: Card) -> Iterator[Asked]:
         yield Asked(name, own.inside(card.transform), problems)
 
 
-def _names(rows: Iterable[Row]) -> Iterator[tuple[Field, list[Row]]]:
-    """Every file name, joined over lines that end in blank-plus, and the rows below it."""
-    waiting = list(rows)
+def _names(card: Card) -> Iterator[tuple[Field, list[Row]]]:
+    """Every file name, joined over lines that end in blank-plus, its parameters resolved, and the rows below it."""
+    waiting = list(card.rows)
     while waiting:
         first = waiting.pop(0)
         if first.blank:
@@ -57,7 +57,7 @@ def _names(rows: Iterable[Row]) -> Iterator[tuple[Field, list[Row]]]:
         text = first.text.rstrip()
         while text.endswith(_CONTINUED) and waiting:
             text = text.removesuffix(_CONTINUED).rstrip() + waiting.pop(0).text.strip()
-        yield replace(first.field(0), text=text.strip().strip('"')), waiting
+        yield replace(first.field(0), text=card.scope.text(text.strip().strip('"'))), waiting
 
 
 def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, ...]]:
@@ -83,7 +83,7 @@ class Folders:
 
     def add(self, card: Card) -> None:
         """Take over ``*INCLUDE_PATH``, or ``_RELATIVE`` to the main deck's folder."""
-        for name, _ in _names(card.rows):
+        for name, _ in _names(card):
             self._paths.append(self._main / _portable(name.text))
 
     def find(self, name: Field) -> str | None:

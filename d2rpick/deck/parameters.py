@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from d2rpick.deck.expression import ExpressionError, Number, evaluate, names_in, number
@@ -14,23 +16,39 @@ if TYPE_CHECKING:
     from d2rpick.deck.rows import Field, Row
 
 _LISTED = re.compile(r"\s*[RIC]\s*&?\s*\w+\s*", re.ASCII | re.IGNORECASE)
+_REFERENCE = re.compile(r"&\s*([a-z_]\w*)", re.ASCII | re.IGNORECASE)
 _PAIRS = 4  # name and value, repeated in a line of *PARAMETER
 
 
 @dataclass(frozen=True)
 class Definition:
-    """One line that gives a parameter a value; ``problem`` says why it has none."""
+    """One line that gives a parameter a value; ``problem`` says why it has none, ``order`` counts all of a deck."""
 
     name: str
     value: Number | str
     place: Field
+    order: int
     replaceable: bool = False
     uses: tuple[str, ...] = ()
     problem: str = ""
 
 
+_Table = dict[str, list[Definition]]
+
+
+@dataclass(eq=False)
+class _Whole:
+    """What all files of a deck share."""
+
+    definitions: _Table = field(default_factory=dict)
+    latest_wins: bool = False
+    count: int = 0
+
+
 class Scope:
     """Parameters visible in one file: its own local ones first, then those of the files that include it.
+
+    The parameters that are not local come last.
 
     Of several definitions the first counts (Vol I R17 as quoted by a converter: DFLAG 1 warns and keeps the
     first), unless ``*PARAMETER_DUPLICATION`` or ``_MUTABLE`` let the later one win.
@@ -38,21 +56,27 @@ class Scope:
 
     def __init__(self, outer: Scope | None = None) -> None:
         self._outer = outer
-        self._own: dict[str, list[Definition]] = {}
-        self._latest_wins = False
+        self._local: _Table = {}
+        self._whole: _Whole = outer._whole if outer else _Whole()
+        self._known: float = math.inf  # how many definitions of the deck were read before
+
+    def as_of_now(self) -> Scope:
+        """Return the same scope as a card sees it that stands here: later definitions do not count for its values."""
+        seen = copy.copy(self)
+        seen._known = self._whole.count
+        return seen
 
     def definitions(self, name: str) -> tuple[Definition, ...]:
-        """All definitions of ``name`` (lower case) in the innermost scope that has one."""
-        if name in self._own:
-            return tuple(self._own[name])
-        return self._outer.definitions(name) if self._outer else ()
+        """All definitions of ``name`` (lower case), later ones too, in the innermost scope that has one by now."""
+        found = [table[name] for table in self._tables() if name in table]
+        return tuple(next((each for each in found if each[0].order < self._known), found[0] if found else ()))
 
     def definition(self, name: str) -> Definition | None:
         """Return the definition that counts."""
-        found = self.definitions(name)
+        found = [definition for definition in self.definitions(name) if definition.order < self._known]
         if not found:
             return None
-        return found[-1] if self._whole._latest_wins or found[-1].replaceable else found[0]
+        return found[-1] if self._whole.latest_wins or found[-1].replaceable else found[0]
 
     def closure(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """Return ``names`` and all parameters their definitions refer to, directly or not."""
@@ -76,25 +100,30 @@ class Scope:
 
     def text(self, text: str) -> str:
         """Return the text of a field, where ``&name`` of a character parameter stands for its text."""
-        found = self.definition(text[1:].strip().lower()) if text.startswith("&") else None
-        return found.value if found and isinstance(found.value, str) else text
+
+        def value(reference: re.Match[str]) -> str:
+            found = self.definition(reference[1].lower())
+            return found.value if found and isinstance(found.value, str) else reference[0]
+
+        return _REFERENCE.sub(value, text)
 
     def define(self, keyword: str, rows: Sequence[Row]) -> None:
         """Take over the definitions of a ``*PARAMETER`` card."""
         options = set(keyword.split("_")[1:])
         if "DUPLICATION" in options:
             flags = [row.field(0).text for row in rows[:1]]
-            self._whole._latest_wins = flags[:1] in (["2"], ["4"])
+            self._whole.latest_wins = flags[:1] in (["2"], ["4"])
             return
-        target = self if "LOCAL" in options else self._whole
+        target = self._local if "LOCAL" in options else self._whole.definitions
         for row, name, text in _pairs(rows, options):
             definition = self._definition(row, name, text, "MUTABLE" in options)
             if definition is not None:
-                target._own.setdefault(definition.name, []).append(definition)
+                target.setdefault(definition.name, []).append(definition)
+                self._whole.count += 1
 
-    @property
-    def _whole(self) -> Scope:
-        return self._outer._whole if self._outer else self
+    def _tables(self) -> Iterator[_Table]:
+        yield self._local
+        yield from self._outer._tables() if self._outer else (self._whole.definitions,)
 
     def _definition(self, row: Row, named: str, text: str, replaceable: bool) -> Definition | None:
         kind, name = named[:1].upper(), named[1:].strip().lstrip("&").strip().lower()
@@ -111,11 +140,14 @@ class Scope:
                 value = int(value) if kind == "I" else float(value)
             except ExpressionError as error:
                 value, problem = 0, str(error)
-        return Definition(name, value, row.field(0), replaceable, uses, problem)
+        return Definition(name, value, row.field(0), self._whole.count, replaceable, uses, problem)
 
     def _number(self, name: str) -> Number:
         definition = self.definition(name)
         if definition is None:
+            if later := self.definitions(name):
+                place = later[0].place
+                raise ExpressionError(f"parameter &{name} is defined only below, at {place.file}:{place.line}")
             raise ExpressionError(f"parameter &{name} is not defined")
         if definition.problem:
             place = definition.place

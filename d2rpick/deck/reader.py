@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import re
+from bisect import bisect_right
+from collections import defaultdict
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final
 
 from d2rpick.deck.card import Card, Transform
@@ -42,7 +45,7 @@ class Deck:
     unread: list[Unread] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
     scope: Scope = field(default_factory=Scope)
-    files: int = 0
+    files: list[str] = field(default_factory=list)
 
     def named(self, *names: str) -> list[Card]:
         """Cards whose keyword is one of ``names``, or one of them with an option behind ``_``."""
@@ -51,12 +54,24 @@ class Deck:
 
     def silences(self, rule: str, file: str, line: int) -> bool:
         """Whether a comment before the card that holds ``line`` of ``file`` silences ``rule``."""
-        holders = [card for card in self._all if card.file == file and card.line <= line]
-        return bool(holders) and rule in max(holders, key=lambda card: card.line).block.silenced
+        cards = self._by_line[file]
+        before = bisect_right(cards, line, key=lambda card: card.line)
+        named = cards[before - 1].block.silenced if before else ()
+        return rule.startswith(tuple(name for name in named if name.startswith("D2R")))
 
     @property
-    def _all(self) -> list[Card]:
-        return [*self.cards, *self.disabled, *self.included]
+    def silencing(self) -> list[Card]:
+        """Cards before which a comment silences rules."""
+        return [card for cards in self._by_line.values() for card in cards if card.block.silenced]
+
+    @cached_property
+    def _by_line(self) -> defaultdict[str, list[Card]]:
+        found: defaultdict[str, list[Card]] = defaultdict(list)
+        for card in (*self.cards, *self.disabled, *self.included):
+            found[card.file].append(card)
+        for cards in found.values():
+            cards.sort(key=lambda card: card.line)
+        return found
 
 
 def read_deck(path: str) -> Deck:
@@ -100,8 +115,8 @@ class _Reader:
         self.folders = Folders(deck.path)
 
     def read(self, path: str, context: _Context) -> None:
-        self.deck.files += 1
-        if self.deck.files > _MOST_FILES:
+        self.deck.files.append(path)
+        if len(self.deck.files) > _MOST_FILES:
             raise DeckError(f"{path}: more than {_MOST_FILES} includes were read; do the files include each other?")
         width = context.width
         for block in SourceFile(path).blocks():
@@ -112,7 +127,7 @@ class _Reader:
             if name == "KEYWORD" and (found := _LONG.search(block.head)):
                 width = LONG if found[1].upper() == "Y" else STANDARD
             own = LONG if "+" in suffix else STANDARD if "-" in suffix else width
-            self.take(Card(name, block, context.scope, own, context.transform), context, width)
+            self.take(Card(name, block, context.scope.as_of_now(), own, context.transform), context, width)
 
     def take(self, card: Card, context: _Context, width: int) -> None:
         """Keep a card, or do what it asks the reader to do."""
@@ -120,7 +135,7 @@ class _Reader:
             if re.search(r"\*(DEFORMABLE_TO_RIGID|RIGID_DEFORMABLE)", card.block.head, re.IGNORECASE):
                 self.deck.disabled.append(card)
         elif card.name.startswith("PARAMETER"):
-            card.scope.define(card.name, card.rows)
+            context.scope.define(card.name, card.rows)
         elif card.name in _PATHS:
             self.folders.add(card)
         elif card.name.startswith("INCLUDE"):
@@ -147,7 +162,7 @@ class _Reader:
                 reason = "no permission to read it"
             else:
                 chain = (*context.chain, os.path.realpath(card.file))
-                self.read(path, _Context(Scope(card.scope), width, asked.transform, chain))
+                self.read(path, _Context(Scope(context.scope), width, asked.transform, chain))
                 continue
             self.deck.unread.append(Unread(asked.name, reason))
 

@@ -22,7 +22,7 @@ _ANCHOR = _PGP.index(b"G")  # a letter that mesh data never holds: looking for i
 _MARK = b"\xef\xbb\xbf"  # byte order mark of UTF-8
 _HEAD = 1024  # longest keyword line that is looked at
 _BEFORE = 4096  # how far back comments belonging to a keyword are looked for
-_SILENCE = re.compile(r"\$\s*d2rpick:\s*ignore\s+(.*)", re.IGNORECASE)
+_SILENCE = re.compile(r"\$\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)", re.IGNORECASE)
 
 
 class SourceFile:
@@ -156,13 +156,16 @@ class Block:
                 yield distance, raw.rstrip(b"\r\n").decode("latin-1")
 
     @cached_property
-    def silenced(self) -> frozenset[str]:
-        """Rules named by ``$ d2rpick: ignore`` in the comment lines directly before the keyword."""
+    def silenced(self) -> tuple[str, ...]:
+        """Rules, or beginnings of their ids, that ``$ d2rpick: ignore`` names in the comments before the keyword.
+
+        Only what stands directly behind it counts, so that a reason may follow; a word that is no id is given too.
+        """
         before = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(_MARK).decode("latin-1")
-        rules: set[str] = set()
+        rules: list[str] = []
         for line in reversed(before.split("\n")[:-1]):
             if not line.startswith("$"):
                 break
             if found := _SILENCE.match(line):
-                rules.update(re.findall(r"D2R\d*", found[1].upper()))
-        return frozenset(rules)
+                rules += re.split(r"[\s,]+", found[1].strip(" \t\r,").upper())
+        return tuple(rules)

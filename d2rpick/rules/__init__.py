@@ -12,9 +12,9 @@ from d2rpick.rules import energy, pairs, reading, scope, switched_parts, times
 from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, Severity, Unreadable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
-    from d2rpick.deck import Window
+    from d2rpick.deck import Deck, Window
 
 __all__ = [
     "RULES",
@@ -53,12 +53,17 @@ def find_rules(name: str) -> tuple[Rule, ...]:
 
 @dataclass(frozen=True)
 class Checked:
-    """What was found in one deck; ``cards`` is the number of its switching cards."""
+    """What was found in one deck; ``cards`` is the number of its switching cards, ``files`` all that were read.
+
+    ``remarks`` tell of comments in the deck that silence nothing.
+    """
 
     deck: str
     windows: tuple[Window, ...]
     findings: tuple[Finding, ...]
     cards: int = 0
+    files: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 def check_deck(path: str, configuration: Configuration | None = None, judge: Judge | None = None) -> Checked:
@@ -107,4 +112,15 @@ def check_deck(path: str, configuration: Configuration | None = None, judge: Jud
     for finding in findings:
         order.setdefault(finding.file, len(order))
     findings.sort(key=lambda finding: (order[finding.file], finding.line, finding.column, finding.rule))
-    return Checked(path, case.windows.windows, tuple(findings), len(case.sets))
+    return Checked(
+        path, case.windows.windows, tuple(findings), len(case.sets), tuple(case.deck.files), tuple(_remarks(case.deck))
+    )
+
+
+def _remarks(deck: Deck) -> Iterator[str]:
+    """Tell of comments that ignore rules that do not exist."""
+    for card in deck.silencing:
+        for name in card.block.silenced:
+            if not (name.startswith("D2R") and any(rule.startswith(name) for rule in RULES)):
+                where = f"{card.file}: the comment before line {card.line}"
+                yield f"{where} ignores no rule: {name!r} was found, {expected_instead(name, RULES)}"

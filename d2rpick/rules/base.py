@@ -96,7 +96,7 @@ class Case:
         """ENDTIM as written; of several the last counts."""
         return next((value for card, value in self.supporting if card.name == "CONTROL_TERMINATION"), None)
 
-    @property
+    @cached_property
     def end(self) -> float | None:
         """ENDTIM [time of the deck], where it is known and positive."""
         cards = self.deck.named("CONTROL_TERMINATION")
@@ -104,7 +104,7 @@ class Case:
             return None
         return self.end_time.value * cards[-1].transform.time
 
-    @property
+    @cached_property
     def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:
         """Numbers of other cards that the rules rely on: ENDTIM, and DT of the energy databases."""
         names = ("CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.cautions import POOR_KINETIC_SHARE, Caution
 from d2rpick.choice import Verdict, better_pair, suggest, verify
 from d2rpick.rules.base import Fault, name_units
+from d2rpick.situation import examine
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
     from d2rpick.situation import Settings
 
 # What verify warns of and no rule reports.
-_KEPT: Final = ("truncated-input", "energy-only", "flight-from-energy", "plastic-or-preload")
+_KEPT: Final = ("truncated-input", "energy-only", "no-free-flight", "flight-from-energy", "plastic-or-preload")
+_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time with --after"
 
 
 @dataclass
@@ -35,7 +37,7 @@ class HistoryJudge:
     selection: Selection
     settings: Settings
     _histories: dict[int | None, History] = field(default_factory=dict)
-    _faults: dict[tuple[int | None, float, float], tuple[Fault, ...]] = field(default_factory=dict)
+    _faults: dict[tuple[int | None, float, float | None], tuple[Fault, ...]] = field(default_factory=dict)
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
     @property
@@ -67,35 +69,38 @@ class HistoryJudge:
         return self._histories[part]
 
     def faults(self, window: Window) -> tuple[Fault, ...]:
-        """Everything that speaks against a window; windows that are none are left to other rules."""
-        if window.td is None or window.td <= window.tr:
-            return ()
+        """Everything that speaks against a window; of one that is not closed, or inverted, tr alone is judged."""
+        td = window.td if window.td is not None and window.td > window.tr else None
         part = window.part if self._known else None
         if part is not None and part not in self._known:
             there = name_units(self._known)
             return (Fault("D2R205", False, f"not in the history, which has {there}; renumbered, or not written?"),)
-        key = part, window.tr, window.td
+        key = part, window.tr, td
         if key not in self._faults:
             if self._known and part is None:
                 what = f"the members of part set {window.unit.id} are not known, it is judged by the whole model"
                 self._cautions[Caution("judged-by-whole", what)] = []
-            self._faults[key] = tuple(self._judged(part, window.tr, window.td))
+            self._faults[key] = tuple(self._judged(part, window.tr, td))
         return self._faults[key]
 
     @property
     def _known(self) -> list[int]:
         return [] if self.selection.energy else [part.id for part in self.run.parts]
 
-    def _judged(self, part: int | None, tr: float, td: float) -> Iterator[Fault]:
+    def _judged(self, part: int | None, tr: float, td: float | None) -> Iterator[Fault]:
         history = self.history(part)
         first, last = float(history.time[0]), float(history.time[-1])
-        outside = [(name == "td", name, time) for name, time in (("tr", tr), ("td", td)) if not first <= time <= last]
+        times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
+        outside = [(name == "td", name, time) for name, time in times if not first <= time <= last]
         for at_td, name, time in outside:
             message = (
                 f"{name} = {time:.6g} lies outside the history, {first:.6g} to {last:.6g}; correct it or run longer"
             )
             yield Fault("D2R205", at_td, message)
         if outside:
+            return
+        if td is None:
+            yield from _of_load(history, tr, self.settings)
             return
         verdict = verify(history, tr, td, self.settings)
         if part is not None and not history.energy.any():
@@ -131,11 +136,28 @@ def faults_of(verdict: Verdict) -> Iterator[Fault]:
         yield Fault("D2R203", True, f"{what} and cannot be kept by any tr; {way_out}")
 
 
+def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]:
+    """Judge a tr of which no td is known: it should lie in the last flight of the history, or in one around it."""
+    last = examine(history, float(history.time[-1]), settings)
+    earliest = last.earliest_tr
+    if earliest is not None and tr >= earliest:
+        return
+    around = examine(history, tr, settings)
+    start = around.earliest_tr
+    if around.flight.source != "energy" and start is not None and start <= tr <= around.latest_td:
+        return
+    if earliest is None:
+        yield Fault("D2R204", False, _UNKNOWN)
+    else:
+        end = f"before the end of the load at {earliest:.6g} ({last.flight.source})"
+        yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; switch after it")
+
+
 def _of_flight(verdict: Verdict) -> Iterator[Fault]:
     situation, tr = verdict.situation, verdict.candidate.tr
     earliest, flight = situation.earliest_tr, situation.flight
     if earliest is None:
-        yield Fault("D2R204", False, "nothing in the history shows when the load is over; give that time with --after")
+        yield Fault("D2R204", False, _UNKNOWN)
     elif tr < earliest:
         end = f"before the end of the load at {earliest:.6g} ({flight.source})"
         yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; {_way_out(verdict)}")
