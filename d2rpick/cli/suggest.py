@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.card import all_cautions
 from d2rpick.cli.output import Output, finish
 from d2rpick.cli.progress import reading
 
@@ -75,6 +74,7 @@ def command(ctx: click.Context, /, td: float, limit: int, output_format: str, ex
 def _card(answer: Suggestion, output: Output) -> bool:
     """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
     from d2rpick.cards import ls_dyna
+    from d2rpick.cli.card import all_cautions
     from d2rpick.judged_card import judged
 
     pair, history = answer.recommended, answer.situation.history
