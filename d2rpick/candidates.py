@@ -232,9 +232,13 @@ def _objections(
     if earliest is None:
         yield "unknown: nothing shows when the load is over"
     elif tr < earliest:
-        yield f"before the end of the load at {earliest:.6g}"
+        yield f"before {situation.end_of_load}"
     if situation.td > situation.latest_td:
-        yield f"td after the end of the flight at {situation.latest_td:.6g}"
+        yield f"td after {situation.end_of_flight}"
+    if situation.drowned:
+        yield "the level at td has sunk into the scatter of the record"
+    if situation.prescribed and situation.mode is None:
+        yield "the prescribed oscillator does not describe the record at td"
     if situation.vibration and known is None:
         yield _UNDESCRIBED[situation.basis]
     elif known and not known.sign_match:

@@ -59,12 +59,15 @@ def _of_parts(situation: Situation) -> Iterator[Caution]:
 
 def _of_flight(situation: Situation) -> Iterator[Caution]:
     flight, td, earliest = situation.flight, situation.td, situation.earliest_tr
+    if situation.history.momenta and flight.source in ("oscillator", "energy"):
+        found = f"the momentum shows no free flight around td = {td:.6g}"
+        yield Caution("no-free-flight", f"{found}; its start was read off the {flight.source} instead")
     if flight.source == "energy":
         found = f"the end of the load, {flight.start:.6g}, was read off the energy alone"
         yield Caution("flight-from-energy", f"{found}; give it with --after where it is known")
     if earliest is None:
         yield Caution("no-flight", "nothing in the record shows when the load is over; give that time with --after")
     elif td <= earliest:
-        yield Caution("td-in-load", f"td = {td:.6g} lies before the end of the load, {earliest:.6g}")
+        yield Caution("td-in-load", f"td = {td:.6g} lies before {situation.end_of_load}")
     if td > situation.latest_td:
-        yield Caution("td-after-contact", f"td = {td:.6g} lies after the end of the flight, {situation.latest_td:.6g}")
+        yield Caution("td-after-contact", f"td = {td:.6g} lies after {situation.end_of_flight}")

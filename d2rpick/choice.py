@@ -73,7 +73,7 @@ def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     best = best_of(situation, candidates)
     if best:
         candidates = tuple(replace(c, recommended=c is best) for c in candidates)
-    better = _better_td(situation)
+    better = better_pair(situation)
     cautions = list(cautions_of(situation))
     if not best:
         cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
@@ -94,7 +94,8 @@ def verify(history: History, tr: float, td: float, settings: Settings) -> Verdic
     known = situation.flight.start is not None
     share = situation.kinetic_share
     limit = POOR_KINETIC_SHARE if settings.max_kinetic_share is None else settings.max_kinetic_share
-    td_ok = False if td > situation.latest_td else None if share is None else share <= limit
+    outside = td > situation.latest_td or (situation.earliest_tr is not None and td <= situation.earliest_tr)
+    td_ok = False if outside else None if share is None else share <= limit
     over = _over_limits(situation, candidate)
     reasons = (*candidate.notes, *over)
     return Verdict(
@@ -168,7 +169,7 @@ def best_of(situation: Situation, ranked: Iterable[Candidate]) -> Candidate | No
     return next((c for c in ranked if c.acceptable and not _over_limits(situation, c)), None)
 
 
-def _better_td(situation: Situation) -> Pair | None:
+def better_pair(situation: Situation) -> Pair | None:
     """Give the nearest peak of the energy in the flight that has an acceptable tr, and the best one there."""
     start = situation.earliest_tr
     if start is None:
@@ -177,6 +178,8 @@ def _better_td(situation: Situation) -> Pair | None:
     end = situation.td if situation.flight.end is None and not situation.span else situation.latest_td
     for td in sorted(situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)):
         there = situation.at(td)
+        if situation.fitted and not there.mode:
+            continue  # the oscillator has sunk into the scatter there
         best = best_of(there, rank(find_candidates(there)))
         if best and not best.same_swing:
             return Pair(best.tr, td, best.residual)

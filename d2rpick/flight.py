@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from d2rpick.crossings import find_crossings
+from d2rpick.history import Samples
 from d2rpick.identify import Identification, identify
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
-    from d2rpick.history import History, Part, Samples
+    from d2rpick.history import History, Part
 
-    Model = Callable[[Samples, Samples], Identification]
-
-# Tails of the record before td that are tried for an oscillator, as shares of what comes before td.  Below an
-# eighth a record has hardly the periods an oscillator needs, and what fits so little of it proves nothing.
-_TAILS = (0.6, 0.36, 0.22, 0.13)
+# Where windows that are tried for an oscillator begin, as shares of what comes before td, and where they end, of what
+# comes after: by such steps one of them lies in any flight of some periods and fills most of it.
+_BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
+# Ends before td, as shares of what comes before it: td itself may lie in the next contact.
+_EARLIER_ENDS = (0.1, 0.2, 0.35)
+# A window that an oscillator describes shows so many periods at least, and holds most of the samples it was fitted to:
+# less may be an accident, or the moment in which a record passes from one thing to another.
+_LEAST_PERIODS, _MOST = 1.25, 0.8
+# An inner fit whose scatter is below this share of that of the whole shows that the ends are not of the flight.
+_MUCH_BETTER = 0.7
 # The record leaves the fitted oscillator where the mean error over a twenty-fifth of a period (three samples at
 # least) exceeds this share of the vibration energy, this many standard errors of such a mean, or this many times the
 # systematic rest that the fit leaves anyway, whichever is most.  Of a million means of white noise one does by chance.
@@ -28,6 +35,9 @@ _SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
 _MOST_REFITS = 8
 # Widening of the band of energies before td, against wiggles of a vibration that the band has not seen.
 _BAND_RESERVE = 0.25
+
+
+Fitter = Callable[[Samples, Samples], Identification]
 
 
 @dataclass(frozen=True)
@@ -52,48 +62,48 @@ class Span(NamedTuple):
 
 
 def described_span(
-    history: History, td: float, first: float, last: float, model: Model = identify
+    history: History, td: float, bounds: Span, fitter: Fitter = identify, *, whole: bool = False
 ) -> tuple[Span | None, Identification]:
-    """Find the longest window around td that one oscillator describes, or whatever ``model`` identifies.
+    """Find the longest window around td that one oscillator describes, or the last one before td.
 
-    First a part of the record that it describes is looked for: all of it, up to td, then ever
-    shorter tails.  From there the window grows both ways while the samples stay with the fit, is fitted anew,
-    and so on until it stays.
+    First a part of the record that one oscillator describes is looked for, long ones first.  From there the window
+    grows both ways while the samples stay with the fit, is fitted anew, and so on until it stays.
 
     Parameters
     ----------
     history : History
-    td, first, last : float
-        Time to look around, and where the search begins and ends [time].
-    model : function
-        `identify`, or `identify_several`.
+    td : float
+        [time]
+    bounds : Span
+        Where to look [time].
+    fitter : callable
+        Gives the oscillator for some samples: `identify`, `identify_several` or one that is given.
+    whole : bool
+        Try nothing shorter than the bounds and their part up to td: it is known that no load acts there.
 
     Returns
     -------
     span : Span or None
-        None when no oscillator describes the record around td.
+        None when no oscillator describes the record around td or before.
     fit : Identification
-        Of that window; when there is none, of the part up to td, with the reason of its refusal.
+        Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
     """
-    refused = []
-    for start, end in _windows(first, td, last):
-        fit = identify_within(history, start, end, model)
-        if fit.describes_record:
-            span, fit = _grow(history, td, fit, first, last, model)
-            if span:
-                return span, fit
-        refused.append(fit)
-    return None, refused[1]
+    refused = {}
+    for window in _windows(td, bounds, whole=whole):
+        span, fit = _grow(history, td, window, bounds, fitter)
+        if span:
+            return span, fit
+        refused[window] = fit
+    return None, refused[Span(bounds.start, td)]
 
 
-def span_of(history: History, td: float, fit: Identification, first: float, last: float) -> Span | None:
-    """Find the window around td, from ``first`` to ``last`` at most, in which the record stays with ``fit``.
+def span_of(history: History, anchor: float, fit: Identification, bounds: Span) -> Span | None:
+    """Find the window around ``anchor`` [time], within ``bounds``, in which the record stays with ``fit``.
 
-    It ends where the energy drifts off the fit; None when it is off at td itself.
+    It ends where the energy drifts off the fit; None when it is off at the anchor itself.
     """
     assert fit.mode is not None
-    inside = slice(*np.searchsorted(history.time, [first, np.nextafter(last, np.inf)]))
-    time, energy = history.time[inside], history.energy[inside]
+    time, energy = _samples(history, bounds)
     period = 2 * np.pi / fit.mode.fastest
     width = max(3, round(period / _MEANS_PER_PERIOD / float(np.sort(np.diff(time))[(time.size - 1) // 2])))
     with np.errstate(over="ignore", invalid="ignore"):  # far off, a damped fit grows beyond all numbers
@@ -101,10 +111,11 @@ def span_of(history: History, td: float, fit: Identification, first: float, last
         room = np.maximum(_SHARE_OFF * fit.mode.vibration_energy(time), least)
         error = np.convolve(energy - fit.mode.energy(time), np.ones(width) / width, mode="same")
         gone = ~(np.abs(error) <= room)
-    middle = int(np.searchsorted(time, td))
+    middle = int(np.searchsorted(time, anchor))
     before, after = np.flatnonzero(gone[:middle]), np.flatnonzero(gone[middle:])
-    left = int(before[-1]) + 1 if before.size else 0
-    right = middle + int(after[0]) - 1 if after.size else time.size - 1
+    # the mean over ``width`` samples reaches half as far beyond its middle
+    left = int(before[-1]) + 1 + width // 2 if before.size else 0
+    right = middle + int(after[0]) - 1 - width // 2 if after.size else time.size - 1
     return Span(float(time[left]), float(time[right])) if left < right else None
 
 
@@ -112,42 +123,83 @@ def energy_flight(history: History, td: float) -> Flight:
     """Take the load to be over when the energy falls into its band before td for the last time.
 
     The band is that of the last quarter of the record before td, widened by a quarter of its width.  Where the
-    energy never was above the band, nothing shows that a load has ended: start and source are None.
+    energy never was above the band, nothing shows that a load has ended, and where its last part leaves the band of
+    the rest, something feeds the part again: start and source are None.
     """
+    length = td - float(history.time[0])
+    earlier, latest = (
+        np.append(history.energy[(history.time >= td - share * length) & (history.time <= end)], history.energy_at(end))
+        for share, end in ((1 / 4, td - length / 16), (1 / 16, td))
+    )
     before = history.time <= td
-    quarter = before & (history.time >= td - (td - history.time[0]) / 4)
-    values = np.append(history.energy[quarter], history.energy_at(td))
+    if latest.max() > earlier.max() + _BAND_RESERVE * np.ptp(earlier):
+        return Flight(None, None, None)
+    values = np.append(earlier, latest)
     level = float(values.max() + _BAND_RESERVE * np.ptp(values))
     falling = [c.time for c in find_crossings(history.time[before], history.energy[before], level) if not c.rising]
     return Flight(falling[-1], None, "energy") if falling else Flight(None, None, None)
 
 
-def _windows(first: float, td: float, last: float) -> Iterator[tuple[float, float]]:
-    """Windows to try: the whole, up to td, then for ever shorter tails up to td, as much beyond, to the end."""
-    yield first, last
-    yield first, td
-    for share in _TAILS:
-        length = share * (td - first)
-        for end in dict.fromkeys((td, min(td + length, last), last)):
-            yield td - length, end
+def identify_within(history: History, window: Span) -> Identification:
+    """Identify the oscillator from the samples in a window."""
+    return identify(*_samples(history, window))
 
 
-def identify_within(history: History, start: float, end: float, model: Model = identify) -> Identification:
-    """Identify the oscillator from the samples in [start, end]."""
-    inside = slice(*np.searchsorted(history.time, [start, np.nextafter(end, np.inf)]))
-    return model(history.time[inside], history.energy[inside])
+def _windows(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
+    """Windows to try: around td, the longest first, then before td."""
+    beginnings = [bounds.start, *(td - share * (td - bounds.start) for share in (() if whole else _BEGINNINGS))]
+    ends = [bounds.end, td, *(td + share * (bounds.end - td) for share in (() if whole else _ENDS))]
+    around = {Span(beginning, end) for beginning in beginnings for end in ends}
+    yield from sorted(around, key=lambda window: window.start - window.end)
+    if not whole:
+        for share in _EARLIER_ENDS:
+            end = td - share * (td - bounds.start)
+            yield from (Span(beginning, end) for beginning in beginnings if beginning < end)
+
+
+def _samples(history: History, window: Span) -> tuple[Samples, Samples]:
+    """Times and energies of the samples in a window."""
+    inside = slice(*np.searchsorted(history.time, [window.start, np.nextafter(window.end, np.inf)]))
+    return history.time[inside], history.energy[inside]
 
 
 def _grow(
-    history: History, td: float, fit: Identification, first: float, last: float, model: Model
+    history: History, td: float, window: Span, bounds: Span, fitter: Fitter
 ) -> tuple[Span | None, Identification]:
-    """Extend the fitted window while the record stays with the fit, refit, repeat."""
-    span = span_of(history, td, fit, first, last)
+    """Fit a window, extend it while the record stays with the fit, refit, repeat until it stays."""
+    fit, span = fitter(*_samples(history, window)), window
     for _ in range(_MOST_REFITS):
-        if span is None or span == (fit.start, fit.end):
-            break
-        refit = identify_within(history, *span, model)
-        if not refit.describes_record:
-            break
-        fit, span = refit, span_of(history, td, refit, first, last)
-    return span, fit
+        if not fit.describes_record or fit.mode is None:
+            return None, fit
+        grown = span_of(history, min(td, window.end), fit, bounds)
+        least = max(_LEAST_PERIODS * 2 * np.pi / fit.mode.omega, _MOST * (window.end - window.start))
+        if grown is None or grown.end - grown.start < least:
+            reason = "the record soon leaves the oscillator that fits a part of it"
+            return None, replace(fit, describes_record=False, reason=reason)
+        if grown == (fit.start, fit.end):
+            return _cleared(history, grown, fit, bounds, fitter)
+        span = grown
+        fit = fitter(*_samples(history, span))
+    return (span, fit) if fit.describes_record else (None, fit)
+
+
+def _cleared(
+    history: History, span: Span, fit: Identification, bounds: Span, fitter: Fitter
+) -> tuple[Span, Identification]:
+    """Fit the window once more without half a period at the ends where the record leaves it.
+
+    There a fit may have given way to the beginning of a contact or the end of a load.  Where the inner fit follows its
+    samples much better, it tells the window.
+    """
+    assert fit.mode is not None
+    inset = np.pi / fit.mode.omega
+    inner = Span(
+        span.start + inset if span.start > bounds.start else span.start,
+        span.end - inset if span.end < bounds.end else span.end,
+    )
+    if inner == span or inner.end - inner.start < 2 * _LEAST_PERIODS * 2 * inset:
+        return span, fit
+    core = fitter(*_samples(history, inner))
+    if not core.describes_record or core.rms > _MUCH_BETTER * fit.rms:
+        return span, fit
+    return span_of(history, (inner.start + inner.end) / 2, core, bounds) or span, core

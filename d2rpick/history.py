@@ -1,4 +1,4 @@
-"""History: the checked internal energy of one run over time, and how finely it was printed."""
+"""What is read of one run: its internal energy over time, checked, its momenta, and how finely they were printed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from d2rpick.errors import HistoryError, RangeError
 
 if TYPE_CHECKING:
-    from d2rpick.momentum import Momenta
+    from collections.abc import Sequence
 
 Samples = NDArray[np.float64]
 
@@ -53,6 +53,39 @@ class Part:
 
     id: int
     title: str
+
+
+@dataclass(frozen=True, eq=False)
+class Momenta:
+    """Momentum of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); None for parts: the whole model.
+
+    ``precision`` is that of the printed numbers; ``chosen`` are the indices of the parts to be switched, ``flying``
+    those of the set that is known to fly together, if it is.
+    """
+
+    time: Samples
+    values: Samples
+    parts: tuple[Part, ...] | None
+    precision: Precision
+    chosen: tuple[int, ...]
+    flying: tuple[int, ...] | None = None
+
+    def of(self, members: Sequence[int]) -> Samples:
+        """Sum over the parts with these indices, shape (n, 3)."""
+        return np.asarray(self.values[:, list(members)].sum(axis=1))
+
+    def noise(self, members: Sequence[int]) -> float:
+        """What the printed digits of these parts leave open in their sum [momentum]."""
+        largest = np.abs(self.values[:, list(members)]).max(axis=(0, 2), initial=0.0)
+        return sum(self.precision.quantum(float(value)) for value in largest) / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Vectors over time: ``time`` of shape (n,), ``values`` of shape (n, 3); a momentum, or the place of a part."""
+
+    time: Samples
+    values: Samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +193,11 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     if equal:
         notes.append(f"{equal} states have the same printed time as the next one; of equal times the last counts")
     if back:
-        notes.append(f"time steps back {back} times (restart); where legs overlap the newer one counts")
+        steps = "once" if back == 1 else f"{back} times"
+        lost = int(np.count_nonzero(~keep)) - equal
+        notes.append(
+            f"time steps back {steps} (restart); where legs overlap the newer one counts, {lost} older states gave way"
+        )
     return keep, tuple(notes)
 
 

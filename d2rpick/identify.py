@@ -313,7 +313,7 @@ def _implausible(mode: Mode | Modes, interval: float, least_periods: float, span
         # a tenth finer than the limit, so that rounding to two digits stays on its safe side
         finer = span / (2 * fastest) / (1.1 * MIN_SAMPLES_PER_PERIOD)
         return (
-            f"the energy has {density:.1f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}, and "
+            f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}, and "
             f"aliasing may fake this mode: ask for an output interval of {finer:.2g} or less"
         )
     return None

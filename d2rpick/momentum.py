@@ -7,7 +7,7 @@ attached to it and vibrates against it, so the set of parts that flies is looked
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,53 +15,27 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from d2rpick.history import Part, Precision, Samples
+    from d2rpick.history import Momenta, Part, Samples
 
 # Misfit that free flight may leave, as a share of the largest component's range over the record: contact shows at once,
 # a solver's own error is a tenth of it.
 TOLERANCE = 1e-3
-# Any smooth motion is straight for a moment.  Such a moment shrinks by the root of a tighter tolerance, free flight
-# hardly does: at a tenth of the tolerance at least half of the window must remain ...
-_TIGHTER, _REMAINS = 0.1, 0.5
-# ... and no window is shorter than this share of the record, or holds fewer states.
+# Any smooth motion obeys the law for a moment; what is left of it there grows with the cube of time or faster.  At a
+# tenth of the tolerance such a moment shrinks by the cube root, free flight hardly does: the limit lies halfway.
+_TIGHTER = 0.1
+# No window is shorter than this share of the record, or holds fewer states.
 _SHORTEST, _FEWEST = 0.05, 12
+# A momentum that changes by less than this share of itself is constant: single precision keeps seven digits.
+_CONSTANT = 1e-6
+# Where it is constant as far as the printed digits tell, the chosen parts must move this many times what these hide.
+_VISIBLE = 100
+# A set with more parts is preferred when its window is longer by this factor.  Some samples more prove nothing: parts
+# with a large momentum of their own, a sled, loosen the tolerance for the others.
+_LONGER = 1.1
 # Parts that may be attached are looked for in this share of the record before td, on so many states at most.
 _LOOK_BACK, _LOOK_STATES = 0.1, 200
 # Parts that are added to the chosen ones, at most, before all parts are tried.
 _MOST_ATTACHED = 12
-
-
-@dataclass(frozen=True, eq=False)
-class Momenta:
-    """Momentum of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); None for parts: the whole model.
-
-    ``precision`` is that of the printed numbers; ``chosen`` are the indices of the parts to be switched, ``flying``
-    those of the set that is known to fly together, if it is.
-    """
-
-    time: Samples
-    values: Samples
-    parts: tuple[Part, ...] | None
-    precision: Precision
-    chosen: tuple[int, ...]
-    flying: tuple[int, ...] | None = None
-
-    def of(self, members: Sequence[int]) -> Samples:
-        """Sum over the parts with these indices, shape (n, 3)."""
-        return np.asarray(self.values[:, list(members)].sum(axis=1))
-
-    def noise(self, members: Sequence[int]) -> float:
-        """What the printed digits of these parts leave open in their sum [momentum]."""
-        largest = np.abs(self.values[:, list(members)]).max(axis=(0, 2), initial=0.0)
-        return sum(self.precision.quantum(float(value)) for value in largest) / 2
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """Vectors over time: ``time`` of shape (n,), ``values`` of shape (n, 3); a momentum, or the place of a part."""
-
-    time: Samples
-    values: Samples
 
 
 @dataclass(frozen=True)
@@ -77,8 +51,13 @@ class FreeFlight:
     end_seen: bool
 
 
+def to_be_asked(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
+    """Give the momenta that may tell of flight, best first: all, or where a set was named to fly only that one's."""
+    return [one for one in momenta if one.flying] or momenta
+
+
 def flight_around(momenta: Momenta, td: float) -> FreeFlight | None:
-    """Find the set of parts that flies freely around ``td`` for the longest time, and when.
+    """Find the set of parts that flies freely around ``td`` for clearly the longest time, and when.
 
     Unless the set is known, tried are the chosen parts, these with the parts that move most against them, and all.
 
@@ -96,7 +75,7 @@ def flight_around(momenta: Momenta, td: float) -> FreeFlight | None:
     best: FreeFlight | None = None
     for members in [momenta.flying] if momenta.flying else _sets(momenta, td):
         found = flight_of(momenta, members, td)
-        if found and (best is None or found.end - found.start > best.end - best.start):
+        if found and (best is None or found.end - found.start > _LONGER * (best.end - best.start)):
             best = found
     return best
 
@@ -108,19 +87,13 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float) -> FreeFlight
         return None
     extent = float(np.ptp(momentum, axis=0).max())
     noise = momenta.noise(members)
-    room = TOLERANCE * extent + noise
-    if extent == 0 or noise > TOLERANCE * extent:
-        return None
-    fit = _Fit(time, momentum)
-    first, last = fit.window(td, room)
-    length = time[last] - time[first]
-    if last - first + 1 < _FEWEST or length < _SHORTEST * (time[-1] - time[0]):
-        return None
-    tight_first, tight_last = fit.window(td, _TIGHTER * TOLERANCE * extent + noise)
-    if time[tight_last] - time[tight_first] < _REMAINS * length:
-        return None
     parts = None if momenta.parts is None else tuple(momenta.parts[i] for i in members)
-    return FreeFlight(float(time[first]), float(time[last]), parts, bool(last < time.size - 1))
+    if extent <= max(2 * noise, _CONSTANT * float(np.abs(momentum).max())):
+        return FreeFlight(float(time[0]), float(time[-1]), parts, False) if _moves(momenta, members, noise) else None
+    if noise > TOLERANCE * extent:
+        return None
+    window = _lasting_window(_Fit(time, momentum), td, extent, noise)
+    return window and FreeFlight(*window, parts, window[1] < time[-1])
 
 
 def all_flights(momenta: Momenta) -> tuple[FreeFlight, ...]:
@@ -130,9 +103,35 @@ def all_flights(momenta: Momenta) -> tuple[FreeFlight, ...]:
     for moment in np.linspace(time[0], time[-1], round(1 / _SHORTEST) + 1):
         if not found or moment > found[-1].end:
             flight = flight_around(momenta, float(moment))
-            if flight and (not found or flight.start >= found[-1].end):
-                found.append(flight)
+            if flight:  # the tolerance may let it begin some samples before the last one has ended
+                found.append(replace(flight, start=max(flight.start, found[-1].end)) if found else flight)
     return tuple(found)
+
+
+def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
+    """Whether a constant momentum that is known up to ``noise`` tells that the chosen parts fly: not of parts at rest.
+
+    Large parts print coarse numbers, behind which a load on the chosen ones may hide.  Where these have no mass, as
+    springs, the members of the set count instead.
+    """
+    parts = momenta.chosen if momenta.values[:, list(momenta.chosen)].any() else members
+    values = momenta.values[:, list(parts)]
+    change = float(np.ptp(values, axis=0).max())
+    size = change if change > 2 * momenta.noise(parts) else float(np.abs(values).max())
+    return size > _VISIBLE * noise
+
+
+def _lasting_window(fit: _Fit, td: float, extent: float, noise: float) -> tuple[float, float] | None:
+    """Find the window around ``td`` with a misfit within the tolerance that a tighter one does not shrink, or None."""
+    time, room, tight = fit.time, TOLERANCE * extent + noise, _TIGHTER * TOLERANCE * extent + noise
+    first, last = fit.window(td, room)
+    length = time[last] - time[first]
+    if last - first + 1 < _FEWEST or length < _SHORTEST * (time[-1] - time[0]):
+        return None
+    tight_first, tight_last = fit.window(td, tight)
+    if time[tight_last] - time[tight_first] < (1 + np.cbrt(tight / room)) / 2 * length:
+        return None
+    return float(time[first]), float(time[last])
 
 
 class _Fit:

@@ -142,7 +142,10 @@ class Oscillator:
             return np.asarray((table @ np.stack([turn.real, turn.imag, slow])).ravel()[:count])
 
         frame, suspended = -self._share(self.mass), self._share(self.frame_mass)
-        return State(displacement(frame), displacement(suspended), speed(frame), speed(suspended))
+        states = State(displacement(frame), displacement(suspended), speed(frame), speed(suspended))
+        for column, value in zip(states, start, strict=True):
+            column[:1] = value  # exact, as it was given
+        return states
 
     def rigid(self, start: State, elapsed: ArrayLike) -> State:
         """State after ``elapsed`` time of rigid motion that begins at ``start`` (8)-(12).

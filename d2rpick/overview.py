@@ -7,19 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.errors import FormatError
 from d2rpick.health import Health, assess
-from d2rpick.momentum import FreeFlight, all_flights
+from d2rpick.momentum import FreeFlight, all_flights, to_be_asked
 from d2rpick.readers.balance import balance_of
+from d2rpick.readers.companions import doubts
 from d2rpick.readers.selection import select_parts
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from d2rpick.history import Part
     from d2rpick.readers import Run, Selection
+    from d2rpick.readers.database import Legs
 
 
 @dataclass(frozen=True)
 class PartOverview:
-    """A part and the highest internal energy it ever has; None where that is not written."""
+    """A part and the highest internal energy it ever has; None where that is not written, or not in every state."""
 
     part: Part
     energy_max: float | None
@@ -39,17 +44,19 @@ class Overview:
     """What the files of a run hold.
 
     Times in the unit of the run, which ``time_unit`` gives only where a file names it.  ``sampling`` is None where
-    there is a single state.  ``flights`` are the windows in which the parts asked for, or all, fly freely by their
-    momentum, ``health`` is that of the run, with the longest of them as its window; None without energies.
+    there is a single state; it and the times are None where there is no state, and they and ``states`` where the time
+    has to be chosen among several columns.
+    ``flights`` are the windows in which the parts asked for, or all, fly freely by their momentum, ``health`` is that
+    of the run, with the longest of them as its window; None without energies.
     """
 
     source: tuple[str, ...]
     format: str
     version: str
     title: str
-    states: int
-    time_start: float
-    time_end: float
+    states: int | None
+    time_start: float | None
+    time_end: float | None
     time_unit: str
     sampling: Sampling | None
     complete: bool
@@ -63,7 +70,15 @@ class Overview:
 def survey(run: Run, selection: Selection) -> Overview:
     """Look at all databases of a run; of ``selection`` the parts matter, for the flights."""
     first = run.databases[0]
-    time = first.time if first.channels else first.part_time
+    notes = [note for database in run.databases for note in _notes(database)]
+    notes += doubts(run.databases)
+    states, time = None, np.empty(0)
+    try:
+        if first.span is not None:
+            time = first.time if first.channels else first.part_time
+        states = int(time.size)
+    except FormatError as error:  # several columns may be the time: there is still a list of them
+        notes.append(str(error))
     steps = np.diff(time)
     flights = _flights(run, selection)
     return Overview(
@@ -71,9 +86,9 @@ def survey(run: Run, selection: Selection) -> Overview:
         format=" + ".join(database.format for database in run.databases),
         version=next((d.version for d in run.databases if d.version), ""),
         title=next((d.title for d in run.databases if d.title), ""),
-        states=int(time.size),
-        time_start=float(time[0]),
-        time_end=float(time[-1]),
+        states=states,
+        time_start=float(time[0]) if time.size else None,
+        time_end=float(time[-1]) if time.size else None,
         time_unit=first.time_unit,
         sampling=Sampling(float(steps.min()), float(np.median(steps)), float(steps.max())) if steps.size else None,
         complete=all(database.complete for database in run.databases),
@@ -81,15 +96,32 @@ def survey(run: Run, selection: Selection) -> Overview:
         parts=tuple(_overviews(run)),
         flights=flights,
         health=_health(run, flights),
-        notes=tuple(dict.fromkeys(note for database in run.databases for note in database.notes)),
+        notes=tuple(dict.fromkeys(notes)),
     )
 
 
-def _overviews(run: Run) -> list[PartOverview]:
-    if not run.parts:
-        return []
-    highest = run.part_energies(run.parts).max(axis=0)
-    return [PartOverview(part, float(energy)) for part, energy in zip(run.parts, highest, strict=True)]
+def _notes(database: Legs) -> tuple[str, ...]:
+    try:
+        return database.notes
+    except FormatError as error:
+        return (str(error),)
+
+
+def _overviews(run: Run) -> Iterator[PartOverview]:
+    try:
+        energies = run.part_energies(run.parts) if run.parts else np.empty((0, 0))
+    except FormatError:  # some parts come and go, so that their columns have holes
+        yield from (PartOverview(part, _highest(run, part)) for part in run.parts)
+    else:
+        for part, column in zip(run.parts, energies.T, strict=True):
+            yield PartOverview(part, float(column.max()))
+
+
+def _highest(run: Run, part: Part) -> float | None:
+    try:
+        return float(run.part_energies([part]).max())
+    except FormatError:
+        return None
 
 
 def _health(run: Run, flights: tuple[FreeFlight, ...]) -> Health | None:
@@ -103,5 +135,5 @@ def _health(run: Run, flights: tuple[FreeFlight, ...]) -> Health | None:
 def _flights(run: Run, selection: Selection) -> tuple[FreeFlight, ...]:
     parts = select_parts(selection.parts, run.parts, run.name) if selection.parts else None
     flying = select_parts(selection.flying, run.parts, run.name) if selection.flying else None
-    found = (all_flights(momenta) for momenta in run.momenta(parts, flying))
+    found = (all_flights(momenta) for momenta in to_be_asked(run.momenta(parts, flying)))
     return next(filter(None, found), ())

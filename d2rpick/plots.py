@@ -38,8 +38,10 @@ _DOTS = 100
 # Beyond this ratio of the highest energy to the level, the level would vanish on a linear axis.
 _LOGARITHMIC = 20.0
 _DECADES_BELOW_LEVEL = 2.0
+# Up to so many candidates their marks leave the curve visible.
+_FEW = 40
 # Width of a figure, and the height of one panel and of two [inch]; on a narrow page letters keep their size.
-_SIZES = {False: (9.0, 4.0, 6.5), True: (4.2, 3.9, 6.6)}
+_SIZES = {False: (10.0, 4.0, 6.5), True: (4.2, 3.9, 6.6)}
 # Share of the axes that the label of a switch time takes up, at most.
 _LABEL = {False: 0.14, True: 0.3}
 
@@ -168,7 +170,8 @@ def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | N
 def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, ...]) -> None:
     history, level, flight = situation.history, situation.energy_td, situation.flight
     if flight.start is not None:
-        end = history.time[-1] if flight.end is None else flight.end
+        known = situation.span.end if situation.span else situation.td  # without a contact, as far as it was seen
+        end = known if flight.end is None else flight.end
         axes.axvspan(flight.start, end, color=_FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
     axes.plot(history.time, history.energy, color=_REFERENCE, linewidth=1, label=_plain(history.channel))
     axes.axhline(level, color=_SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
@@ -176,7 +179,10 @@ def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, 
         some = [c for c in candidates if c.acceptable == acceptable]
         if some:
             times, energies = [c.tr for c in some], [c.energy for c in some]
-            axes.scatter(times, energies, s=28, facecolors=fill, edgecolors=_GOOD, zorder=3, label=name)
+            size = 28 if len(candidates) <= _FEW else 8
+            axes.scatter(
+                times, energies, s=size, linewidths=0.7, facecolors=fill, edgecolors=_GOOD, zorder=3, label=name
+            )
     _show_level(axes, level, float(history.energy.max()))
     axes.set_ylabel("internal energy")
 
@@ -228,7 +234,7 @@ def _finish(axes: Axes, *, legend: bool = True) -> None:
     axes.grid(visible=True, linewidth=0.3)
     axes.margins(x=0)
     if legend:
-        axes.legend(fontsize="small", loc="upper right")
+        axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def _plain(name: str) -> str:

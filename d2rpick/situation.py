@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +13,9 @@ from d2rpick.crossings import find_extrema
 from d2rpick.envelope import upper_envelope
 from d2rpick.errors import RangeError
 from d2rpick.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
-from d2rpick.identify import Identification, assess, identify_several
+from d2rpick.identify import Identification, assess, identify, identify_several
 from d2rpick.modes import Modes
-from d2rpick.momentum import FreeFlight, flight_around
+from d2rpick.momentum import FreeFlight, flight_around, to_be_asked
 from d2rpick.profile import Profile
 from d2rpick.signs import Parts, PartVibration, read_parts
 
@@ -28,6 +28,8 @@ _POINTS_PER_PERIOD = 64
 # Where the scatter of the last period exceeds this share of the vibration energy at td, the vibration has sunk
 # into it: its sign is no longer certain.
 _DROWNED = 0.2
+# Beyond, squares of energies are no numbers any more; no unit system comes near.
+_LARGEST = 1e150
 
 
 @dataclass(frozen=True)
@@ -58,9 +60,9 @@ class Settings:
 class Situation:
     """A history seen from one td [time].
 
-    ``fit`` is None only where no oscillator was looked for; ``mode`` is its mode, or several, where it can be relied on
-    at td, else None, and then ``no_mode`` says why.  ``span`` is the window in which it describes the record.
-    ``parts`` are the deformations of single parts, where their energies are known and an oscillator was looked for.
+    ``fit`` is None only where no oscillator was looked for; ``span`` is the window in which it describes the record.
+    ``parts`` are the deformations of single parts, where their energies are known and an oscillator was looked for;
+    ``part_vibration`` is their vibration, where they have a sign.
     """
 
     history: History
@@ -68,11 +70,41 @@ class Situation:
     settings: Settings
     flight: Flight
     fit: Identification | None
-    mode: Mode | Modes | None
     span: Span | None
-    no_mode: str | None
     parts: Parts | None = None
     part_vibration: PartVibration | None = None
+
+    @cached_property
+    def mode(self) -> Mode | Modes | None:
+        """Mode of the oscillator, or several, where it can be relied on at td."""
+        return None if self.no_mode else self.fitted
+
+    @property
+    def fitted(self) -> Mode | Modes | None:
+        """Mode of the oscillator, or several, that describes the span, whatever it is worth at td."""
+        return self.fit.mode if self.fit and self.span else None
+
+    @cached_property
+    def no_mode(self) -> str | None:
+        """Why there is no mode to rely on at td."""
+        if self.fit is None:
+            return "no oscillator was looked for (--no-verify)"
+        if self.fit.reason:
+            what = (
+                "the given oscillator does not describe"
+                if self.settings.oscillator
+                else "no single oscillator describes"
+            )
+            return f"{what} the record: {self.fit.reason}"
+        if not self._in_span(self.td):
+            return "the oscillator does not describe the record at td"
+        assert self.fitted is not None  # there is a span
+        return _drowned(self.history, self.td, self.fitted, self.span)
+
+    @property
+    def drowned(self) -> bool:
+        """Whether an oscillator describes the record at td, but has sunk into its scatter there."""
+        return self.mode is None and self.fitted is not None and self._in_span(self.td)
 
     @property
     def basis(self) -> str:
@@ -108,9 +140,26 @@ class Situation:
         return self.part_vibration is not None and self.mode is None
 
     @property
+    def prescribed(self) -> bool:
+        """Whether the user gave the oscillator, or the window to identify it in."""
+        return bool(self.settings.oscillator or self.settings.fit_window)
+
+    @property
     def earliest_tr(self) -> float | None:
         """Start of the flight with the margin, or None when unknown [time]."""
         return None if self.flight.start is None else self.flight.start + self.settings.margin
+
+    @property
+    def end_of_load(self) -> str:
+        """Words for ``earliest_tr``: the start of the flight, and the margin where one is kept."""
+        margin = f" with the margin {self.settings.margin:.6g}" if self.settings.margin else ""
+        return f"the end of the load at {self.flight.start:.6g}{margin}"
+
+    @property
+    def end_of_flight(self) -> str:
+        """Words for ``latest_td``: the end of the flight, and the margin where one is kept."""
+        margin = f" with the margin {self.settings.margin:.6g}" if self.settings.margin else ""
+        return f"the end of the flight at {self.flight.end:.6g}{margin}"
 
     @property
     def latest_td(self) -> float:
@@ -124,14 +173,17 @@ class Situation:
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
         """Times in (start, end], ascending, where the energy peaks: of the oscillator, of the samples without one."""
-        if self.mode and self.span:
-            return self.mode.peaks(max(start, self.span.start), min(end, self.span.end))
+        if self.fitted and self.span:
+            return self.fitted.peaks(max(start, self.span.start), min(end, self.span.end))
         history = self.history
         return tuple(e.time for e in find_extrema(history.time, history.energy) if e.peak and start < e.time <= end)
 
     def described(self, time: float) -> bool:
-        """Whether the oscillator describes the record at ``time``."""
-        return self.mode is not None and self.span is not None and self.span.start <= time <= self.span.end
+        """Whether there is an oscillator to rely on that describes the record at ``time``."""
+        return self.mode is not None and self._in_span(time)
+
+    def _in_span(self, time: float) -> bool:
+        return self.span is not None and self.span.start <= time <= self.span.end
 
     def measured(self, time: float) -> bool:
         """Whether the deformation at ``time`` can be compared with that at td."""
@@ -178,21 +230,21 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
     RangeError when td, --after or the fit window lie outside the record, or it has fewer than 3 states.
     """
     if history.time.size < 3:
-        raise RangeError(
-            f"{', '.join(history.source)}: {history.time.size} states were found, choosing needs at least 3"
-        )
+        found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
+        raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
     history.energy_at(td)
+    largest = float(np.abs(history.energy).max())
+    if largest > _LARGEST:
+        raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
     if settings.after is not None:
         _inside(history, settings.after, "--after")
-    seen = next(filter(None, (flight_around(momenta, td) for momenta in history.momenta)), None)
+    seen = next(filter(None, (flight_around(momenta, td) for momenta in to_be_asked(history.momenta))), None)
     fit, span = _oscillator(history, td, settings, seen)
-    mode, no_mode = _reliable_mode(history, td, fit, span, given=settings.oscillator is not None)
-    flight = _flight(history, td, settings.after, seen, span)
-    situation = Situation(history, td, settings, flight, fit, mode, span, no_mode)
+    situation = Situation(history, td, settings, _flight(history, td, settings.after, seen, span), fit, span)
     if history.part_energies is None or not settings.replay:
         return situation
     # without a sign of the next contact nothing is known of what comes after td
-    end = flight.end or (float(history.time[-1]) if seen or span else td)
+    end = situation.flight.end or (float(history.time[-1]) if seen or span else td)
     return _with_parts(situation, history.part_energies, end)
 
 
@@ -202,17 +254,22 @@ def _oscillator(
     """Find the oscillator, given or identified, and the window around td that it describes."""
     if not settings.replay:
         return None, None
-    first, last = (seen.start, seen.end) if seen else (float(history.time[0]), float(history.time[-1]))
+    bounds = Span(seen.start, seen.end) if seen else Span(float(history.time[0]), float(history.time[-1]))
     if settings.after is not None:
-        first = min(settings.after, td)
-    fit = _given_fit(history, settings, first)
-    if fit is None:
-        span, fit = described_span(history, td, first, last)
-        if span is None:
-            span, several = described_span(history, td, first, last, identify_several)
-            fit = several if span else fit
+        bounds = bounds._replace(start=min(settings.after, td))
+    if settings.fit_window:
+        for bound in settings.fit_window:
+            _inside(history, bound, "--fit-window")
+        fit = identify_within(history, Span(*settings.fit_window))
+        return fit, span_of(history, td, fit, bounds) if fit.describes_record else None
+    if settings.oscillator:
+        span, fit = described_span(history, td, bounds, partial(assess, settings.oscillator), whole=seen is not None)
         return fit, span
-    return fit, span_of(history, td, fit, first, last) if fit.describes_record else None
+    span, fit = described_span(history, td, bounds, identify, whole=seen is not None)
+    if span is None:
+        span, several = described_span(history, td, bounds, identify_several, whole=seen is not None)
+        fit = several if span else fit
+    return fit, span
 
 
 def _with_parts(situation: Situation, energies: Samples, end: float) -> Situation:
@@ -240,18 +297,6 @@ def _flight(history: History, td: float, after: float | None, seen: FreeFlight |
     return Flight(span.start, end, "oscillator") if span else energy_flight(history, td)
 
 
-def _given_fit(history: History, settings: Settings, first: float) -> Identification | None:
-    """Give the fit that the user prescribed, by an oscillator or by a window; None when it is to be searched."""
-    if settings.oscillator:
-        inside = history.time >= first
-        return assess(settings.oscillator, history.time[inside], history.energy[inside])
-    if settings.fit_window:
-        for bound in settings.fit_window:
-            _inside(history, bound, "--fit-window")
-        return identify_within(history, *settings.fit_window)
-    return None
-
-
 def _inside(history: History, time: float, option: str) -> None:
     if not history.time[0] <= time <= history.time[-1]:
         raise RangeError(
@@ -260,24 +305,15 @@ def _inside(history: History, time: float, option: str) -> None:
         )
 
 
-def _reliable_mode(
-    history: History, td: float, fit: Identification | None, span: Span | None, *, given: bool
-) -> tuple[Mode | Modes | None, str | None]:
-    """Give the mode of ``fit`` if it can be relied on at td, else None and why not."""
-    if fit is None:
-        return None, "no oscillator was looked for (--no-verify)"
-    if not fit.describes_record or fit.mode is None:
-        what = "the given oscillator does not describe" if given else "no single oscillator describes"
-        return None, f"{what} the record: {fit.reason}"
-    if span is None:
-        return None, "the oscillator does not describe the record at td"
-    period = 2 * np.pi / fit.mode.omega
-    last = (history.time >= max(td - period, span.start)) & (history.time <= max(td, span.start))
-    scatter = float(np.sqrt(np.mean((history.energy[last] - fit.mode.energy(history.time[last])) ** 2)))
-    vibration = float(fit.mode.vibration_energy(td))
-    if scatter > _DROWNED * vibration:
-        return None, (
-            f"at td the vibration energy {vibration:.3g} has sunk into the scatter of the record, {scatter:.3g}: "
-            "the sign of the deformation cannot be told"
-        )
-    return fit.mode, None
+def _drowned(history: History, td: float, mode: Mode | Modes, span: Span | None) -> str | None:
+    """Say so when the vibration at td is no more than the scatter of the record about it."""
+    assert span is not None  # td lies in it
+    last = (history.time >= max(td - 2 * np.pi / mode.omega, span.start)) & (history.time <= max(td, span.start))
+    scatter = float(np.sqrt(np.mean((history.energy[last] - mode.energy(history.time[last])) ** 2)))
+    vibration = float(mode.vibration_energy(td))
+    if scatter <= _DROWNED * vibration:
+        return None
+    return (
+        f"at td the vibration energy {vibration:.3g} has sunk into the scatter of the record, {scatter:.3g}: "
+        "the sign of the deformation cannot be told"
+    )

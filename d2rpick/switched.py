@@ -10,26 +10,39 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick import measures
 from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
-    from d2rpick.history import History, Samples
-    from d2rpick.momentum import Track
+    from collections.abc import Iterator
+
+    from d2rpick.history import History, Samples, Track
 
 # A deviation of the momentum after td beyond this share of it is worth an objection: the motion is another one.
 MOST_MOMENTUM_ERROR = 0.05
-# Some solvers report a wrong energy for rigid solid elements; beyond this share that is worth a note.
+# Momentum below this share of the largest of the run is hardly any: a body that has come to rest cannot be off by much.
+_AT_REST = 0.01
+# Some solvers report a wrong energy for rigid solid elements; beyond this share, and beyond what the energy changes
+# from state to state anyway, that is worth a note.
 _REPORTED_OFF = 0.01
+# While rigid the energy keeps its digits; a vibrating one changes by more than this share from state to state.
+_STILL = 1e-4
+# A solver switches at the first step from tr on, and output may miss it by a state or two: this share of the energy
+# about tr is left to that.
+_ABOUT = 0.05
 
 
 @dataclass(frozen=True)
 class Comparison:
     """Measures of a switched run; fields are the keys of the JSON output, None where the files lack the quantity.
 
-    ``energy_frozen`` is the energy that came back at td, ``energy_td`` that of the reference there.  Means and spreads
-    (standard deviations) are over the time from td to ``end``.  ``momentum_error`` is the largest deviation after td
-    relative to the largest momentum of the reference, ``displacement`` the largest distance of the parts' centre from
-    where the reference has it [length].
+    ``energy_frozen`` is the energy that came back at td, ``energy_td`` that of the reference there.
+    ``rigid_from`` and ``rigid_to`` are the first and last state of the window around the middle of (tr, td) in which
+    its energy stands still [time], None where it does not.  Means and spreads
+    (standard deviations) are over the time from td to ``end``.  ``momentum_error`` is the largest deviation of the
+    momentum behind the first state from td on, relative to the largest that the reference has there;
+    ``displacement`` the largest distance there of the parts' centre from where the reference has it [length].
+    ``notes``: what was left out or assumed in reading the switched run and not the reference, and what is odd in it.
     """
 
     source: tuple[str, ...]
@@ -43,45 +56,62 @@ class Comparison:
     spread_after_reference: float
     momentum_error: float | None
     displacement: float | None
+    rigid_from: float | None
+    rigid_to: float | None
+    objections: tuple[str, ...]
     notes: tuple[str, ...]
-
-    @property
-    def objections(self) -> tuple[str, ...]:
-        """What is wrong with the motion of the switched run."""
-        if self.momentum_error is None or self.momentum_error <= MOST_MOMENTUM_ERROR:
-            return ()
-        return (f"the switched run's momentum after td is off by {self.momentum_error:.1%}: its motion is another one",)
 
 
 def compare(
     reference: History,
     switched: History,
-    td: float,
+    pair: tuple[float, float],
     end: float,
+    tolerance: float,
     momenta: tuple[Track | None, Track | None],
     centres: tuple[Track | None, Track | None],
 ) -> Comparison:
-    """Hold a switched run against its reference from ``td`` to ``end``.
+    """Hold a switched run against its reference: was it rigid from tr to td, and what came after td.
 
     Parameters
     ----------
     reference, switched : History
         Energies of the same parts in both runs.
-    td, end : float
-        Switch back, and the next contact or the end of the records [time].
+    pair : (float, float)
+        tr and td [time].
+    end : float
+        The next contact, or the end of the records [time].
+    tolerance : float
+        On the error of the amplitude that was locked in [-].
     momenta, centres : pair of Track or None
         Of the reference and of the switched run, None where it has none.
 
     Raises
     ------
     RangeError
-        If the switched run holds fewer than two states in that window.
+        If a run holds fewer than three states in that window.
     """
+    tr, td = pair
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
     after, reference_after = _between(switched, td, end), _between(reference, td, end)
-    if min(after.size, reference_after.size) < 2:
-        raise RangeError(f"{', '.join(switched.source)}: fewer than two states between td {td:g} and {end:g}")
+    if min(after.size, reference_after.size) < 3:
+        short = min(reference, switched, key=lambda history: history.time[-1])
+        found = f"fewer than 3 states from td {td:g} to {end:g}"
+        raise RangeError(f"{', '.join(short.source)}: {found}; nothing can be compared there")
+    before = switched.energy[switched.time < td]
+    if before.size and after[0] == before[-1] and _reported_wrong(before[-1], after[1:]):
+        after = after[1:]  # the switch comes at the first step from td on: this state was still rigid
     frozen, wanted = float(after[0]), reference.energy_at(td)
+    notes = tuple(note for note in switched.notes if note not in reference.notes)
+    error, rigid = _relative(*momenta, td, end), _rigid_window(switched, tr, td)
+    objections = [*_not_rigid(switched, rigid, tr, td), *_not_of_tr(reference, tr, frozen)]
+    level_error = measures.level_error(frozen, wanted)
+    if level_error is not None and level_error > tolerance:
+        objections.append(
+            f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {wanted:.6g}"
+        )
+    if error is not None and error > MOST_MOMENTUM_ERROR:
+        objections.append(f"the switched run's momentum after td is off by {error:.1%}: its motion is another one")
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -92,22 +122,65 @@ def compare(
         mean_after_reference=float(reference_after.mean()),
         spread_after=float(after.std()),
         spread_after_reference=float(reference_after.std()),
-        momentum_error=_relative(*momenta, td, end),
+        momentum_error=error,
         displacement=_distance(*centres, td, end),
-        notes=_reported(switched, td, frozen),
+        rigid_from=rigid[0] if rigid else None,
+        rigid_to=rigid[1] if rigid else None,
+        objections=tuple(objections),
+        notes=(*notes, *(_reported(float(before[-1]), after) if before.size else ())),
     )
+
+
+def _rigid_window(switched: History, tr: float, td: float) -> tuple[float, float] | None:
+    """First and last state around the middle of (tr, td) between which the energy stands still; None without any."""
+    time, energy = switched.time, switched.energy
+    middle = int(np.argmin(np.abs(time - (tr + td) / 2)))
+    if not tr <= time[middle] <= td:
+        return None
+    still = np.abs(energy - energy[middle]) <= _STILL * abs(energy[middle])
+    moving = np.flatnonzero(~still)
+    first = int(moving[moving < middle].max(initial=-1)) + 1
+    last = int(moving[moving > middle].min(initial=time.size)) - 1
+    return float(time[first]), float(time[last])
+
+
+def _not_rigid(switched: History, rigid: tuple[float, float] | None, tr: float, td: float) -> Iterator[str]:
+    """Object when the energy does not stand still from about tr to about td, as far as the states tell."""
+    if rigid is None:
+        yield f"the switched run has no state between tr {tr:g} and td {td:g}: nothing shows that it was rigid"
+        return
+    room = 2 * switched.step
+    if rigid[0] > tr + room or rigid[1] < td - room or rigid[0] < tr - room or rigid[1] > td + room:
+        found = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
+        yield f"{found}, not from tr {tr:g} to td {td:g}"
+
+
+def _not_of_tr(reference: History, tr: float, frozen: float) -> Iterator[str]:
+    """Object when the energy that came back is not one that the reference has about tr."""
+    about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
+    room = _ABOUT * float(np.abs(about).max(initial=0.0))
+    if about.size and not about.min() - room <= frozen <= about.max() + room:
+        yield (
+            f"the energy that came back, {frozen:.6g}, is not that of the reference at tr {tr:g}, "
+            f"{reference.energy_at(tr):.6g}: was it switched at another time?"
+        )
 
 
 def _between(history: History, start: float, end: float) -> Samples:
     return history.energy[(history.time >= start) & (history.time <= end)]
 
 
-def _reported(switched: History, td: float, frozen: float) -> tuple[str, ...]:
+def _reported_wrong(rigid: float, after: Samples) -> bool:
+    """Whether the energy reported while rigid is not the one that comes back."""
+    usual = np.abs(np.diff(after)).max()
+    return bool(abs(rigid - after[0]) > max(usual, _REPORTED_OFF * abs(after[0])))
+
+
+def _reported(rigid: float, after: Samples) -> tuple[str, ...]:
     """Note an energy that the solver reports just before td otherwise than it comes back."""
-    before = switched.energy[switched.time < td]
-    if not before.size or abs(before[-1] - frozen) <= _REPORTED_OFF * abs(frozen):
+    if not _reported_wrong(rigid, after):
         return ()
-    found = f"while rigid the run reports an energy of {before[-1]:.6g}, at td {frozen:.6g} came back"
+    found = f"while rigid the run reports an energy of {rigid:.6g}, at td {after[0]:.6g} came back"
     return (f"{found}; some solvers report rigid solid elements wrongly",)
 
 
@@ -115,14 +188,21 @@ def _relative(reference: Track | None, other: Track | None, td: float, end: floa
     distance = _distance(reference, other, td, end)
     if reference is None or distance is None:
         return None
-    largest = float(np.linalg.norm(reference.values, axis=1).max(initial=0.0))
+    sizes = np.linalg.norm(reference.values, axis=1)
+    there = sizes[(reference.time >= td) & (reference.time <= end)]
+    largest = max(float(there.max(initial=0.0)), _AT_REST * float(sizes.max()))
     return distance / largest if largest > 0 else None
 
 
 def _distance(reference: Track | None, other: Track | None, td: float, end: float) -> float | None:
-    """Largest distance of the second track from the first between two times; None where one is missing."""
+    """Largest distance of the second track from the first between two times; None where one is missing.
+
+    The first state from td on is left out, since it may still be rigid.
+    """
     if reference is None or other is None:
         return None
-    inside = (other.time >= td) & (other.time <= end)
+    inside = np.flatnonzero((other.time >= td) & (other.time <= end))[1:]
+    if not inside.size:
+        return None
     there = [np.interp(other.time[inside], reference.time, column) for column in reference.values.T]
-    return float(np.linalg.norm(other.values[inside] - np.stack(there, axis=1), axis=1).max(initial=0.0))
+    return float(np.linalg.norm(other.values[inside] - np.stack(there, axis=1), axis=1).max())

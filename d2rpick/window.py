@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from d2rpick.candidates import find_candidates
 from d2rpick.choice import EQUALLY_GOOD, Pair, Suggestion, best_of, rank, suggest
 from d2rpick.expectation import expectation, mean_in_flight, shortfall
-from d2rpick.momentum import all_flights
+from d2rpick.momentum import all_flights, to_be_asked
 from d2rpick.situation import examine
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def suggest_in_window(history: History, window: tuple[float, float], settings: S
 def advice(history: History, settings: Settings) -> str:
     """Tell where td should lie when none was given: before the end of the flight, on the last peak before it."""
     time = history.time
-    flights = next(filter(None, (all_flights(momenta) for momenta in history.momenta)), ())
+    flights = next(filter(None, (all_flights(momenta) for momenta in to_be_asked(history.momenta))), ())
     if flights:
         longest = max(flights, key=lambda flight: flight.end - flight.start)
         start, end, seen = longest.start, longest.end, longest.end_seen

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,6 +22,12 @@ def shared(relative: str) -> Path:
     if not path.exists():
         pytest.skip(f"{path} is absent; D2RPICK_SHARED names the folder that holds {relative}")
     return path
+
+
+def shared_bytes(relative: str) -> bytes:
+    """Content of a shared file, unpacked."""
+    path = shared(relative)
+    return gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
 
 
 def columns(relative: str, energy: str) -> tuple[Samples, Samples]:

@@ -93,6 +93,20 @@ def test_a_given_oscillator_that_does_not_fit_is_not_believed() -> None:
     assert "energy-only" in codes(answer)
 
 
+def test_the_first_sample_counts_like_any_other() -> None:
+    time = np.linspace(0, 1, 2001)
+    answer = suggest(of(4 * np.cos(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN)
+    assert answer.recommended is not None
+    assert answer.recommended.tr == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_level_of_zero_is_met_once_by_each_passage() -> None:
+    time = np.linspace(0, 1, 2001)
+    answer = suggest(of(4 * np.sin(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN)
+    times = [round(c.tr, 6) for c in answer.candidates if c.kind == "crossing"]
+    assert len(times) == len(set(times)) == 6
+
+
 def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates() -> None:
     history = vibration()
     answer = suggest(history, 3.25, PLAIN)

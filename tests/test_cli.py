@@ -151,7 +151,7 @@ def test_columns_are_chosen_by_name_or_number_and_energies_added() -> None:
     assert by_name["candidates"] == by_number["candidates"]
     assert by_name["history"]["channel"] == "internal_energy"
     total = answer(*SUGGEST, "--energy", "6", "--energy", "7", ENERGY)
-    both = read_history(ENERGY, Selection(energy=("6", "7")))
+    both = read_history([ENERGY], Selection(energy=("6", "7")))
     assert total["history"]["channel"] == "internal_energy + kinetic_energy"
     assert total["energy_td"] == pytest.approx(both.energy_at(0.064), rel=1e-6)
 
@@ -195,7 +195,7 @@ def test_the_sample_data_is_what_the_command_beside_it_writes(
     (tmp_path / "sample_data").mkdir()
     args = shlex.split(line.replace("energy.csv", name))
     assert run(*args[1:]).exit_code == 0
-    fresh, kept = read_history(f"sample_data/{name}"), read_history(str(ROOT / "sample_data" / name))
+    fresh, kept = (read_history([str(folder / "sample_data" / name)]) for folder in (Path(), ROOT))
     np.testing.assert_allclose(fresh.time, kept.time, rtol=1e-14)
     np.testing.assert_allclose(fresh.energy, kept.energy, rtol=1e-5 if "glstat" in name else 1e-11, atol=1e-13)
 
@@ -246,7 +246,7 @@ def test_without_a_command_the_help_is_an_error_message() -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_shell_completes_the_names_of_commands(command: str) -> None:
-    env = {"_D2RPICK_COMPLETE": "bash_complete", "COMP_WORDS": f"d2rpick {command[:3]}", "COMP_CWORD": "1"}
+    env = {"_D2RPICK_COMPLETE": "bash_complete", "COMP_WORDS": f"d2rpick {command[:4]}", "COMP_CWORD": "1"}
     assert run(env=env).stdout.strip() == f"plain,{command}"
 
 

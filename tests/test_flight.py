@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from d2rpick.choice import suggest
 from d2rpick.flight import Flight, Span, described_span, energy_flight
 from d2rpick.history import History
+from d2rpick.replay import to_mode
 from d2rpick.situation import Settings, examine
 from tests import paper
 from tests.shared import shared
@@ -71,7 +74,7 @@ def test_the_next_contact_ends_the_flight(td: float) -> None:
 
 
 def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown_end() -> None:
-    span, fit = described_span(paper.history(), paper.TD, 0.0, 0.15)
+    span, fit = described_span(paper.history(), paper.TD, Span(0.0, 0.15))
     assert span == Span(0.0, 0.15)
     assert examine(paper.history(), paper.TD, Settings()).flight == Flight(0.0, None, "oscillator")
     assert fit.mode is not None
@@ -143,3 +146,102 @@ def test_a_vibration_that_has_sunk_into_noise_has_no_sign() -> None:
     assert situation.basis == "energy"
     assert situation.no_mode is not None
     assert "sunk into the scatter" in situation.no_mode
+
+
+# ---- td early in a flight, and in the next contact
+
+
+def struck_twice() -> History:
+    """A load to 20 ms, free flight, the next contact from 150 ms on."""
+
+    def force(t: float) -> float:
+        if t < 0.02:
+            return 1e4 * math.sin(math.pi * t / 0.02)
+        return 1.3e4 * math.sin(math.pi * (t - 0.15) / 0.03) if 0.15 <= t <= 0.18 else 0.0
+
+    def equations_of_motion(t: float, u: np.ndarray) -> list[float]:
+        z, y, vz, vy = u
+        return [vz, vy, (660e3 * (y - z) + force(t)) / 15.7 - 10 * vz, -660e3 * (y - z) / 31.4 - 10 * vy]
+
+    time = np.linspace(0, 0.25, 2501)
+    found = solve_ivp(equations_of_motion, (0, 0.25), [0.0] * 4, "DOP853", time, rtol=1e-10, atol=1e-13, max_step=5e-4)
+    return History(time, 330e3 * (found.y[1] - found.y[0]) ** 2, source=("struck",), format="csv", channel="E")
+
+
+STRUCK = struck_twice()
+
+
+@pytest.mark.parametrize("td", [0.028, 0.030, 0.034, 0.038, 0.044, 0.1, 0.149])
+def test_the_whole_flight_is_found_wherever_td_lies_in_it(td: float) -> None:
+    situation = examine(STRUCK, td, Settings())
+    assert situation.basis == "oscillator"
+    assert situation.flight.start == pytest.approx(0.020, abs=PERIOD / 10)
+    assert situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
+
+
+@pytest.mark.parametrize("td", [0.153, 0.157, 0.162, 0.17, 0.178])
+@pytest.mark.parametrize("after", [None, 0.03])
+def test_td_in_the_next_contact_is_after_the_end_of_the_flight(td: float, after: float | None) -> None:
+    answer = suggest(STRUCK, td, Settings(after=after))
+    assert answer.recommended is None
+    assert answer.situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
+    assert "td-after-contact" in {caution.code for caution in answer.cautions}
+
+
+@pytest.mark.parametrize("td", [0.1, 0.149])
+def test_a_contact_does_not_creep_into_the_fit(td: float) -> None:
+    situation = examine(STRUCK, td, Settings())
+    assert situation.fitted is not None
+    assert situation.fitted.alpha == pytest.approx(10, abs=0.05)
+    assert situation.flight.end == pytest.approx(0.150, abs=PERIOD / 25)
+
+
+def test_a_rising_energy_shows_no_end_of_a_load() -> None:
+    time = np.linspace(0, 1, 1001)
+    energy = (
+        np.exp(-((time - 0.1) ** 2) / 0.001) + 0.1 * np.sin(300 * time) ** 2 + np.where(time > 0.9, time - 0.9, 0) * 9
+    )
+    fed = History(time, energy, source=("fed",), format="csv", channel="E")
+    assert energy_flight(fed, 0.96) == Flight(None, None, None)
+    assert energy_flight(fed, 0.85).start == pytest.approx(0.13, abs=0.05)
+
+
+def test_a_small_second_mode_makes_no_short_flights() -> None:
+    mode, time = to_mode(paper.OSCILLATOR, 6.0), paper.history().time
+    energy = mode.energy(time) + 0.02 * 140 * np.exp(-30 * time) * np.sin(571 * time + 0.3) ** 2
+    history = History(time, energy, source=("two",), format="csv", channel="E")
+    for td in np.linspace(0.03, 0.12, 10):
+        situation = examine(history, float(td), Settings())
+        assert situation.span is None or situation.span.end - situation.span.start > 1.25 * PERIOD
+
+
+# ---- an oscillator that is given, or has sunk into noise
+
+
+def test_a_given_oscillator_is_held_against_its_flight_only() -> None:
+    struck = 330e3 * (np.diff(np.stack(paper.OSCILLATOR.free(paper.START, STRUCK.time))[:2], axis=0)[0]) ** 2
+    energy = np.where(STRUCK.time < 0.15, struck, STRUCK.energy)
+    history = History(STRUCK.time, energy, source=("given",), format="csv", channel="E")
+    situation = examine(history, 0.064, Settings(oscillator=to_mode(paper.OSCILLATOR, 6.0)))
+    assert situation.basis == "oscillator"
+    assert situation.flight.start == 0.0
+    assert situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
+
+
+def test_a_given_oscillator_that_does_not_fit_recommends_nothing() -> None:
+    wrong = to_mode(replace(paper.OSCILLATOR, stiffness=1.05 * 660e3), 6.0)
+    answer = suggest(paper.history(), paper.TD, Settings(oscillator=wrong))
+    assert answer.recommended is None
+    assert any("prescribed oscillator" in note for c in answer.candidates for note in c.notes)
+
+
+def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_has_not() -> None:
+    noise = 0.01 * paper.history().energy.max() * np.random.default_rng(3).normal(size=1501)
+    history = History(
+        paper.history().time, paper.history().energy + noise, source=("noisy",), format="csv", channel="E"
+    )
+    answer = suggest(history, 0.1, Settings())
+    assert answer.recommended is None
+    assert answer.better_td is not None
+    assert float(min(abs(answer.better_td.td - peak / 1e3) for peak, _ in paper.PEAKS)) < 1e-4
+    assert answer.better_td.residual == pytest.approx(0.0, abs=1e-6)

@@ -155,11 +155,12 @@ def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
     ("name", "known", "expected"),
     [
         ("PILLARS-LSDyna__Bolt_B_Explicit-glstat", {"hourglass_share": 0.0}, {"energy-ratio", "sliding"}),
-        ("Crimping__results-glstat.head16000", {"hourglass_share": 0.007826}, {"sliding"}),
+        ("Crimping__results-glstat.head16000", {"hourglass_share": 0.0082211}, {"sliding"}),
         ("Masters-Project__Steel_Explicit-glstat.head16000", {"hourglass_share": None, "sliding_share": 0.0}, set()),
         ("lasso-python__sph_models-R12_2_1-binout", {"energy_ratio_min": 0.950303}, set()),
         ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01", {"part_hourglass_share": 0.0574625}, set()),
-        ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01.csv", {"hourglass_share": 0.0574625}, set()),
+        # of its names only two are sure
+        ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01.csv", {"hourglass_share": None}, set()),
         ("OpenRadioss__miniqa-onefile_rad-reference-CRA2AV4T01", {}, {"hourglass", "part-hourglass"}),
     ],
 )

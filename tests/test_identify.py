@@ -198,7 +198,7 @@ def test_too_few_samples_per_period_are_refused_and_the_interval_asked_for_is_ac
     mode = Mode(omega=7.0, alpha=0.1, cosine=0.3, sine=1.0, origin=0.0)
     coarse = np.linspace(0.0, 59 * np.pi / mode.omega / samples_per_period, 60)
     reason = refused(coarse, mode.energy(coarse))
-    assert f"{samples_per_period} samples per period" in reason
+    assert f"{samples_per_period:.2f} samples per period" in reason
     interval = float(reason.split(" or less")[0].split()[-1])
     fine = np.linspace(0.0, coarse[-1], int(coarse[-1] / interval) + 1)
     assert accepted(fine, mode.energy(fine))[1].omega == pytest.approx(7.0, rel=1e-10)

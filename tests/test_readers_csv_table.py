@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
 from d2rpick.history import EXACT, Precision
-from d2rpick.readers import Run, Selection, csv_table
-from d2rpick.readers.database import Legs
-from d2rpick.readers.source import Source
+from d2rpick.readers import Selection, csv_table
+from tests.reading import history_of, states_of
 
 if TYPE_CHECKING:
     from d2rpick.history import History
@@ -24,8 +23,7 @@ ENERGIES = [1.5, 2.75, -3.125]
 
 def read(text: str | bytes, *energy: str, time: str | None = None) -> History:
     data = text if isinstance(text, bytes) else text.encode()
-    selection = Selection(time, energy)
-    return Run(("table",), (Legs(csv_table.open_legs([Source("table", data)], selection)),)).history(selection)
+    return history_of(csv_table, data, selection=Selection(time, energy), name="table")
 
 
 def table(separator: str = ",", decimal: str = ".", end: str = "\n", tail: str = "") -> str:
@@ -156,6 +154,34 @@ def test_the_time_by_name_and_number() -> None:
     assert read("Time,Y1,Time,Y2\n0,1,5,2\n1,3,6,4\n", "Y2", time="3").time.tolist() == [5, 6]
 
 
+SIDE_BY_SIDE = "Time,IE,Time,KE,Time,HE\n0,1,0,5,0,7\n1,3,0.5,6,1,8\n2,4,,,2,9\n3,6,,,3,10\n"
+
+
+def test_curves_side_by_side_have_times_of_their_own() -> None:
+    """T/HIS writes them like this; a shorter curve ends in empty cells."""
+    assert states_of(read(SIDE_BY_SIDE)) == [(0, 1), (1, 3), (2, 4), (3, 6)]
+    assert states_of(read(SIDE_BY_SIDE, "KE")) == [(0, 5), (0.5, 6)]
+    assert read(SIDE_BY_SIDE, "KE").time_precision == Precision(digits=1)
+    assert states_of(read(SIDE_BY_SIDE, "IE", "HE")) == [(0, 8), (1, 11), (2, 13), (3, 16)]
+    without_names = SIDE_BY_SIDE.partition("\n")[2]
+    assert states_of(read(without_names, "4", time="3")) == [(0, 5), (0.5, 6)]
+
+
+@pytest.mark.parametrize(
+    ("text", "energy", "reason"),
+    [
+        (SIDE_BY_SIDE, ["IE", "KE"], "'KE' has other times than the first curve"),
+        (SIDE_BY_SIDE.replace("3,6,,,", "3,6,3,7,"), ["KE"], "table:5: a curve goes on behind empty cells"),
+        (SIDE_BY_SIDE.replace("3,6,,,", "3,6,,7,"), ["KE"], "table:5: 'Time' is ''"),
+        (SIDE_BY_SIDE.replace("3,6,,,", "3,,,,"), ["IE"], "table:5: 'IE' is ''"),
+        (SIDE_BY_SIDE.replace("IE", "IE_a").replace("KE", "IE_b"), [], "2 columns are named like an internal energy"),
+    ],
+)
+def test_curves_side_by_side_are_not_mixed(text: str, energy: list[str], reason: str) -> None:
+    with pytest.raises(FormatError, match=reason):
+        read(text, *energy)
+
+
 @pytest.mark.parametrize(
     ("text", "asked", "reason"),
     [
@@ -166,11 +192,11 @@ def test_the_time_by_name_and_number() -> None:
         (FOUR, ["5"], "no column '5'"),
         (FOUR, ["0"], "no column '0'"),
         (FOUR, ["KE", "ke"], "asked for twice"),
-        (FOUR, ["1"], "asked for twice"),
+        (FOUR, ["1"], "'1' is the time column, not to be used twice"),
         ("time,IE,ie\n0,1,2\n1,2,3\n", ["Ie"], "'Ie' may be any of these columns: 2 'IE', 3 'ie'"),
         ("time,IE,IE\n0,1,2\n1,2,3\n", [], "2 columns are named"),
         ("time,3,2\n0,1,2\n1,2,3\n", ["2"], "may be any of these"),
-        ("Time,Y1,Time,Y2\n0,1,5,2\n1,3,6,4\n", ["Y1"], "choose with --time: 1 'Time', 3 'Time'"),
+        ("Time,Y1,Y2,Time\n0,1,5,2\n1,3,6,4\n", ["Y1"], "choose with --time: 1 'Time', 4 'Time'"),
         (
             '"time","INTERNAL ENERGY",A,B\n0,1,2\n1,2,3\n',
             ["A"],
@@ -249,7 +275,7 @@ def test_precision_is_read_off_the_text(rows: str, time: Precision, energy: Prec
     assert (history.time_precision, history.energy_precision) == (time, energy)
 
 
-finite = st.floats(-1e300, 1e300, allow_subnormal=False)
+finite = st.floats(-1e149, 1e149, allow_subnormal=False)  # a history holds no energies beyond 1e150
 FORMS = [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("  ", "."), (" , ", ".")]
 
 

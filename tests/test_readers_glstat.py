@@ -1,4 +1,4 @@
-"""glstat: small texts in, expected numbers out; every cut gives an error or a true prefix."""
+"""glstat: what it may look like and what is refused; every cut gives an error or a true prefix."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
 from d2rpick.history import History, Precision
-from d2rpick.readers import Run, Selection, glstat
-from d2rpick.readers.database import Legs
-from d2rpick.readers.source import Source
+from d2rpick.readers import Selection, glstat
+from tests.reading import history_of, run_of, states_of
+from tests.shared import shared_bytes
 
 HEAD = """\
  Internal energy of a time box, 1.0E+00
@@ -61,16 +61,11 @@ STATES = ((0.0, 2e-20), (1.5e-3, 1.36945e-5), (2.75e-3, -8.05e2))
 WHOLE = HEAD + "".join(block(*state, controller=c) for state, c in zip(STATES, CONTROLLERS, strict=False))
 
 
-def read(text: str | bytes, *energy: str, time: str | None = None) -> History:
-    data = text if isinstance(text, bytes) else text.encode("latin-1")
-    selection = Selection(time, energy)
-    return Run(("glstat",), (Legs(glstat.open_legs([Source("glstat", data)], selection)),)).history(selection)
+def read(text: str | bytes, *energy: str) -> History:
+    return history_of(glstat, text, selection=Selection(energy=energy), name="glstat")
 
 
-def states(history: History) -> list[tuple[float, float]]:
-    return list(zip(history.time.tolist(), history.energy.tolist(), strict=True))
-
-
+KILLED = "a leg that was killed, and its restart"
 SCENARIOS = {
     "as written": (WHOLE, STATES),
     "one state": (HEAD + block(0.0, 4.5), [(0.0, 4.5)]),
@@ -90,6 +85,18 @@ SCENARIOS = {
         [(1e-3, 1.23457e-100), (2e-3, -4.94066e-300), (0.3, 1.0)],
     ),
     "values before the first time line": (WHOLE[WHOLE.index(" time step") :], STATES[1:]),
+    "trailing blanks": (WHOLE.replace("\n", "  \n"), STATES),
+    "a title like data": (WHOLE.replace(" Internal energy of a time box, 1.0E+00", line("time", 9.0)[:-1]), STATES),
+    "a line more in one state": (
+        WHOLE.replace(line("eroded internal energy", 77.0), " body row1= 0.1 0.2 0.3\n", 1),
+        STATES,
+    ),
+    "a line more in the last state": (WHOLE + line("percentage increase", 1.0), STATES),
+    "no hourglass line": (WHOLE.replace(line("hourglass energy ", 0.0), ""), STATES),
+    KILLED: (
+        HEAD + block(0.0, 1.0) + block(1.0, 9.0)[:500] + HEAD + block(1.0, 2.0) + block(2.0, 3.0),
+        [(0, 1), (1, 2), (2, 3)],
+    ),
     "equal times, the last counts": (
         HEAD + block(0.0, 1.0) + block(0.0, 2.0) + block(1.0, 3.0),
         [(0, 2), (1, 3)],
@@ -112,7 +119,7 @@ SCENARIOS = {
 def test_scenario(name: str) -> None:
     text, expected = SCENARIOS[name]
     history = read(text)
-    assert states(history) == [tuple(map(float, state)) for state in expected]
+    assert states_of(history) == [tuple(map(float, state)) for state in expected]
     assert history.channel == "internal energy"
     assert history.format == "glstat"
     assert history.complete
@@ -121,9 +128,18 @@ def test_scenario(name: str) -> None:
 
 def test_notes_say_what_was_left_out() -> None:
     assert read(WHOLE).notes == ()
-    assert "begins inside a state" in read(WHOLE[WHOLE.index(" time step") :]).notes[0]
+    assert "no head" in read(WHOLE[WHOLE.index(" time step") :]).notes[0]
     assert "same printed time" in read(HEAD + block(0.0, 1.0) + block(0.0, 2.0)).notes[0]
+    assert "a leg of the run stops inside the state of line 29" in read(SCENARIOS[KILLED][0]).notes[0]
     assert "kinetic" in read(WHOLE, "kinetic energy").notes[0]
+
+
+def test_a_head_alone_is_a_legal_file_without_states() -> None:
+    run = run_of(glstat, HEAD)
+    assert run.databases[0].span is None
+    assert run.databases[0].complete
+    assert run.databases[0].version == "ls-dyna smp d R16 R16.1_180_d50332d date 07/09/2025"
+    assert run.databases[0].title == "Internal energy of a time box, 1.0E+00"
 
 
 @pytest.mark.parametrize(
@@ -131,6 +147,7 @@ def test_notes_say_what_was_left_out() -> None:
     [
         (("Kinetic Energy",), "kinetic energy", 9.93442e-6),
         (("hourglass energy",), "hourglass energy", 0.0),
+        (("stonewall energy wall# 2",), "stonewall energy wall# 2", -2.0),
         (("energy ratio w/o eroded energy",), "energy ratio w/o eroded energy", 1.0),
         (
             ("dissipated internal energy", "eroded internal energy"),
@@ -145,36 +162,37 @@ def test_other_labels(asked: list[str], channel: str, expected: float) -> None:
     assert history.energy.tolist() == [expected] * 3
 
 
-WIDE = WHOLE.replace(line("internal energy", 1.36945e-5), line("internal energy", "1.36945E-05")[:-1] + "1\n")
+GOOD = line("internal energy", 1.36945e-5)  # in line 32, its state begins in line 29
+NO_NUMBER = "glstat:32: 'internal energy' is '{}', a number in its columns was expected"
+NOT_ONCE = "glstat:29: 'internal energy' is missing, cut or doubled in the state that begins here"
 REFUSED = {
     "no state": (HEAD, "no states"),
     "no state, one controller": (HEAD + " dt of cycle       1 is controlled by dt2ms\n", "no states"),
-    "overflow": (
-        HEAD + block(0.0, 1.0) + block(1.0, "*" * 14) + block(2.0, 1.0),
-        r"glstat:\d+: 'internal energy' is '\*",
-    ),
-    "no number": (HEAD + block(0.0, "NaN") + block(1.0, 1.0), r"glstat:10: 'internal energy' is 'NaN'"),
-    "infinite": (HEAD + block(0.0, 1.0) + block("Infinity", 1.0), r"'time' is 'Infinity'"),
-    "old Windows": (HEAD + block(0.0, "-1.#IND0E+00") + block(1.0, 1.0), "a number in columns 33-46"),
-    "underscore": (HEAD + block(0.0, "1.0_000E+00") + block(1.0, 1.0), "a number in columns 33-46"),
-    "wider than its column": (WIDE, "a number in columns 33-46"),
-    "shifted": (
-        WHOLE.replace("energy................   1.36", "energy................  1.36"),
-        "columns 33-46",
-    ),
-    "a state without the label": (
-        HEAD + block(0.0, 1.0) + block(1.0, None) + block(2.0, 1.0),
-        r"glstat:\d+: 'time' where",
-    ),
+    "a time that is none": (HEAD + block(0.0, 1.0) + block("Infinity", 1.0), "'time' is 'Infinity'"),
     "a state without its time": (
-        HEAD + block(0.0, 1.0) + block(1.0, 2.0).replace(line("time", 1.0), "") + block(2.0, 3.0),
-        r"glstat:\d+: 'internal energy' where 'time' was expected",
+        WHOLE.replace(line("time", 1.5e-3), ""),
+        "'internal energy' is missing, cut or doubled",
     ),
-    "no such line at all": (HEAD + block(0.0, None) + block(1.0, None), "no whole line 'internal energy'"),
+    "no such line at all": (
+        HEAD + block(0.0, None) + block(1.0, None),
+        "no internal energy; choose with --energy: time",
+    ),
     "time at random": (
         HEAD + "".join(block(float(t), 1.0) for t in (5, 1, 4, 2, 3)),
         "glstat: time steps back",
     ),
+    "line missing": (WHOLE.replace(GOOD, ""), NOT_ONCE),
+    "line twice": (WHOLE.replace(GOOD, 2 * GOOD), NOT_ONCE),
+    "wider than its column": (WHOLE.replace(GOOD, GOOD[:-1] + "1\n"), NOT_ONCE),
+    "narrower than its column": (WHOLE.replace(GOOD, GOOD[:-2] + "\n"), NOT_ONCE),
+    "shifted": (WHOLE.replace(GOOD, GOOD.replace("   1.", "  1.")), NOT_ONCE),
+    **{
+        text.strip() or "blank": (
+            WHOLE.replace("   1.36945E-05", f"{text:>14}"),
+            NO_NUMBER.format(re.escape(text.strip())),
+        )
+        for text in ("*" * 14, "NaN", "Infinity", "-1.#IND0E+00", "1.0_000E+00", "1.0E+999", "", "1.36945E-5 ")
+    },
 }
 
 
@@ -192,9 +210,9 @@ def test_refused(name: str) -> None:
             ("kinetik energy",),
             "did you mean 'kinetic energy'.*there are: time step, kinetic energy, internal energy",
         ),
-        (("stonewall energy",), "'stonewall energy' where 'time' was expected"),
+        (("stonewall energy",), "no 'stonewall energy' .did you mean 'stonewall energy wall# [12]'"),
         (("internal energy", "Internal Energy"), "asked for twice"),
-        (("time",), "no whole line 'time'"),
+        (("time",), "no 'time'"),
     ],
 )
 def test_labels_that_cannot_be_taken(asked: list[str], reason: str) -> None:
@@ -202,16 +220,14 @@ def test_labels_that_cannot_be_taken(asked: list[str], reason: str) -> None:
         read(WHOLE, *asked)
 
 
-def test_the_time_is_the_time() -> None:
-    assert states(read(WHOLE, time="Time")) == list(STATES)
-    with pytest.raises(FormatError, match="leave --time out"):
-        read(WHOLE, time="cycle")
+def test_other_lines_of_a_damaged_state_are_still_good() -> None:
+    assert read(WHOLE.replace("   1.36945E-05", "           NaN"), "kinetic energy").time.size == 3
 
 
 @pytest.mark.parametrize("energy", ["internal energy", "kinetic energy", "added mass"])
 def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
     whole = WHOLE.encode()
-    expected = states(read(whole, energy))
+    expected = states_of(read(whole, energy))
     outcomes: set[str | int] = set()
     for cut in range(len(whole) + 1):
         try:
@@ -219,12 +235,27 @@ def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
         except FormatError:
             outcomes.add("error")
             continue
-        found = states(history)
+        found = states_of(history)
         assert found == expected[: len(found)]
         outcomes.add(len(found))
         # All that lies between two whole lines is told from a whole file by nothing but the missing lines.
-        assert not history.complete or whole[:cut].endswith(b"\n")
+        assert not history.complete or whole[:cut].rstrip(b" ").endswith(b"\n")
+        assert history.complete or history.notes
     assert outcomes == {"error", 1, 2, 3}
+
+
+def test_a_last_state_counts_for_the_lines_that_are_there() -> None:
+    cut = WHOLE[: WHOLE.rindex(" hourglass") + 40]
+    assert states_of(read(cut)) == list(STATES)
+    assert read(cut).notes[-1] == "the file stops inside its last state, behind the lines that were needed"
+    assert read(cut, "stonewall energy wall# 2").time.size == 3
+    assert read(cut, "hourglass energy").time.size == 2
+    assert not read(cut).complete
+    energy = line("internal energy", -8.05e2)
+    at_its_end = WHOLE[: WHOLE.rindex(energy) + len(energy)]
+    assert read(at_its_end).time.size == 2  # no line follows
+    assert read(at_its_end + " ").time.size == 3
+    assert run_of(glstat, cut, selection=Selection(energy=("no such line",))).databases[0].time.size == 2
 
 
 @pytest.mark.parametrize("damage", ["", " ", "0", "_", "*", "\n", "time"])
@@ -233,7 +264,7 @@ def test_a_byte_lost_or_put_between_the_columns_is_seen(damage: str) -> None:
     for place in range(start, start + 34):
         removed = WHOLE[:place] + damage + WHOLE[place + 1 :]
         try:
-            found = states(read(removed))
+            found = states_of(read(removed))
         except FormatError:
             continue
         assert found == list(STATES)
@@ -268,3 +299,23 @@ def test_no_bytes_raise_anything_else(data: bytes) -> None:
 )
 def test_recognised_by_content(head: str, expected: bool) -> None:
     assert glstat.recognises(head.encode()) is expected
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        "PILLARS-LSDyna__Bolt_B_Explicit-glstat",
+        "PILLARS-LSDyna__test_parachute-windflow_v1_thru_v10-glstat",
+        "ansys-example-data__result_files-binout-binout_glstat.l2a-glstat",
+    ],
+)
+def test_all_numbers_of_a_real_file_are_those_of_float(file: str) -> None:
+    data = shared_bytes(f"real/histories/{file}")
+    run = glstat.Glstat(data, file)
+    written: dict[str, list[float]] = {}
+    for text in data.decode("latin-1").split("\n"):
+        if text[31:32] == ".":
+            label = " ".join([text[1:32].rstrip(".").rstrip(), *text[46:].split()])
+            written.setdefault(label, []).append(float(text[32:46]))
+    assert run.time.tolist() == written.pop("time")
+    assert {name: run.channel(name).tolist() for name in run.channels} == written

@@ -135,7 +135,7 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
             whole = upper_envelope(situation.history.time, situation.history.energy)
             assert whole is not None
             vibration = replace(situation.part_vibration, whole=whole)
-            situation = replace(situation, mode=None, no_mode="not looked for", part_vibration=vibration)
+            situation = replace(situation, fit=None, span=None, part_vibration=vibration)
             assert situation.kinetic_share_estimated
         runs = [run for run in chain.scan() if abs(run["td_s"] - td) < 1e-3]  # a step of the solver late
         errors += [abs(predicted(situation.at(run["td_s"]), run["tr_s"]) - run["R_sim"]) for run in runs]

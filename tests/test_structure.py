@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.command import ENERGY, GLSTAT, ROOT
+from d2rpick.cli import options, replay
+from d2rpick.readers import READERS
+from d2rpick.writers import TRAJECTORY_WRITERS
+from tests.command import DECK, ENERGY, GLSTAT, ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,14 +23,26 @@ PACKAGE = ROOT / "d2rpick"
 
 # Each module imports only from those above it.
 ORDER = (
-    "d2rpick", "errors", "history",
-    "readers.source", "readers.names", "readers.printed", "readers.layout", "readers.csv_table", "readers.glstat",
-    "readers",
-    "crossings", "oscillator", "mode", "fitting", "identify", "measures", "replay", "flight", "situation",
-    "cautions", "uncertainty", "choice",
-    "report", "report.tables", "report.situation", "report.suggestion", "report.verdict",
+    "d2rpick", "errors", "configuration", "cards",
+    "deck.source", "deck.expression", "deck.rows", "deck.parameters", "deck.card", "deck.includes", "deck.reader",
+    "deck.parts", "deck.elements", "deck.switching", "deck.windows", "deck",
+    "rules.base", "rules.example_decks", "rules.reading", "rules.pairs", "rules.times", "rules.switched_parts",
+    "rules.energy", "rules.scope", "rules",
+    "history",
+    "readers.names", "readers.source", "readers.selection", "readers.printed", "readers.layout", "readers.columns",
+    "readers.curves", "readers.csv_table", "readers.database", "readers.fortran", "readers.fixed_text",
+    "readers.glstat", "readers.matsum", "readers.repeat", "readers.lsda", "readers.binout_states",
+    "readers.binout_branch", "readers.binout", "readers.hdf5_columns", "readers.hdf5_file", "readers.radioss_th",
+    "readers.companions", "readers.run", "balance", "readers.balance", "readers",
+    "momentum", "crossings", "oscillator", "mode", "modes", "fitting", "fitting_several", "identify",
+    "flight", "envelope", "signs", "measures", "profile", "replay", "situation",
+    "cautions", "uncertainty", "contributions", "candidates", "expectation", "switched", "health", "choice", "window",
+    "overview", "rules.judgement", "judged_card", "integration", "reproduction", "exhibits",
+    "report", "report.findings", "report.rules", "report.tables", "report.situation", "report.suggestion",
+    "report.verdict", "report.health", "report.overview", "report.html", "report.page", "report.reproduction",
     "writers", "plots",
-    "cli", "cli.options", "cli.output", "cli.suggest", "cli.verify", "cli.replay",
+    "cli", "cli.options", "cli.output", "cli.progress", "cli.check", "cli.rule", "cli.card",
+    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract", "cli.reproduce",
     "__main__",
 )  # fmt: skip
 # The only modules that may import these.
@@ -91,8 +106,21 @@ def loaded(*args: str) -> set[str]:
     return set(result.stderr.split())
 
 
-@pytest.mark.parametrize("args", [("--help",), ("--version",), ("suggest", "--help")])
+@pytest.mark.parametrize("args", [("--help",), ("--version",), ("suggest", "--help"), ("info", "--help")])
 def test_help_and_version_load_no_numbers(args: tuple[str, ...]) -> None:
+    assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.history", "d2rpick.choice"})
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ("check", "-f", "json", DECK),
+        ("rule", "D2R201"),
+        ("card", "--tr", "0.02", "--td", "0.09", "--part", "1"),
+        ("card", "--solver", "radioss", "--tr", "0.02", "--td", "0.09", "--node", "1", "--end", "1"),
+    ],
+)
+def test_decks_and_cards_need_no_numbers_without_a_history(args: tuple[str, ...]) -> None:
     assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.history", "d2rpick.choice"})
 
 
@@ -103,6 +131,14 @@ def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
     assert not modules & HEAVY
 
 
-@pytest.mark.parametrize("name", ["py.typed", "schemas/suggest-1.json", "schemas/verify-1.json"])
+def test_the_command_line_offers_the_formats_there_are() -> None:
+    assert tuple(READERS) == options.FORMATS
+    assert tuple(TRAJECTORY_WRITERS) == replay.FORMATS
+
+
+SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check")]
+
+
+@pytest.mark.parametrize("name", ["py.typed", *SCHEMAS])
 def test_the_package_ships_what_is_not_code(name: str) -> None:
     assert files("d2rpick").joinpath(name).is_file()

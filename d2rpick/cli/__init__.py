@@ -18,13 +18,14 @@ from d2rpick.errors import D2RPickError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-COMMANDS: Final = ("suggest", "verify", "replay", "info", "extract", "reproduce")
+COMMANDS: Final = ("suggest", "verify", "replay", "info", "extract", "card", "check", "rule", "reproduce")
 COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended
 EXAMPLES: Final = """\b
 Examples:
   d2rpick suggest --td 0.064 sample_data/energy.csv
   d2rpick verify --tr 0.013 --td 0.064 sample_data/energy.csv
+  d2rpick check sample_data/switching.k --history sample_data/energy.glstat
   d2rpick replay --help
 """
 
@@ -72,6 +73,19 @@ class _Group(click.Group):
 
                 click.echo(traceback.format_exc(), err=True, nl=False)
             raise click.ClickException(_one_line(error)) from error
+        except (
+            ArithmeticError,
+            AttributeError,
+            LookupError,
+            MemoryError,
+            RuntimeError,
+            TypeError,
+            ValueError,
+        ) as error:
+            if isinstance(error, click.exceptions.Exit | click.Abort) or ctx.meta.get("d2rpick.debug"):
+                raise
+            what = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            raise click.ClickException(f"a fault of this program, please report it with --debug ({what})") from error
 
     def main(self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any) -> NoReturn:  # type: ignore[override]
         extra["standalone_mode"] = False

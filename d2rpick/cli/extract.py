@@ -8,6 +8,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
+from d2rpick.cli.progress import reading
 
 EXAMPLES = """\b
 Examples:
@@ -32,12 +33,13 @@ def command(write_as: str | None, **options: Any) -> None:
     from d2rpick import writers
 
     form = write_as or writers.format_of(options["output_file"], list(writers.TABLE_WRITERS))
-    run = shared.open_run(options)
-    output = Output.of(options, *run.sources)
-    history = run.history(shared.selection(options))
-    table = {"time": history.time, "internal_energy": history.energy}
-    if history.parts and len(history.parts) > 1:
-        energies = run.part_energies(history.parts)
-        table |= {f"part_{part.id}": column for part, column in zip(history.parts, energies.T, strict=True)}
+    with reading(options["history"], quiet=options["quiet"]):
+        run = shared.open_run(options)
+        output = Output.of(options, *run.sources)
+        history = run.history(shared.selection(options))
+        table = {"time": history.time, "internal_energy": history.energy}
+        if history.parts and len(history.parts) > 1:
+            energies = run.part_energies(history.parts)
+            table |= {f"part_{part.id}": column for part, column in zip(history.parts, energies.T, strict=True)}
     output.notes(history.notes, ())
     output.content(writers.TABLE_WRITERS[form](table))

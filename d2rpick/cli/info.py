@@ -8,6 +8,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
+from d2rpick.cli.progress import reading
 
 EXAMPLES = """\b
 Examples:
@@ -25,9 +26,10 @@ def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **option
     from d2rpick.overview import survey
     from d2rpick.report import overview as report
 
-    run = shared.open_run(options)
-    output = Output.of(options, *run.sources)
-    overview = survey(run, shared.selection(options))
+    with reading(options["history"], quiet=options["quiet"]):
+        run = shared.open_run(options)
+        output = Output.of(options, *run.sources)
+        overview = survey(run, shared.selection(options))
     output.notes((), report.cautions(overview))
     texts = {
         "table": lambda: report.as_table(overview),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -31,7 +31,8 @@ class Output:
     @classmethod
     def of(cls, options: dict[str, Any], *inputs: str) -> Output:
         """Take the options of ``file_options``; D2RPickError when a file to be written may not be."""
-        output = cls(options["output_file"], options["overwrite"], options["quiet"], inputs)
+        file = None if options["output_file"] == "-" else options["output_file"]
+        output = cls(file, options["overwrite"], options["quiet"], inputs)
         plot = options.get("plot")
         if plot is not None:
             from d2rpick import plots
@@ -46,6 +47,11 @@ class Output:
                 if other != option:
                     raise D2RPickError(f"{name}: {option} and {other} name the same file; name two")
         return output
+
+    def spare(self, inputs: Iterable[str]) -> None:
+        """Raise D2RPickError when the result would replace one of further inputs, known only since they were read."""
+        if self.file is not None:
+            replace(self, inputs=tuple(inputs)).claim(self.file)
 
     def claim(self, name: str) -> None:
         """Raise D2RPickError when ``name`` cannot be written, is an input, or exists and was not to be replaced."""
@@ -65,7 +71,8 @@ class Output:
 
     def result(self, text: str) -> None:
         """Give out the result; on a terminal the line of the recommended candidate stands out."""
-        text = text and f"{text}\n"
+        # bytes of file names that are no text come as lone surrogates, which no encoding can write
+        text = text and f"{text}\n".encode(errors="surrogateescape").decode(errors="replace")
         if self.file is not None:
             self.write(self.file, text.encode())
             return

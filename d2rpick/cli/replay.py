@@ -9,7 +9,7 @@ import click
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
 
-MOST_STATES = 100_000_000
+MOST_STATES = 10_000_000  # their text takes some gigabytes
 FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.writers, which --help does without
 
 EXAMPLES = """\b

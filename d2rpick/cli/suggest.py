@@ -8,6 +8,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
+from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
     from d2rpick.choice import Suggestion
@@ -21,6 +22,7 @@ Examples:
   d2rpick suggest --td-window 0.06 0.07 sample_data/energy.csv
   d2rpick suggest --td 0.37 --energy boxIE_J sample_data/rollover.csv
   d2rpick suggest --td 0.064 -f json sample_data/energy.glstat
+  d2rpick suggest --td 0.37 --part box -f card sample_data/rolloverT01.gz
   d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
 """
 
@@ -40,7 +42,7 @@ Examples:
 @shared.history_options
 @shared.choosing_options
 @click.option("--report", metavar="FILE", help="Write all of it to FILE, one HTML page to read, print and sign.")
-@shared.output_options("table", "json", "csv", "markdown", "value")
+@shared.output_options("table", "json", "csv", "markdown", "value", "card")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -61,10 +63,11 @@ def command(
     from d2rpick.readers.balance import balance_of
     from d2rpick.report import suggestion as report
 
-    _check_times(td, td_window)
-    run = shared.open_run(options)
-    output = Output.of(options, *run.sources)
-    history = run.history(shared.selection(options), with_momenta=True)
+    _check_usage(td, td_window, card=output_format == "card", parts=options["part"])
+    with reading(options["history"], quiet=options["quiet"]):
+        run = shared.open_run(options)
+        output = Output.of(options, *run.sources)
+        history = run.history(shared.selection(options), with_momenta=True)
     answer = _answer(history, td, td_window, shared.settings(options))
     if balance := balance_of(run, history.parts, answer.situation.td):
         answer = with_health(answer, balance)
@@ -75,6 +78,10 @@ def command(
         output.write(options["plot"], plots.render(plots.draw_suggestion(answer), options["plot"]))
     if options["report"]:
         output.write(options["report"], _page(answer, run, ctx.meta["d2rpick.command"]).encode())
+    if output_format == "card":
+        written = _card(answer, output)
+        finish(ctx, objection=not written, exit_zero=exit_zero)
+        return
     texts = {
         "table": lambda: report.as_table(answer, limit),
         "markdown": lambda: report.as_markdown(answer, limit),
@@ -86,12 +93,14 @@ def command(
     finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
 
 
-def _check_times(td: float | None, window: tuple[float, float] | None) -> None:
-    """Raise UsageError where the times asked for make no sense, before a file is opened."""
+def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: bool, parts: tuple[str, ...]) -> None:
+    """Raise UsageError where what is asked for makes no sense, before a file is opened."""
     if td is not None and window:
         raise click.UsageError("--td and --td-window exclude each other")
     if window and not window[0] < window[1]:
         raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
+    if card and not parts:
+        raise click.UsageError("-f card needs --part, the parts that are switched")
 
 
 def _answer(history: History, td: float | None, window: tuple[float, float] | None, settings: Settings) -> Suggestion:
@@ -122,3 +131,23 @@ def _page(answer: Suggestion, run: Run, command: tuple[str, ...]) -> str:
         for number, (caption, draw) in enumerate(drawings.items())
     }
     return as_page(answer, run, command, figures)
+
+
+def _card(answer: Suggestion, output: Output) -> bool:
+    """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
+    from d2rpick.cards import ls_dyna
+    from d2rpick.cli.card import all_cautions
+    from d2rpick.judged_card import judged
+
+    pair, history = answer.recommended, answer.situation.history
+    if pair is None:
+        output.content(b"")
+        return False
+    ids = [part.id for part in history.parts or ()]
+    card, verdict = judged(
+        lambda remarks: ls_dyna(pair.tr, pair.td, ids, remarks=remarks), history, answer.situation.settings
+    )
+    said = set(answer.cautions)
+    output.notes(card.notes, [caution for caution in all_cautions(verdict) if caution not in said])
+    output.content(card.text.encode())
+    return verdict.verified

@@ -8,8 +8,12 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
+from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.history import Part, Track
     from d2rpick.readers import Run
     from d2rpick.situation import Situation
     from d2rpick.switched import Comparison
@@ -21,14 +25,29 @@ Examples:
 """
 
 
-@click.command("verify", epilog=EXAMPLES)
+class _Verify(click.Command):
+    """Lets ``--switched`` take all file names that follow it, as a shell's glob gives them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        spread: list[str] = []
+        taking = False
+        for arg in args:
+            option = arg.startswith("-") and arg != "-"
+            if taking and not option and spread[-1] != "--switched":
+                spread.append("--switched")
+            taking = arg == "--switched" if option else taking
+            spread.append(arg)
+        return super().parse_args(ctx, spread)
+
+
+@click.command("verify", cls=_Verify, epilog=EXAMPLES)
 @click.option("--tr", type=shared.TIME, required=True, metavar="T", help="Switch to rigid at this time.")
 @click.option("--td", type=shared.TIME, required=True, metavar="T", help="Switch back to deformable at this time.")
 @click.option(
     "--switched",
     metavar="FILE",
     multiple=True,
-    help="Compare a finished switched run with the reference; a file, folder or glob, given again for more.",
+    help="Compare a finished switched run with the reference: all files, folders and globs up to the next option.",
 )
 @shared.history_options
 @shared.choosing_options
@@ -39,12 +58,14 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
     from d2rpick.choice import verify, with_comparison
     from d2rpick.report import verdict as report
 
-    run = shared.open_run(options)
-    output = Output.of(options, *run.sources)
-    history = run.history(shared.selection(options), with_momenta=True)
+    with reading(options["history"], quiet=options["quiet"]):
+        run = shared.open_run(options)
+        output = Output.of(options, *run.sources)
+        history = run.history(shared.selection(options), with_momenta=True)
     answer = verify(history, tr, td, shared.settings(options))
     if options["switched"]:
-        answer = with_comparison(answer, _comparison(run, answer.situation, options))
+        with reading(options["switched"], quiet=options["quiet"]):
+            answer = with_comparison(answer, _comparison(run, answer.situation, {**options, "tr": tr}))
     output.notes(history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick import plots
@@ -67,13 +88,20 @@ def _comparison(run: Run, situation: Situation, options: dict[str, Any]) -> Comp
 
     selection = shared.selection(options)
     other = open_run(options["switched"], selection, options["input_format"])
-    parts = situation.history.parts
-    together = situation.flight.parts or parts
+    flight, parts = situation.flight, situation.history.parts
+    together = flight.parts if flight.source == "momentum" else flight.parts or parts
     return compare(
         situation.history,
         other.history(selection),
-        situation.td,
-        situation.latest_td,
-        momenta=(run.momentum(together), other.momentum(together)),
+        (options["tr"], situation.td),
+        situation.latest_td if situation.latest_td > situation.td else float("inf"),
+        situation.settings.tolerance,
+        momenta=(run.momentum(together), _momentum(other, together)),
         centres=(run.centre(parts), other.centre(parts)) if parts else (None, None),
     )
+
+
+def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:
+    """Momentum of some parts, None also where the run does not have them all."""
+    missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
+    return None if missing else run.momentum(parts)

@@ -1,14 +1,16 @@
 """Readers of energy histories: one module per format, one table of formats.
 
-A reader is a module with the two functions of `Reader`; a new format is a new module and a line in `READERS`.
+A reader is a module with the two functions of `Reader`; a new format is a new module and a line in `READERS`.  It is
+imported when a file may be its own: start-up is part of the product.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Protocol
+from importlib import import_module
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, cast
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import binout, csv_table, glstat, hdf5_file, matsum, radioss_th
+from d2rpick.readers.companions import check_companions
 from d2rpick.readers.database import Legs
 from d2rpick.readers.run import Run
 from d2rpick.readers.selection import Selection
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.history import History
     from d2rpick.readers.database import Database
 
-__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "read_history", "sha256"]
+__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "read_history", "reader", "sha256"]
 
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
@@ -37,16 +39,28 @@ class Reader(Protocol):
         """Open files of this format as the legs of one run; FormatError when one is none."""
 
 
+class Listed(NamedTuple):
+    """Module of a reader, and what its files have in their head: one of these."""
+
+    module: str
+    hints: tuple[bytes, ...]
+
+
 # In the order they are asked, and in which they are preferred as sources of one quantity: binary before text, since it
 # holds more digits; csv takes any text, so it comes last.
-READERS: Final[Mapping[str, Reader]] = {
-    "binout": binout,
-    "radioss-th": radioss_th,
-    "glstat": glstat,
-    "matsum": matsum,
-    "hdf5": hdf5_file,
-    "csv": csv_table,
+READERS: Final[Mapping[str, Listed]] = {
+    "binout": Listed("binout", (b"\0",)),
+    "radioss-th": Listed("radioss_th", (b"\0",)),
+    "glstat": Listed("glstat", (b" time.", b"ls-dyna")),
+    "matsum": Listed("matsum", (b" time =", b"{BEGIN LEGEND}")),
+    "hdf5": Listed("hdf5_file", (b"\x89HDF",)),
+    "csv": Listed("csv_table", (b"",)),
 }
+
+
+def reader(kind: str) -> Reader:
+    """Import the reader of a format, one of `READERS`."""
+    return cast("Reader", import_module(f"d2rpick.readers.{READERS[kind].module}"))
 
 
 def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
@@ -71,8 +85,12 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
     for source in map(open_source, files):
         kinds.setdefault(input_format if input_format != "auto" else _format(source), []).append(source)
     ordered = [kind for kind in READERS if kind in kinds]
-    databases = tuple(Legs(READERS[kind].open_legs(kinds[kind], selection)) for kind in ordered)
-    _check_companions(databases)
+    _refuse_time_of_solver(ordered, selection.time)
+    databases = tuple(
+        Legs(reader(kind).open_legs(kinds[kind], selection), cut=[one.name for one in kinds[kind] if one.cut])
+        for kind in ordered
+    )
+    check_companions(databases)
     return Run(files, databases)
 
 
@@ -81,22 +99,18 @@ def read_history(names: Sequence[str], selection: Selection = _DEFAULT, input_fo
     return open_run(names, selection, input_format).history(selection)
 
 
+def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
+    """Refuse ``--time`` where it would be passed over: solvers have one time and call it so."""
+    if time is not None and time.strip().casefold() != "time" and not {"csv", "hdf5"} & {*kinds}:
+        raise FormatError(f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave --time out")
+
+
 def _format(source: Source) -> str:
     head = source.data[:_HEAD]
-    for kind, reader in READERS.items():
-        if reader.recognises(head):
+    for kind, listed in READERS.items():
+        if any(hint in head for hint in listed.hints) and reader(kind).recognises(head):
             return kind
     raise FormatError(
         f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected; "
         "export the energy history as text"
     )
-
-
-def _check_companions(databases: Sequence[Legs]) -> None:
-    """Refuse companions that cannot be of one run."""
-    for one in databases[1:]:
-        own, other = one.span, databases[0].span
-        if own[0] > other[1] or other[0] > own[1]:
-            raise FormatError(
-                f"{databases[0].source} and {one.source} have no time in common, files of one run were expected"
-            )

@@ -40,14 +40,16 @@ _VELOCITIES: Final = (
 def balance_of(run: Run, parts: Sequence[Part] | None, until: float = np.inf) -> Balance | None:
     """Read the balance of the whole model, and the hourglass energy of ``parts``, up to a time [time].
 
-    None where the files have neither.
+    None where the files have neither, or leave open which columns are meant.
     """
     whole = next((database for database in run.databases if database.channels), None)
     of_parts = _hourglass_of(run, parts, until) if parts else ()
     if whole is None:
-        time = run.databases[0].part_time
-        return Balance(time, hourglass_of_parts=of_parts) if of_parts else None
-    columns = _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
+        return Balance(run.databases[0].part_time, hourglass_of_parts=of_parts) if of_parts else None
+    try:
+        columns = _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
+    except FormatError:
+        return None
     found = {name: columns.first(*names) for name, names in _NAMES.items()}
     rotation = found.pop("rotation")
     if rotation is not None and found["kinetic"] is not None:

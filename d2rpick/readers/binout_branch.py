@@ -74,8 +74,6 @@ class Branch:
         if states.missing:
             holes = listing(states.missing, most=3)
             notes.append(f"{self.source} lacks the states {holes}; is a file of the family missing?")
-        if states.superseded:
-            notes.append(f"{self.source}: a newer leg wrote {states.superseded} states again; the newer ones count")
         names = {name for group in self._states.groups for name in group.layout.variables}
         if late := sorted(names - self.common):
             notes.append(f"{self.source} has {listing(late)} in some states only")

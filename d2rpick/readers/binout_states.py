@@ -47,18 +47,17 @@ class States:
     """The states of one branch in all files of a family.
 
     A solver numbers its states one by one.  Where a file begins higher than the last one ended, a member of
-    the family is missing; a number that comes again begins a newer leg, which writes the same variables.  A
-    number left out inside a file, a name twice in a state and a leg with other variables are the marks of
-    records lost or out of place: what then seems to be one state may be made of two.
+    the family is missing; a number that comes again begins a newer leg, which writes the same variables, be it
+    the same states again or the next ones: that shows in their times.  A number left out inside a file, a name
+    twice in a state and a leg with other variables are the marks of records lost or out of place: what then seems
+    to be one state may be made of two.
 
     Attributes
     ----------
     numbers : array of int, shape (n,)
-        Number of each state that counts, ascending.
+        Number of each state, in the order of the files by their first times.
     groups : tuple of Group
         The same states by file and layout.
-    superseded : int
-        How many states a newer leg wrote again.
     unfinished : tuple of str
         Files whose last state is not whole; it is left out.
     missing : tuple of str
@@ -69,7 +68,7 @@ class States:
 
     def __init__(self, branch: str, family: Sequence[Lsda]) -> None:
         visited = [file for file in family if file.visits[branch].numbers]
-        files = sorted(visited, key=lambda file: file.visits[branch].numbers[0])
+        files = sorted(visited, key=lambda file: _start(file, branch))
         cut = [_is_unfinished(file, branch) for file in files]
         self.unfinished = tuple(file.source for file, last in zip(files, cut, strict=True) if last)
         self.damage = ""
@@ -93,12 +92,19 @@ class States:
             starts = np.append(starts, np.array(visits.starts[whole]))
             kinds = np.append(kinds, np.array(visits.layouts[whole]) + len(layouts))
             layouts += [(file, layout) for layout in file.layouts]
-        keep, dropped = _newest(numbers)
-        self.superseded = dropped.size
-        self.numbers = numbers[keep]
-        self.groups = tuple(_groups(layouts, kinds[keep], starts[keep]))
+        self.numbers = numbers
+        self.groups = tuple(_groups(layouts, kinds, starts))
         holes = np.flatnonzero(np.diff(self.numbers) > 1)
         self.missing = tuple(f"{self.numbers[i] + 1} to {self.numbers[i + 1] - 1}" for i in holes)
+
+
+def _start(file: Lsda, branch: str) -> float:
+    """Time of the first state of a branch in a file; before all others where it has none."""
+    visits = file.visits[branch]
+    variable = file.layouts[visits.layouts[0]].variables.get("time")
+    if variable is None or not variable.count:
+        return -np.inf
+    return float(file.read(np.array([visits.starts[0] + variable.offset]), variable.dtype)[0])
 
 
 def _is_unfinished(file: Lsda, branch: str) -> bool:
@@ -114,18 +120,3 @@ def _groups(layouts: Sequence[tuple[Lsda, Layout]], kinds: NDArray[np.int32], st
     for rows in np.split(order, cuts) if order.size else ():
         file, layout = layouts[kinds[rows[0]]]
         yield Group(file, layout, rows, starts[rows])
-
-
-def _newest(numbers: Indices) -> tuple[slice | Indices, Indices]:
-    """Which states count, and which give way to a newer leg: all from a number on that comes again.
-
-    Examples
-    --------
-    >>> _newest(np.array([1, 2, 3, 2, 3]))
-    (array([0, 3, 4]), array([1, 2]))
-    """
-    if (np.diff(numbers) > 0).all():
-        return slice(None), np.empty(0, dtype=np.int64)
-    later = np.minimum.accumulate(numbers[::-1])[::-1]
-    counts = np.append(numbers[:-1] < later[1:], True)
-    return np.flatnonzero(counts), np.flatnonzero(~counts)

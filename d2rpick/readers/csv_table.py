@@ -18,18 +18,13 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.readers import printed
+from d2rpick.readers.columns import internal_energy, labelled, named_column, own_times, time_column
+from d2rpick.readers.curves import Curves, find_curves
 from d2rpick.readers.layout import Layout, as_number, find_layout, is_skipped, split
-from d2rpick.readers.names import (
-    is_internal_energy,
-    is_some_internal_energy,
-    is_time,
-    listing,
-    near_miss,
-    normalised,
-)
+from d2rpick.readers.names import listing
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from d2rpick.history import Part, Precision, Samples
     from d2rpick.readers.selection import Selection
@@ -41,18 +36,21 @@ _UTF8 = b"\xef\xbb\xbf"
 # How many rows from the start, the end and between are looked at to judge the printed format.
 _SAMPLE = 100
 
-# A restart steps back once; a column that does so in more than this share of its rows is no time.
-_MOST_BACK = 0.1
-
 
 def recognises(head: bytes) -> bool:
     """Whether this is text: what it says is seen when it is read."""
     return head.startswith(_UTF16) or b"\0" not in head
 
 
-def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table]:
+def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | Curves]:
     """Open tables; the selection tells their time column, and which values must be whole in a last line."""
-    return [Table(source, selection) for source in sources]
+    return [_opened(source, selection) for source in sources]
+
+
+def _opened(source: Source, selection: Selection) -> Table | Curves:
+    lines = _text(source).split("\n")
+    unended = lines.pop()  # empty when the last line has its end
+    return find_curves(source.name, lines, unended, selection) or Table(source.name, lines, unended, selection)
 
 
 class Table:
@@ -65,14 +63,12 @@ class Table:
     version = title = ""
     parts: tuple[Part, ...] = ()
 
-    def __init__(self, source: Source, selection: Selection) -> None:
-        self.source = source.name
-        lines = _text(source).split("\n")
-        unended = lines.pop()  # empty when the last line has its end
-        self._layout = layout = find_layout(source.name, lines, unended)
-        self._time, notes = _time_column(source.name, layout, selection.time)
+    def __init__(self, source: str, lines: list[str], unended: str, selection: Selection) -> None:
+        self.source = source
+        self._layout = layout = find_layout(source, lines, unended)
+        self._time, notes = time_column(source, layout, selection.time, selection.energy)
         self._rows = lines[layout.start :]
-        self._columns = _labelled(layout, self._time)
+        self._columns = labelled(layout, self._time)
         self.complete = True
         if not is_skipped(unended):
             self.complete = _is_whole(unended, self._rows, layout, self._needed(selection))
@@ -84,7 +80,7 @@ class Table:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of all columns but the time."""
+        """Names of all columns but the time, as far as they are sure."""
         return tuple(self._columns)
 
     @property
@@ -95,29 +91,22 @@ class Table:
     @property
     def energy_channel(self) -> str:
         """The column named like an internal energy, or the only one beside the time; else FormatError."""
-        column = _internal_energy(self.source, self._layout, self._time)
+        column = internal_energy(self.source, self._layout, [self._time, *own_times(self._layout)])
         return next(label for label, own in self._columns.items() if own == column)
 
     def find(self, wanted: str) -> str:
         """Name of a column that is meant by its name or 1-based number; FormatError with what there is."""
-        if wanted in self._columns:
+        if wanted in self._columns and wanted not in self._layout.names:
             return wanted
-        column = _named_column(self.source, self._layout, wanted)
+        column = named_column(self.source, self._layout, wanted)
         if column == self._time:
-            raise FormatError(f"{self.source}: {wanted!r} is the time column; name the time and each energy once")
+            raise FormatError(f"{self.source}: {wanted!r} is the time column, not to be used twice; name an energy")
         return next(label for label, own in self._columns.items() if own == column)
 
     @property
     def time(self) -> Samples:
-        """Times as they stand in the file, shape (n,) [time]; FormatError when they step back all the time."""
-        time = self._values(self._time)
-        back, steps = int(np.count_nonzero(np.diff(time) < 0)), time.size - 1
-        if back > 1 and back > _MOST_BACK * steps:
-            raise FormatError(
-                f"{self.source}: time steps back at {back} of {steps} states, increasing times were expected; "
-                "name the time column with --time"
-            )
-        return time
+        """Times as they stand in the file, shape (n,) [time]."""
+        return self._values(self._time)
 
     @property
     def part_time(self) -> Samples:
@@ -126,7 +115,16 @@ class Table:
 
     def channel(self, name: str) -> Samples:
         """One column, shape (n,); FormatError with the line of a value that is no number."""
-        return self._values(self._columns[name])
+        if name not in self._columns:
+            raise FormatError(f"{self.source}: no column {name!r}, only {listing(self.channels)}")
+        column = self._columns[name]
+        own = column - 1 if column - 1 in own_times(self._layout) else self._time
+        if own == self._time:
+            return self._values(column)
+        curve = _checked_values(self.source, self._rows, self._layout, (own, column))
+        if not np.array_equal(curve[:, 0], self.time):
+            raise FormatError(f"{self.source}: {name!r} has other times than the first curve that is asked for")
+        return np.ascontiguousarray(curve[:, 1])
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:  # noqa: ARG002  as a Database
         """Refused: a table has no parts."""
@@ -134,7 +132,7 @@ class Table:
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """How finely the times and these columns were printed."""
-        fields = _sample(self._rows, self._layout)
+        fields = [row for row in _sample(self._rows, self._layout) if row[self._time]]  # not behind a curve's end
         times = [row[self._time] for row in fields]
         energies = [row[self._columns[name]] for row in fields for name in names]
         return printed.precisions(times, energies, self.time)
@@ -147,10 +145,7 @@ class Table:
             if selection.energy:
                 raise
             return [self._time, *self._columns.values()]
-        columns = [self._time, *(self._columns[name] for name in names)]
-        if len(set(columns)) < len(columns):
-            raise FormatError(f"{self.source}: a column is asked for twice; name the time and each energy once")
-        return columns
+        return [self._time, *(self._columns[name] for name in names)]
 
     def _values(self, column: int) -> Samples:
         if self._whole is not None and np.isfinite(self._whole[:, column]).all():
@@ -175,16 +170,6 @@ class Table:
         return FormatError(f"{self.source}: a table has no parts; choose its columns with --energy")
 
 
-def _labelled(layout: Layout, time: int) -> dict[str, int]:
-    """Columns beside the time by the name they are called by, with their number where a name is not theirs alone."""
-    names = [layout.channel(column) for column in range(layout.columns)]
-    return {
-        name if names.count(name) == 1 else f"{name} (column {column + 1})": column
-        for column, name in enumerate(names)
-        if column != time
-    }
-
-
 def _text(source: Source) -> str:
     data = bytes(source.data)
     if data.startswith(_UTF16):
@@ -197,71 +182,6 @@ def _text(source: Source) -> str:
         except UnicodeDecodeError:
             text = data.decode("latin-1")
     return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _time_column(name: str, layout: Layout, wanted: str | None) -> tuple[int, list[str]]:
-    """Column of the time, and what had to be assumed."""
-    if wanted is not None:
-        return _named_column(name, layout, wanted), []
-    times = [i for i, column in enumerate(layout.names[: layout.trusted]) if is_time(column)]
-    if len(times) > 1:
-        raise FormatError(
-            f"{name}: {len(times)} columns are named like a time; choose with --time: {_menu(layout, times)}"
-        )
-    if layout.names and not times:
-        return 0, [f"no column is named like a time; {layout.name(0)!r}, the first, was taken for it"]
-    return (times[0] if times else 0), []
-
-
-def _internal_energy(name: str, layout: Layout, time: int) -> int:
-    """Pick the only column beside the time, or else the one named like an internal energy."""
-    beside = [column for column in range(layout.columns) if column != time]
-    if len(beside) == 1:
-        return beside[0]
-    sure = [column for column in beside if column < layout.trusted]
-    named = [column for column in sure if is_internal_energy(layout.name(column))]
-    named = named or [column for column in sure if is_some_internal_energy(layout.name(column))]
-    if len(named) == 1:
-        return named[0]
-    found = f"{len(named)} columns are" if named else "no column is"
-    raise FormatError(
-        f"{name}: {found} named like an internal energy; choose with --energy: {_menu(layout, named or beside)}"
-    )
-
-
-def _named_column(name: str, layout: Layout, wanted: str) -> int:
-    """Find a column by its name, or by its 1-based number."""
-    spellings: tuple[Callable[[str], str], ...] = (
-        str.strip,
-        lambda text: text.strip().casefold(),
-        normalised,
-    )
-    found = next(
-        (same for key in spellings if (same := [i for i, own in enumerate(layout.names) if key(own) == key(wanted)])),
-        [],
-    )
-    if wanted.isdecimal() and 0 < int(wanted) <= layout.columns:
-        found = [*({*found} | {int(wanted) - 1})]
-    if not found:
-        raise FormatError(
-            f"{name}: no column {wanted!r}{near_miss(wanted, layout.names)}; "
-            f"there are: {_menu(layout, range(layout.columns))}"
-        )
-    if len(found) > 1:
-        raise FormatError(
-            f"{name}: {wanted!r} may be any of these columns: {_menu(layout, found)}; choose by another name or number"
-        )
-    if found[0] >= layout.trusted:
-        raise FormatError(
-            f"{name}: the header has {len(layout.names)} names for {layout.columns} values (th_to_csv writes "
-            f"such files), so the name of column {found[0] + 1} is not sure; "
-            f"only these may be used: {_menu(layout, range(2))}"
-        )
-    return found[0]
-
-
-def _menu(layout: Layout, columns: Sequence[int]) -> str:
-    return listing([f"{column + 1} {layout.name(column)!r}" for column in columns])
 
 
 def _is_whole(line: str, rows: Sequence[str], layout: Layout, used: Sequence[int]) -> bool:
@@ -301,9 +221,12 @@ def _fast_values(rows: Sequence[str], layout: Layout) -> Samples | None:
 
 
 def _checked_values(name: str, rows: Sequence[str], layout: Layout, used: Sequence[int]) -> Samples:
-    """Values line by line, with comments and blank lines between, or the line that is wrong."""
+    """Values line by line, with comments and blank lines between, or the line that is wrong.
+
+    Where all cells are empty the curve has ended: another one beside it goes on.
+    """
     values: list[list[float]] = []
-    gap = False
+    gap = ended = False
     for number, row in enumerate(rows, layout.start + 1):
         if is_skipped(row):
             gap = True
@@ -316,11 +239,14 @@ def _checked_values(name: str, rows: Sequence[str], layout: Layout, used: Sequen
                 f"{name}:{number}: {len(cells)} values, {layout.columns} were expected as in the other rows; "
                 "repair the line"
             )
+        if not any(cells[column] for column in used) and values:
+            ended = True
+            continue
         state = [_value(f"{name}:{number}", layout, column, cells[column]) for column in used]
-        if gap and values and state[0] <= values[-1][0]:
+        if ended or (gap and values and state[0] <= values[-1][0]):
+            found = "a curve goes on behind empty cells" if ended else "the time starts again behind a gap"
             raise FormatError(
-                f"{name}:{number}: the time starts again behind a gap, one curve was expected; "
-                "put each curve into its own file"
+                f"{name}:{number}: {found}, one curve was expected; repair it or put each curve into its own file"
             )
         gap = False
         values.append(state)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Protocol
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.history import Precision, newest_states
-from d2rpick.readers.names import resolve
+from d2rpick.readers.names import listing, resolve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.history import Part, Samples
+
+# A restart steps back once; times that do so in more than this share of their states are none.
+_MOST_BACK: Final = 0.1
 
 
 class Database(Protocol):
@@ -87,19 +91,27 @@ class Database(Protocol):
         """How finely the times and these channels were written; of no channels: those of the parts."""
 
 
+# An interval so many times the median one is no output interval.
+_LONG = 30.0
+
+
 class Legs:
     """Legs of one run as one `Database`: in the order of their start, and where they overlap the newer counts.
 
-    Also one leg alone needs this where a restart wrote states again or times are printed alike.
+    Also one leg alone needs this where a restart wrote states again or times are printed alike.  Legs without any
+    state count only where all are so.
     """
 
-    def __init__(self, legs: Sequence[Database]) -> None:
-        self._legs = sorted(legs, key=_start)
+    def __init__(self, legs: Sequence[Database], cut: Sequence[str] = ()) -> None:
+        self._cut = tuple(cut)  # files whose packed data ends early
+        several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
+        self._files = sorted(legs, key=_start) if several else [*legs]
+        self._legs = [leg for leg in self._files if not several or _start(leg) > -np.inf] or self._files
 
     @property
     def source(self) -> str:
         """Names of the files."""
-        return ", ".join(leg.source for leg in self._legs)
+        return ", ".join(leg.source for leg in self._files)
 
     @property
     def format(self) -> str:
@@ -129,31 +141,36 @@ class Legs:
     @property
     def complete(self) -> bool:
         """Whether all legs are."""
-        return all(leg.complete for leg in self._legs)
+        return all(leg.complete for leg in self._files) and not self._cut
 
-    @property
+    @cached_property
     def channels(self) -> tuple[str, ...]:
         """Columns that all legs have."""
         return tuple(n for n in self._legs[0].channels if all(n in leg.channels for leg in self._legs))
 
-    @property
+    @cached_property
     def parts(self) -> tuple[Part, ...]:
         """Parts that all legs have."""
-        return tuple(p for p in self._legs[0].parts if all(p.id in {q.id for q in leg.parts} for leg in self._legs))
+        return tuple(part for part in self._legs[0].parts if part.id not in self._passing)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and what was left out between them."""
-        own = [note for leg in self._legs for note in leg.notes]
-        sorts = [self._kept] if self.channels else []
-        sorts += [self._parts_kept] if self.parts else []
-        return tuple(dict.fromkeys([*own, *(note for _, notes in sorts for note in notes)]))
+        notes = [f"{name}: the packed data ends early; what it holds up to there was read" for name in self._cut]
+        notes += [note for leg in self._files for note in leg.notes]
+        if self._passing:
+            notes.append(f"{self.source}: only some legs have part {listing(self._passing)}, which was left out")
+        if self.channels:
+            notes += self._kept[1]
+        if self.parts:
+            notes += self._parts_kept[1]
+        return tuple(dict.fromkeys(notes))
 
     @property
-    def span(self) -> tuple[float, float]:
-        """First and last time [time]."""
-        time = self.time if self.channels else self.part_time
-        return float(time[0]), float(time[-1])
+    def span(self) -> tuple[float, float] | None:
+        """First and last time [time]; None where there are no states."""
+        times = [time for time in _times(self) if time.size]
+        return (float(times[0][0]), float(times[0][-1])) if times else None
 
     @cached_property
     def time(self) -> Samples:
@@ -183,6 +200,12 @@ class Legs:
         return min((t for t, _ in found), key=_digits), min((e for _, e in found), key=_digits)
 
     @cached_property
+    def _passing(self) -> tuple[int, ...]:
+        """Parts that only some legs have."""
+        legs = Counter(part.id for leg in self._legs for part in leg.parts)
+        return tuple(id_ for id_, count in legs.items() if count < len(self._legs))
+
+    @cached_property
     def _kept(self) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         return self._order([leg.time for leg in self._legs])
 
@@ -191,25 +214,47 @@ class Legs:
         return self._order([leg.part_time for leg in self._legs])
 
     def _order(self, times: Sequence[Samples]) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-        time = np.concatenate(times)
-        if not time.size:
-            raise FormatError(
-                f"{self.source}: no states, a history has at least one; look whether the run wrote output"
-            )
-        return newest_states(time)
+        """Which states count, and what to say of the others."""
+        for leg, time in zip(self._legs, times, strict=True):
+            back, steps = int(np.count_nonzero(np.diff(time) < 0)), time.size - 1
+            if back > 1 and back > _MOST_BACK * steps:
+                raise FormatError(
+                    f"{leg.source}: time steps back at {back} of {steps} states, increasing times were expected; "
+                    "check that this is the time (--time) and the file is not damaged"
+                )
+        keep, notes = newest_states(np.concatenate(times))
+        behind = np.cumsum([time.size for time in times])
+        unused = [
+            f"{leg.source} was not used: a newer leg begins at or before its first time"
+            for leg, here in zip(self._legs, np.split(keep, behind[:-1]), strict=True)
+            if here.size and not here.any()
+        ]
+        return keep, (*notes, *unused, *_holes(np.concatenate(times)[keep]))
 
     def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
         whole = columns[0] if len(columns) == 1 else np.concatenate(columns)
         return whole if keep.all() else whole[keep]
 
 
+def _times(database: Database) -> list[Samples]:
+    """Times of the whole model and of the parts, as far as there are any."""
+    return [*([database.time] if database.channels else []), *([database.part_time] if database.parts else [])]
+
+
 def _start(leg: Database) -> float:
-    times = leg.time if leg.channels else leg.part_time
-    return float(times[0]) if times.size else -np.inf
+    """First time of a leg; before all others where it has no states."""
+    return min((float(time[0]) for time in _times(leg) if time.size), default=-np.inf)
 
 
 def _digits(precision: Precision) -> int:
     return precision.digits if precision.decimals is None else precision.decimals
+
+
+def _holes(time: Samples) -> tuple[str, ...]:
+    """Say where output stops for long, as it does where a leg is missing."""
+    steps = np.diff(time)
+    holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2]) if steps.size > 2 else ()
+    return tuple(f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a leg missing?" for i in holes[:3])
 
 
 # Significant digits by bytes per number: 24 bits hold 7 digits; 17 digits restore every double.

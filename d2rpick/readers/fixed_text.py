@@ -11,7 +11,7 @@ from __future__ import annotations
 from array import array
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from d2rpick.errors import FormatError
 from d2rpick.readers.fortran import decode
 
 if TYPE_CHECKING:
+    import re
     from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 
     from d2rpick.history import Samples
@@ -28,11 +29,13 @@ if TYPE_CHECKING:
 Bytes = NDArray[np.uint8]
 Addresses = NDArray[np.int64]
 
-TWICE: Final = -1  # in place of an offset: the field stands twice in the block, so neither is sure
+UNSURE: Final = -1  # in place of an offset: the field is cut, or stands in the block twice
 
 _CHUNK: Final = 1 << 20  # bytes compared at a time: they stay in the cache between the two passes
+_FOLD: Final = 16  # blocks side by side compared as one row: saves half the time
 _BATCH: Final = 1 << 14  # numbers converted at a time, for the same reason
 _RECENT: Final = 4  # layouts tried before a block is taken apart
+_LINE: Final = 1 << 10  # no first line of a block is longer
 _NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
 
 
@@ -40,13 +43,14 @@ _NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
 class Layout:
     """Where in a block what stands.
 
-    ``fields`` maps the name of a number to its offset in the block, or to TWICE.  ``literal`` is 255 for the
-    bytes that all blocks of this layout share and 0 for the others; its shape is that of the block.
+    ``fields`` maps the name of a number to its offset in the block, or to UNSURE.  ``literal`` is 255 for the
+    bytes that all blocks of this layout share, line ends among them, and 0 for the others; its shape is that
+    of the block.  No line of a block can be hidden between literal bytes.
     ``last`` names the number the block ends with.  ``broken_off`` is True when the head of another run
     follows in place of the next block.
     """
 
-    fields: Mapping[Hashable, int]
+    fields: Mapping[Any, int]
     literal: Bytes
     last: Hashable
     broken_off: bool
@@ -58,8 +62,8 @@ class Grammar:
 
     ``start`` is the text a block's first line begins with, ``describe`` takes a block apart, ``whole`` tells
     whether a block that stands alone in its file is known to be whole.  The numbers have ``width`` columns
-    and ``decimals`` places.  ``compare_all`` compares every block in full when the file is opened; otherwise
-    only its first line, and the rest when it is read.
+    and ``decimals`` places.  ``compare_all`` compares every block in full when the file is opened; otherwise,
+    where all blocks have one size, only their first lines, and the rest when it is read.
     """
 
     start: bytes
@@ -102,7 +106,9 @@ class Blocks:
     notes : tuple of str
         What was left out.
     tail : int
-        Address at which the last block of the file starts, whole or not; that of its end when it has none.
+        Address at which the last block of the file starts, whole or not; ``begin`` when there is none.
+    rest : Run or None
+        The last block, when the file stops inside it: it is no state unless ``admit_rest`` makes it one.
     """
 
     def __init__(self, data: Content, source: str, begin: int, grammar: Grammar) -> None:
@@ -116,7 +122,13 @@ class Blocks:
         self._runs = array("q")
         self.layout = lru_cache(maxsize=16)(self._describe)
         self._compared = grammar.compare_all
+        self.states, self.complete = 0, True
+        self.notes: tuple[str, ...] = ()
+        self.rest: Run | None = None
         self._walk()
+        if not self._compared and not self._is_even():
+            self._compared = True
+            self._walk()
 
     def __iter__(self) -> Iterator[Run]:
         return (Run(*self._runs[at : at + 4]) for at in range(0, len(self._runs), 4))
@@ -147,6 +159,18 @@ class Blocks:
         self._fetch(values.reshape(-1), names)
         return values
 
+    def admit_rest(self, names: Sequence[Hashable]) -> None:
+        """Let the last state count although the file stops inside it, if these numbers and a line behind are there."""
+        if self.rest is None:
+            return
+        offsets = [self.layout(self.rest.example, self.rest.stride).fields.get(name, UNSURE) for name in names]
+        end_of_line = self._data.find(b"\n", self.rest.start + max(offsets))
+        if UNSURE in offsets or end_of_line == len(self._data) - 1:
+            return
+        self._runs.extend(self.rest)
+        self.states += 1
+        self.notes = (*self.notes[:-1], "the file stops inside its last state, behind the lines that were needed")
+
     def line(self, address: int) -> int:
         """Find the number of the line at ``address``, from 1."""
         return 1 + sum(self._data[at : min(at + _CHUNK, address)].count(b"\n") for at in range(0, address, _CHUNK))
@@ -172,17 +196,16 @@ class Blocks:
                 address, name = int(where[bad]), names[(at + bad) % len(names)]
                 text = self.text(address, grammar.width).decode("latin-1").strip()
                 raise FormatError(
-                    f"{self.source}:{self.line(address)}: {_spoken(name)} is {text!r}, a number in its columns "
-                    "was expected; cut the file before this state"
+                    f"{self.source}:{self.line(address)}: {_spoken(name)} is {text!r}, a number in its "
+                    "columns was expected; cut the file before this state"
                 )
 
     def _offsets(self, run: Run, layout: Layout, names: Sequence[Hashable]) -> Addresses:
         for name in names:
-            if layout.fields.get(name, TWICE) == TWICE:
-                found = "twice" if name in layout.fields else "never"
+            if layout.fields.get(name, UNSURE) == UNSURE:
                 raise FormatError(
-                    f"{self.source}:{self.line(run.start)}: the state that begins here has {found} a whole "
-                    f"{_spoken(name)}, each state should have one; leave it out or cut the file"
+                    f"{self.source}:{self.line(run.start)}: {_spoken(name)} is missing, cut or doubled in "
+                    "the state that begins here, each state should have it once; leave it out or cut the file"
                 )
         return np.array([layout.fields[name] for name in names], dtype=np.int64)
 
@@ -191,9 +214,9 @@ class Blocks:
     def _walk(self) -> None:
         """Find all runs of blocks, leaving out blocks that are not whole."""
         self._runs = array("q")
-        self.notes: tuple[str, ...] = ()
+        self.notes = ()
         self.complete = not self._data[self._end : self._end + 4096].strip()
-        self.states, self.tail = 0, self._end
+        self.states, self.tail, self.rest = 0, self._begin, None
         recent: list[tuple[int, int]] = []
         previous: Layout | None = None
         position = self._find(self._begin)
@@ -204,7 +227,7 @@ class Blocks:
             following = position + count * stride
             is_last = following >= self._end
             if (layout.broken_off or is_last) and not self._is_whole(layout, previous):
-                self._leave_out(position, is_last)
+                self._leave_out(Run(position, stride, 1, example), is_last)
             else:
                 self._runs.extend((position, stride, count, example))
                 self.states += count
@@ -216,10 +239,11 @@ class Blocks:
     def _is_whole(self, layout: Layout, previous: Layout | None) -> bool:
         return self._grammar.whole(layout) if previous is None else previous.last in layout.fields
 
-    def _leave_out(self, position: int, is_last: bool) -> None:
-        self.complete &= not is_last
+    def _leave_out(self, block: Run, is_last: bool) -> None:
+        if is_last:
+            self.complete, self.rest = False, block
         where = "the file" if is_last else "a leg of the run"
-        self.notes += (f"{where} stops inside the state of line {self.line(position)}, which was left out",)
+        self.notes += (f"{where} stops inside the state of line {self.line(block.start)}, which was left out",)
 
     def _known(self, position: int, recent: list[tuple[int, int]]) -> tuple[int, int, int] | None:
         """Try the recent layouts: example, stride and count of the blocks that follow one of them."""
@@ -243,13 +267,15 @@ class Blocks:
 
     def _count(self, position: int, example: int, stride: int) -> int:
         """Count the blocks from ``position`` on that look like the example and have another behind them."""
-        literal = self.layout(example, stride).literal
-        if not self._compared:
-            literal = literal[: len(self._grammar.start)]
+        literal, start = self.layout(example, stride).literal, self._grammar.start
         run = Run(position, stride, (self._end - position) // stride, example)
-        count = self._like_example(run, 0, literal)
-        behind = position + count * stride
-        return count if self.text(behind, len(self._grammar.start)) == self._grammar.start else max(0, count - 1)
+        if self._compared:
+            count = self._like_example(run, 0, literal)
+        else:
+            first_line = self.text(example, _LINE).find(b"\n") + 1
+            count = self._like_example(run, 0, literal[:first_line])
+            count = self._like_example(run._replace(repeats=count), stride - 1, literal[-1:])
+        return count if self.text(position + count * stride, len(start)) == start else max(0, count - 1)
 
     def _like_example(self, run: Run, offset: int, literal: Bytes) -> int:
         """Count the blocks of ``run`` that have, from ``offset`` on, the literal bytes of its example."""
@@ -260,12 +286,13 @@ class Blocks:
             step = min(step, run.repeats - done)
             first = run.start + done * run.stride + offset
             rows: Bytes = np.ndarray((step, size), np.uint8, self._data, first, (run.stride, 1))
-            # A column is constant where its AND and its OR agree: two passes, nothing stored.
-            for together in (np.bitwise_and, np.bitwise_or):
-                if np.any(together.reduce(rows, axis=0) & literal != template):
-                    return done + int(np.argmax(np.any(rows & literal != template, axis=1)))
+            if step < _FOLD or not _all_like(template, literal, rows):
+                differs = (rows & literal != template).any(axis=1)
+                if differs.any():
+                    return done + int(differs.argmax())
             done += step
-            step = max(1, min(2 * step, _CHUNK // size))
+            if 2 * step * size <= _CHUNK:
+                step *= 2
         return done
 
     def _alike(self, run: Run, layout: Layout, offsets: Addresses, anchors: Sequence[Hashable]) -> bool:
@@ -274,13 +301,27 @@ class Blocks:
             return True
         first = np.array([layout.fields[anchor] for anchor in anchors])
         order = np.argsort(first)
-        first, last = first[order], np.maximum.accumulate(offsets[order])
+        behind = offsets[order] + self._grammar.width + 1  # what follows a number is compared, too
+        first, last = first[order], np.maximum.accumulate(behind)
         gaps = np.flatnonzero(first[1:] - last[:-1] > _NEAR) + 1
         for piece_first, piece_last in zip(np.split(first, gaps), np.split(last, gaps), strict=True):
             low, high = int(piece_first[0]), int(piece_last[-1])
             if self._like_example(run, low, layout.literal[low:high]) < run.repeats:
                 return False
         return True
+
+    def _is_even(self) -> bool:
+        """Tell whether all blocks but the last have one size, and look alike at both ends of the file."""
+        runs = list(self)
+        if not runs:
+            return True
+        first = runs[0]
+        literal = self.layout(first.example, first.stride).literal
+        last = first.repeats - 1
+        return [run.start for run in runs[1:]] in ([], [self.tail]) and all(
+            self._like_example(first._replace(start=first.start + block * first.stride, repeats=1), 0, literal)
+            for block in (min(1, last), last)
+        )
 
     def _compare_in_full(self) -> None:
         states = self.states
@@ -310,6 +351,30 @@ class Blocks:
             if found >= 0:
                 return first + found + 1
         return 0
+
+
+def _all_like(template: Bytes, literal: Bytes, rows: Bytes) -> bool:
+    """Tell whether the literal bytes of all rows are those of the template, without storing anything.
+
+    A column is constant where its AND and its OR agree.
+    """
+    count, size = rows.shape
+    if count % _FOLD == 0 and rows.flags.c_contiguous:
+        rows = rows.reshape(count // _FOLD, _FOLD * size)
+    for together in (np.bitwise_and, np.bitwise_or):
+        constant = together.reduce(rows, axis=0).reshape(-1, size)
+        if np.any(constant & literal != template):
+            return False
+    return True
+
+
+def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: int, behind: int) -> None:
+    """Let what ``changing`` matches in a piece of a block differ from block to block.
+
+    It must match short pieces only, lest a whole line hide in one.
+    """
+    for piece in changing.finditer(block, first, behind):
+        literal[piece.start() : piece.end()] = 0
 
 
 def _spoken(name: Hashable) -> str:

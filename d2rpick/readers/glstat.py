@@ -8,13 +8,14 @@ line; the line before it, on what controls the time step, has too many forms to 
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING, Final, NoReturn
 
 import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.readers.database import SolverFile
-from d2rpick.readers.fixed_text import TWICE, Blocks, Grammar, Layout, head
+from d2rpick.readers.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
@@ -23,10 +24,17 @@ if TYPE_CHECKING:
     from d2rpick.readers.selection import Selection
     from d2rpick.readers.source import Content, Source
 
+_TIME: Final = "time"
+_ENERGY: Final = "internal energy"
 _START: Final = b" time".ljust(32, b".")
+_WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
 _LAST: Final = "time per zone cycle.(nanosec)"  # in every glstat seen; mass scaling may add lines behind it
-_LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]{14})([ \t][^\r\n]*)?\r?$", re.MULTILINE)
+_LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTILINE)
+_VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")  # there is a line for each wall
+
+# In lines other than these: numbers, and what controls the time step.
+_CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*|(?<= is controlled by )[^\r\n]{1,40}")
 
 
 def recognises(data: bytes) -> bool:
@@ -38,25 +46,29 @@ def recognises(data: bytes) -> bool:
     return bool(version) and (not states or states.startswith(_CONTROL.strip()))
 
 
-def open_legs(sources: Sequence[Source], _: Selection) -> list[Glstat]:
-    """Open each file as a leg of the run."""
-    return [Glstat(source.data, source.name) for source in sources]
+def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
+    """Open each file as a leg of the run; the selection tells what its last state must have to count."""
+    return [Glstat(source.data, source.name, selection.energy or (_ENERGY,)) for source in sources]
 
 
 class Glstat(SolverFile):
     """One glstat file; a ``Database`` without parts.
 
-    FormatError if it has neither a head nor a state, or a time that is no number.
+    A last state in which the file stops counts if it has the lines that are ``needed``.  FormatError if there is
+    neither a head nor a state, or a time that is no number.
     """
 
     format: Final = "glstat"
     parts: tuple[Part, ...] = ()
     digits = 6
 
-    def __init__(self, data: Content, source: str) -> None:
+    def __init__(self, data: Content, source: str, needed: Sequence[str] = ()) -> None:
         self.source = source
         self.title, self.version, begin = head(data)
         self._blocks = Blocks(data, source, begin, _GRAMMAR)
+        self.channels = self._names()
+        with suppress(FormatError):  # that there is no such line is said when it is read
+            self._blocks.admit_rest([_TIME, *(self.find(name) for name in needed or self.channels)])
         if not self.version and not self._blocks.states:
             raise FormatError(
                 f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is no glstat; "
@@ -68,8 +80,7 @@ class Glstat(SolverFile):
             self.notes += ("the file stops before the time of its next state",)
         if not self.version:
             self.notes += ("the file has no head; what stands before its first time line was left out",)
-        self.channels = self._names()
-        self.time = self._blocks.numbers(["time"])[:, 0]
+        self.time = self._blocks.numbers([_TIME])[:, 0]
 
     @property
     def part_time(self) -> Samples:
@@ -89,22 +100,30 @@ class Glstat(SolverFile):
 
     def _names(self) -> tuple[str, ...]:
         layouts = {(run.example, run.stride) for run in self._blocks}
+        if not layouts and self._blocks.rest:
+            layouts = {(self._blocks.rest.example, self._blocks.rest.stride)}
         names = {str(name): None for layout in sorted(layouts) for name in self._blocks.layout(*layout).fields}
-        return tuple(name for name in names if name != "time")
+        return tuple(name for name in names if name != _TIME)
 
 
 def _describe(block: bytes) -> Layout:
-    literal = np.where(np.frombuffer(block, np.uint8) == ord("\n"), np.uint8(255), np.uint8(0))
+    literal = np.full(len(block), 255, np.uint8)
+    behind = 0
     fields: dict[Hashable, int] = {}
     name = ""
     for line in _LINE.finditer(block):
-        label, _, remark = line.groups()
-        name = label.rstrip(b".").rstrip().decode("latin-1")
-        if remark and remark.strip():  # "wall# 1": there is a line for each wall
-            name += " " + " ".join(remark.decode("latin-1").split())
-        literal[line.start() : line.end()] = 255
-        literal[line.start(2) : line.end(2)] = 0
-        fields[name] = TWICE if name in fields else line.start(2)
+        name = line[1].rstrip(b".").rstrip().decode("latin-1")
+        release(literal, block, _CHANGING, behind, line.start())
+        behind = line.end()
+        value = _VALUE.match(line[2])
+        if value is None:
+            fields[name] = UNSURE
+            continue
+        if value[1]:
+            name += " " + " ".join(value[1].decode().split())
+        literal[line.start(2) : line.start(2) + _WIDTH] = 0
+        fields[name] = UNSURE if name in fields else line.start(2)
+    release(literal, block, _CHANGING, behind, len(block))
     return Layout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
 
 
@@ -112,4 +131,4 @@ def _is_whole(layout: Layout) -> bool:
     return _LAST in layout.fields
 
 
-_GRAMMAR: Final = Grammar(_START, _describe, _is_whole, width=14, decimals=5, compare_all=True)
+_GRAMMAR: Final = Grammar(_START, _describe, _is_whole, _WIDTH, decimals=5, compare_all=True)

@@ -122,8 +122,6 @@ def find_layout(source: str, lines: Sequence[str], unended: str) -> Layout:
     FormatError
         If the lines are no table, or one whose columns cannot be told for sure.
     """
-    if lines and lines[0].startswith("Curveplot"):
-        raise FormatError(f"{source}: an LS-PrePost Curveplot is not read; export the curve as CSV")
     told = _SEP_LINE.fullmatch(lines[0].strip()) if lines else None
     first, separator = (1, told[1]) if told else (0, "")
     bare = _find_rows(lines, first, separator) or _find_rows([*lines, unended], first, separator)

@@ -17,10 +17,10 @@ import numpy as np
 from d2rpick.errors import FormatError
 from d2rpick.history import Part
 from d2rpick.readers.database import SolverFile
-from d2rpick.readers.fixed_text import TWICE, Blocks, Grammar, Layout, head
+from d2rpick.readers.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.history import Samples
     from d2rpick.readers.selection import Selection
@@ -37,20 +37,22 @@ QUANTITIES: Final[Mapping[str, str]] = {
 }
 
 _START: Final = b" time ="
-_TIME: Final = (None, "time")
+_TIME: Final[tuple[int | None, str]] = (None, "time")
 _MAT: Final = "mat.#"  # the line a part begins with
 _LUMPED: Final = 0  # "mat.#=    0" holds the kinetic energy of lumped masses
 _UNREADABLE: Final = -1  # in place of a part number that is damaged or has overflowed
 _WIDEST: Final = 99_999_999  # larger part numbers overflow their eight columns
 
 _LEGEND: Final = re.compile(rb"^\{BEGIN LEGEND\}[ \r]*\n(.*?)^\{END LEGEND\}", re.MULTILINE | re.DOTALL)
-_ENTRY: Final = re.compile(rb"^([ \d]{8}\d)(?: {5}([^\r\n]*))?\r?$", re.MULTILINE)
+_ENTRY: Final = re.compile(rb"^(?=[ \d]{9}(?: {5}|\r?$)) *(\d+)(?: {5}([^\r\n]*))?\r?$", re.MULTILINE)
+_LONGEST: Final = 1 << 24  # no legend has more bytes
 _LINE: Final = re.compile(
     rb"^(?: time =| mat\.#=([^\r\n]*)| [xyz]-(?:mom|rbv)=| +hgeng=| +\+mass=)[^\r\n]*\r?$", re.MULTILINE
 )
-_FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13})(?=[ \r\n]|\Z)")
+_FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
 # A part number has 5 or, from 100000 on, 8 columns; a longer one, where it is printed, pushes the line.
-_ID: Final = re.compile(rb"(?=[ \d]{5} {13}i|[ \d]{8} {10}i|\d{9,} {10}i) *(\d+) +inten=")
+_ID: Final = re.compile(rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,}) {10}i) *(0|[1-9]\d*) +inten=")
+_CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")  # numbers in other lines
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
 
@@ -149,20 +151,29 @@ class Matsum(SolverFile):
         return bool(self._legend) and all((id_, _MAT) in layout.fields for id_ in self._legend)
 
     def _describe(self, block: bytes) -> Layout:
-        literal = np.where(np.frombuffer(block, np.uint8) == ord("\n"), np.uint8(255), np.uint8(0))
-        fields: dict[Hashable, int] = {}
+        literal = np.full(len(block), 255, np.uint8)
+        behind = 0
+        fields: dict[tuple[int | None, str], int] = {}
         part: int | None = None
-        name: Hashable = None
+        doubled = False
+        name = _TIME
         for line in _LINE.finditer(block):
+            release(literal, block, _CHANGING, behind, line.start())
             first, behind = line.span()
-            literal[first:behind] = 255
             if line[1] is not None:
                 part = self._part_number(line[1], block)
-                fields[part, _MAT] = TWICE if (part, _MAT) in fields else first
+                doubled = (part, _MAT) in fields
+                if doubled:  # two groups of lines: neither is sure
+                    fields.update({field: UNSURE for field in fields if field[0] == part})
+                fields[part, _MAT] = UNSURE if doubled else first - 1  # with the line end before it
             for field in _FIELD.finditer(block, first, behind):
                 name = (part, field[1].decode())
-                literal[field.start(2) : field.end(2)] = 0
-                fields[name] = TWICE if name in fields else field.start(2)
+                if field[2] is None or doubled or name in fields:
+                    fields[name] = UNSURE
+                else:
+                    literal[field.start(2) : field.end(2)] = 0
+                    fields[name] = field.start(2)
+        release(literal, block, _CHANGING, behind, len(block))
         return Layout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
 
     def _part_number(self, text: bytes, block: bytes) -> int:
@@ -181,6 +192,7 @@ class Matsum(SolverFile):
 
 def _legend(data: Content) -> dict[int, str]:
     """Titles of the parts by number, in the order of the legend."""
-    match = _LEGEND.search(data)
+    first_state = data.find(b"\n" + _START, 0, _LONGEST)
+    match = _LEGEND.search(data, 0, first_state if first_state >= 0 else _LONGEST)
     entries = _ENTRY.findall(match[1]) if match else []
     return {int(id_): title.decode("latin-1").strip() for id_, title in entries}

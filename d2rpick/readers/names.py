@@ -99,6 +99,12 @@ def is_some_internal_energy(name: str) -> bool:
     return bool(_SOME_INTERNAL.search(name)) and not _OTHER.search(name)
 
 
+def internal_energies(names: Sequence[str]) -> list[int]:
+    """Places of the names that say internal energy without addition or, where there are none, that speak of one."""
+    plain = [place for place, name in enumerate(names) if is_internal_energy(name)]
+    return plain or [place for place, name in enumerate(names) if is_some_internal_energy(name)]
+
+
 def is_unit(cell: str) -> bool:
     """Whether a cell of a units row may read like this: ``ms``, ``[J]``, ``(-)``, nothing."""
     return cell.casefold() in _UNITS | {"", "-", "1"} or (bool(cell) and cell[0] + cell[-1] in ("()", "[]"))

@@ -26,8 +26,8 @@ def precisions(time: Sequence[str], energy: Sequence[str], moments: Samples) -> 
     One writer uses one format: the most significant digits seen in any field hold for both columns, since
     formats like ``%g`` drop trailing zeros; 15 or more mean that nothing was lost.  A column without
     exponents whose fields all have the same number of decimals is taken as written in fixed decimals.
-    Times on an exactly uniform grid are the multiples of a step that was meant, however few digits that
-    needs; they get the digits of the energy.
+    Times on an exactly uniform grid that show more decimals than the grid needs are the multiples of a step
+    that was meant, and get the digits of the energy; with no decimal to spare they may be rounded to the grid.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def precisions(time: Sequence[str], energy: Sequence[str], moments: Samples) -> 
         return EXACT, EXACT
     general = Precision(digits=max(digits, 1))
     time_decimals, energy_decimals = _fixed_decimals(time), _fixed_decimals(energy)
-    time_fixed = time_decimals and not _is_uniform(moments)
+    time_fixed = time_decimals and not _is_finer_than_its_grid(time_decimals, moments)
     return (
         Precision(digits=general.digits, decimals=time_decimals) if time_fixed else general,
         Precision(digits=general.digits, decimals=energy_decimals) if energy_decimals else general,
@@ -91,11 +91,13 @@ def _fixed_decimals(fields: Sequence[str]) -> int | None:
     return decimals.pop() or None if len(decimals) == 1 else None
 
 
-def _is_uniform(moments: Samples) -> bool:
+def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
+    """Whether times are equidistant and their step could be written with fewer decimals."""
     if moments.size < 3:
         return False
     steps = np.diff(moments)
-    return bool(np.ptp(steps) <= 1e-9 * abs(steps[0]))
+    coarser = float(steps[0]) * 10.0 ** (decimals - 1)
+    return bool(np.ptp(steps) <= 1e-9 * abs(steps[0])) and abs(coarser - round(coarser)) <= 1e-6 * abs(coarser)
 
 
 def _exponent_width(exponent: str | None) -> int:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.history import History
-from d2rpick.momentum import Momenta, Track
+from d2rpick.history import History, Momenta, Track
+from d2rpick.readers.companions import doubts
 from d2rpick.readers.names import listing, quantity_note
-from d2rpick.readers.selection import select_parts
+from d2rpick.readers.selection import menu, select_parts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,6 +42,12 @@ class Run:
         """Parts with histories of their own."""
         holder = self._with_parts()
         return holder.parts if holder else ()
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know about the files."""
+        own = (note for database in self.databases for note in database.notes)
+        return tuple(dict.fromkeys([*own, *doubts(self.databases)]))
 
     def history(self, selection: Selection, *, with_momenta: bool = False) -> History:
         """Take the selected energy: of parts, of named channels, or by default of the whole model.
@@ -98,14 +105,15 @@ class Run:
         return Track(holder.part_time, np.stack(places, axis=1)) if holder else None
 
     def _of_holder(self, quantity: str, parts: Sequence[Part]) -> Samples:
-        holder = self._with_parts()
-        if holder is None:
-            raise FormatError(f"{self.name}: no parts with histories of their own")
-        return holder.part_channel(quantity, [part.id for part in parts])
+        return self._holder().part_channel(quantity, [part.id for part in parts])
 
     def _energy(self, selection: Selection) -> History:
+        if all(database.span is None for database in self.databases):
+            raise FormatError(
+                f"{self.name}: no states, a history has at least one; did the run get to its first output?"
+            )
         if selection.parts:
-            return self._of_parts(select_parts(selection.parts, self.parts, self.name))
+            return self._of_parts(select_parts(selection.parts, self._holder().parts, self.name))
         if selection.energy:
             return self._of_channels(selection.energy)
         for database in self.databases:
@@ -113,17 +121,22 @@ class Run:
                 return self._of_channels((database.energy_channel,))
         return self._of_all_parts()
 
+    def _holder(self) -> Legs:
+        """The database that knows parts; FormatError with what there is instead of them."""
+        holder = self._with_parts()
+        if holder is None:
+            self.databases[0].part_channel("internal_energy", ())  # knows best why there are none
+            raise FormatError(f"{self.name}: no parts with histories of their own; let the run write them")
+        return holder
+
     def _with_parts(self) -> Legs | None:
         return next((database for database in self.databases if database.parts), None)
 
     def _of_parts(self, chosen: tuple[Part, ...]) -> History:
-        holder = self._with_parts()
-        assert holder is not None  # or there were no parts to choose from
+        holder = self._holder()
         energies = self.part_energies(chosen)
         idle = [part for part, energy in zip(chosen, energies.T, strict=True) if not energy.any()]
-        notes = tuple(
-            f"part {part.id} {part.title!r} never has internal energy: it is rigid or has no elements" for part in idle
-        )
+        notes = (f"never any internal energy: part {menu(idle)}; rigid, or without elements?",) if idle else ()
         channel = "internal energy of " + ", ".join(part.title or f"part {part.id}" for part in chosen)
         names = [part.title or f"part {part.id}" for part in chosen]
         history = self._made(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
@@ -139,6 +152,8 @@ class Run:
 
     def _of_channels(self, wanted: Sequence[str]) -> History:
         database, names = self._holding(wanted)
+        if len(set(names)) < len(names):
+            raise FormatError(f"{self.name}: an energy is asked for twice; name each once")
         columns = [database.channel(name) for name in names]
         channel = " + ".join(names)
         notes = quantity_note(channel)
@@ -148,13 +163,14 @@ class Run:
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
         """Find the database that has all these channels, under the names it gives them."""
         refusals = []
-        for database in self.databases:
-            if database.channels:
-                try:
-                    return database, tuple(database.find(name) for name in wanted)
-                except FormatError as error:
-                    refusals.append(error)
-        raise refusals[0] if refusals else FormatError(f"{self.name}: no channel {wanted[0]!r}; choose with --part")
+        for database in sorted(self.databases, key=lambda one: not one.channels):
+            try:
+                if not database.channels:
+                    database.channel(wanted[0])  # knows best why there are none
+                return database, tuple(database.find(name) for name in wanted)
+            except FormatError as error:
+                refusals.append(error)
+        raise refusals[0]
 
     def _made(
         self, database: Legs, time: Samples, energy: Samples, channel: str, names: Sequence[str],
@@ -172,7 +188,7 @@ class Run:
             energy_precision=energy_precision,
             time_unit=database.time_unit,
             complete=all(one.complete for one in self.databases),
-            notes=tuple(dict.fromkeys([*(note for one in self.databases for note in one.notes), *notes])),
+            notes=(*self.notes, *notes),
         )
 
 

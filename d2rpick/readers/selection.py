@@ -52,27 +52,38 @@ def select_parts(wanted: Sequence[str], known: Sequence[Part], where: str) -> tu
 
 
 def _meant(text: str, known: Sequence[Part], where: str) -> Iterator[Part]:
-    titled = [part for part in known if part.title.strip().casefold() == text.strip().casefold()]
-    if titled:  # a title may hold a comma
-        yield _only(titled, text, where)
+    whole = _titled(text, known)
+    if whole and "," in text:  # a title may hold a comma
+        yield _only(whole, text, where)
         return
     for piece in text.split(","):
         yield from _piece(piece.strip(), known, where)
 
 
 def _piece(piece: str, known: Sequence[Part], where: str) -> Sequence[Part]:
+    titled = _titled(piece, known)
     numbers = _RANGE.fullmatch(piece)
     if not numbers:
-        titled = [part for part in known if part.title.strip().casefold() == piece.casefold()]
         if not titled:
             near = near_miss(piece, [part.title for part in known])
             raise FormatError(f"{where}: no part {piece!r}{near}; there are: {menu(known)}")
         return [_only(titled, piece, where)]
     low, high = int(numbers[1]), int(numbers[2] or numbers[1])
     inside = [part for part in known if low <= part.id <= high]
+    if titled and titled != inside:
+        raise FormatError(
+            f"{where}: {piece!r} is the title of part {titled[0].id}, as a number it means {menu(inside) or 'none'}; "
+            "choose by a number or title that is one part's only"
+        )
     if not inside:
         raise FormatError(f"{where}: no part {piece}; there are: {menu(known)}")
     return inside
+
+
+def _titled(text: str, known: Sequence[Part]) -> list[Part]:
+    """Parts with this title; none of them has no title."""
+    wanted = text.strip().casefold()
+    return [part for part in known if wanted and part.title.strip().casefold() == wanted]
 
 
 def _only(titled: Sequence[Part], text: str, where: str) -> Part:

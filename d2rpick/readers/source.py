@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from d2rpick.errors import FormatError
+from d2rpick.readers.names import listing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +19,7 @@ STDIN = "-"
 Content = bytes | mmap.mmap
 
 # What solvers call their databases in the folder of a run.
-_DATABASE = re.compile(r"(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d(?:\.gz)?")
+_DATABASE = re.compile(r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?")
 
 # Standard input can be read only once; its bytes stay here for a later sha256("-").
 _stdin = b""
@@ -26,10 +27,14 @@ _stdin = b""
 
 @dataclass(frozen=True)
 class Source:
-    """The unpacked bytes of one file, mapped where it lies on a disk, under the name the user gave it."""
+    """The unpacked bytes of one file, mapped where it lies on a disk, under the name the user gave it.
+
+    ``cut`` is True when packed data ends early: ``data`` is what could be unpacked.
+    """
 
     name: str
     data: Content
+    cut: bool = False
 
 
 def expand(names: Sequence[str]) -> tuple[str, ...]:
@@ -54,11 +59,12 @@ def open_source(name: str) -> Source:
         If there is nothing to be read under this name.
     """
     data: Content = _read_stdin() if name == STDIN else _mapped(name)
+    cut = False
     if data[:2] == b"\x1f\x8b":
-        data = _unpacked(name, data)
+        data, cut = _unpacked(name, data)
     if not data:
         raise FormatError(f"{name}: the file is empty, an energy history was expected; was the run started?")
-    return Source(name, data)
+    return Source(name, data, cut)
 
 
 def sha256(name: str) -> str:
@@ -76,16 +82,20 @@ def sha256(name: str) -> str:
 
 def _files(name: str) -> Sequence[str]:
     path = Path(name)
-    if name == STDIN or path.is_file():
+    try:
+        is_file, is_folder = path.is_file(), path.is_dir()
+    except OSError:  # a name too long; what is wrong with it shows when it is opened
         return [name]
-    if path.is_dir():
+    if name == STDIN or is_file:
+        return [name]
+    if is_folder:
         return _databases(path)
     if any(sign in name for sign in "*?["):
         found = sorted(str(file) for file in Path(path.anchor).glob(name.removeprefix(path.anchor)) if file.is_file())
         if not found:
             raise FormatError(f"{name}: no file has such a name; check the folder")
         return found
-    return [name]  # what is wrong with it shows when it is opened
+    return [name]
 
 
 def _databases(folder: Path) -> list[str]:
@@ -93,10 +103,12 @@ def _databases(folder: Path) -> list[str]:
     found = {file: match["root"] for file, match in matches.items() if match}
     if not found:
         raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; name the file")
-    roots = sorted({root for root in found.values() if root is not None})
-    if len(roots) > 1:
-        runs = ", ".join(f"{root}T01" for root in roots[:5])
-        raise FormatError(f"{folder}: this folder holds several runs ({runs}), one was expected; name the files of one")
+    runs = sorted({"one of LS-DYNA" if root is None else f"{root}T01" for root in found.values()})
+    if len(runs) > 1:
+        raise FormatError(
+            f"{folder}: this folder holds several runs ({listing(runs, most=5)}), one was expected; "
+            "name the files of one"
+        )
     return [str(file) for file in found]
 
 
@@ -120,11 +132,18 @@ def _mapped(name: str) -> Content:
         raise FormatError(f"{name}: cannot be read ({reason}); check the name and the permissions") from None
 
 
-def _unpacked(name: str, data: Content) -> bytes:
-    import gzip
+def _unpacked(name: str, data: Content) -> tuple[bytes, bool]:
+    """Unpack what there is, of files that were packed one behind the other too; True when the last one ends early."""
     import zlib
 
-    try:
-        return gzip.decompress(data)
-    except (EOFError, OSError, zlib.error) as error:
-        raise FormatError(f"{name}: gzip data that cannot be unpacked ({error}); copy the file again") from None
+    found, rest = [], bytes(data)
+    while rest[:2] == b"\x1f\x8b":
+        unpacker = zlib.decompressobj(wbits=31)  # 31: the gzip format
+        try:
+            found.append(unpacker.decompress(rest))
+        except zlib.error as error:
+            raise FormatError(f"{name}: gzip data that cannot be unpacked ({error}); copy the file again") from None
+        if not unpacker.eof:
+            return b"".join(found), True
+        rest = unpacker.unused_data
+    return b"".join(found), False

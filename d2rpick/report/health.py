@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from d2rpick.health import Health
 
 
+HEAD = ("health", "this run", "practice", "verdict")
+
+
 class Measure(NamedTuple):
     """A measure for people: ``value`` None where the files lack it, and then ``good`` is None too."""
 

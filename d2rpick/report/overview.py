@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from d2rpick import __version__
 from d2rpick.health import cautions_of_health
 from d2rpick.report import tables
+from d2rpick.report.health import HEAD as HEALTH_HEAD
 from d2rpick.report.health import measures_of
 
 if TYPE_CHECKING:
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from d2rpick.overview import Overview
 
 SCHEMA = "d2rpick/info/1"
+_PARTS_HEAD = ("part", "title", "highest internal energy")
+# Keys of the JSON output with a single value.
+_PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "time_unit", "complete")
 
 
 def cautions(overview: Overview) -> tuple[Caution, ...]:
@@ -31,20 +35,34 @@ def as_table(overview: Overview) -> str:
     width = max(len(name) for name, _ in rows)
     lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in rows]
     if overview.parts:
-        parts = [[one.part.id, one.part.title, one.energy_max] for one in overview.parts]
-        lines += ["", tables.as_text(("part", "title", "highest internal energy"), parts)]
+        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview))]
+    if health := _health(overview):
+        lines += ["", tables.as_text(HEALTH_HEAD, health)]
     return "\n".join([*lines, *(f"note: {note}" for note in overview.notes)])
 
 
 def as_markdown(overview: Overview) -> str:
-    """The facts as a Markdown table of two columns."""
-    return tables.as_markdown(("what", "value"), _rows(overview))
+    """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
+    facts = tables.as_markdown(("what", "value"), _rows(overview))
+    parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
+    health = [tables.as_markdown(HEALTH_HEAD, _health(overview))] if _health(overview) else []
+    return "\n\n".join([facts, *parts, *health, *(f"* {note}" for note in overview.notes)])
 
 
 def as_csv(overview: Overview) -> str:
-    """One row of facts."""
-    rows = _rows(overview)
-    return tables.as_csv([name for name, _ in rows], [[value for _, value in rows]]).rstrip("\n")
+    """One row, a column for each key of the JSON output, what is a list there with semicolons."""
+    sampling = overview.sampling
+    row: dict[str, tables.Cell] = {
+        "source": "; ".join(overview.source),
+        **{name: getattr(overview, name) for name in _PLAIN},
+        **{f"sampling_{name}": getattr(sampling, name) if sampling else None for name in ("min", "median", "max")},
+        "channels": "; ".join(overview.channels),
+        "parts": "; ".join(f"{one.part.id} {one.part.title}".rstrip() for one in overview.parts),
+        "flights": "; ".join(map(_flight, overview.flights)),
+        "health": "; ".join(f"{what} {value}" for what, value, *_ in _health(overview)),
+        "notes": "; ".join(overview.notes),
+    }
+    return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
 
 
 def as_json(overview: Overview, command: Sequence[str]) -> str:
@@ -82,9 +100,19 @@ def _rows(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("channels", ", ".join(overview.channels) or None),
     ]
     rows += [("flight", _flight(flight)) for flight in overview.flights]
-    if overview.health:
-        rows += [(one.what, one.value) for one in measures_of(overview.health) if one.value]
     return rows
+
+
+def _health(overview: Overview) -> list[list[tables.Cell]]:
+    """Measures that the files hold, with what practice allows."""
+    if overview.health is None:
+        return []
+    verdicts = {True: "kept", False: "exceeded", None: None}
+    return [[one.what, one.value, one.limit, verdicts[one.good]] for one in measures_of(overview.health) if one.value]
+
+
+def _parts(overview: Overview) -> list[list[tables.Cell]]:
+    return [[one.part.id, one.part.title, one.energy_max] for one in overview.parts]
 
 
 def _flight(flight: FreeFlight) -> str:

@@ -20,7 +20,8 @@ HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolera
 
 def as_table(answer: Suggestion, limit: int) -> str:
     """Heading, the first ``limit`` candidates, the recommended and the better pair; the recommended row has a star."""
-    lines = [*heading(answer.situation), "", tables.as_text(HEAD, rows(answer, limit))]
+    table = tables.as_text(HEAD, rows(answer, limit)) if answer.candidates else "no candidates"
+    lines = [*heading(answer.situation), "", table]
     left = len(answer.candidates) - limit
     if left > 0:
         lines.append(f"... and {left} more (--limit)")

@@ -30,14 +30,15 @@ def as_table(answer: Verdict) -> str:
 
 def as_markdown(answer: Verdict) -> str:
     """The measures as a Markdown table of two columns, and the reasons below it."""
-    table = tables.as_markdown(("measure", "value"), list(_measures(answer).items()))
+    table = tables.as_markdown(("measure", "value"), list({**_measures(answer), **_of_switched(answer)}.items()))
     return "\n".join([table, *(f"\n* {reason}" for reason in answer.reasons)])
 
 
 def as_csv(answer: Verdict) -> str:
-    """One row, a column for each measure, and the reasons."""
+    """One row, a column for each measure, those of a switched run with ``switched_`` before them, and the reasons."""
     situation = answer.situation
     measures = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **_measures(answer)}
+    measures |= _of_switched(answer)
     measures["reasons"] = "; ".join(answer.reasons)
     return tables.as_csv(list(measures), [list(measures.values())]).rstrip("\n")
 
@@ -60,18 +61,26 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
 def _comparison(switched: Comparison) -> list[str]:
     """Lines that hold the switched run against the reference."""
     rows = [
-        ("energy at td", switched.energy_frozen, switched.energy_td),
+        ("energy locked in, at td", switched.energy_frozen, switched.energy_td),
         ("mean after td", switched.mean_after, switched.mean_after_reference),
         ("spread after td", switched.spread_after, switched.spread_after_reference),
     ]
-    after = f"after td, to {switched.end:.6g}"
+    error, displacement = switched.momentum_error, switched.displacement
+    off = "not in both runs" if error is None else f"{error:.2g} of its largest"
+    moved = "not in both runs" if displacement is None else f"{displacement:.3g}"
     return [
-        f"switched run  {', '.join(switched.source)}",
+        f"switched run  {', '.join(switched.source)}; after td means to {switched.end:.6g}",
         tables.as_text(("", "switched", "reference"), rows),
-        f"largest error of momentum {after}: {tables.short(switched.momentum_error)} of the largest momentum",
-        f"largest displacement of the centre {after}: {tables.short(switched.displacement)}",
-        *switched.notes,
+        f"largest error of the momentum after td  {off}",
+        f"largest displacement after td           {moved}",
+        *(f"note: {note}" for note in switched.notes),
     ]
+
+
+def _of_switched(answer: Verdict) -> dict[str, Any]:
+    """Measures of the switched run under names of their own; empty where there is none."""
+    found = asdict(answer.switched) if answer.switched else {}
+    return {f"switched_{name}": value for name, value in found.items() if name not in ("source", "notes")}
 
 
 def _measures(answer: Verdict) -> dict[str, Any]:

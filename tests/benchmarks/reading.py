@@ -1,0 +1,191 @@
+"""How fast and in how much memory big databases are read, against plain loops and against lasso-python.
+
+The files are made in a temporary folder, read once by both to compare the results, and lie in the page cache.
+lasso-python is looked for in this interpreter, or in the one that D2RPICK_LASSO_PYTHON names.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.readers import Selection, open_run
+from tests.made_binout import GLSTAT, LsdaWriter, values
+from tests.text_files import glstat_text, matsum_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from d2rpick.history import History, Samples
+
+LASSO = Path(os.environ.get("D2RPICK_LASSO_PYTHON", sys.executable))
+_STATES = 100_000
+_PARTS, _PART_STATES = 500, 2000
+_ROUNDS = 7
+_ROOM = 64  # MB that reading may take beside twice the answer
+_folder = TemporaryDirectory()
+
+Numbers = tuple[list[float], list[float]]
+
+
+def glstat_to_loop() -> float:
+    """A loop over the lines of glstat, 1e5 states, over reading time and internal energy."""
+    file = _glstat()
+    _agree(_read(file), _glstat_loop(file))
+    return _ratio(lambda: _glstat_loop(file), lambda: _read(file))
+
+
+def glstat_to_bare_read() -> float:
+    """Reading time and internal energy of the same glstat over reading its bytes."""
+    file = _glstat()
+    return _ratio(lambda: _read(file), lambda: _bare_read(file))
+
+
+def matsum_to_loop(part: int | None) -> float:
+    """A loop over the lines of matsum, 500 parts and 2000 states, over reading all parts or one."""
+    file = _matsum()
+    start = b" mat.#=" if part is None else b" mat.#=%5d " % part
+
+    def read() -> tuple[Samples, Samples]:
+        run = open_run([str(file)])
+        chosen = [one for one in run.parts if part in (None, one.id)]
+        return run.databases[0].part_time, run.part_energies(chosen)
+
+    _agree(read(), _matsum_loop(file, start))
+    return _ratio(lambda: _matsum_loop(file, start), read)
+
+
+def lasso_to_binout() -> float | None:
+    """lasso-python over reading time and internal energy of a binout of 1e5 states; None where it is not installed."""
+    file = _binout()
+    code = (
+        "import sys, time; from lasso.dyna import Binout; times = []\n"
+        "for _ in range(3):\n"
+        "    start = time.perf_counter(); run = Binout(sys.argv[1])\n"
+        "    numbers = run.read('glstat', 'time'), run.read('glstat', 'internal_energy')\n"
+        "    times.append(time.perf_counter() - start)\n"
+        "print(sorted(times)[1], *(float(column.sum()) for column in numbers))"
+    )
+    found = subprocess.run([LASSO, "-c", code, str(file)], capture_output=True, text=True, check=False)
+    if "ModuleNotFoundError" in found.stderr:
+        return None
+    seconds, *sums = map(float, found.stdout.split())
+    history = _read(file)
+    np.testing.assert_allclose([history.time.sum(), history.energy.sum()], sums, rtol=1e-4)  # lasso adds in singles
+    return seconds / median(_seconds(lambda: _read(file)) for _ in range(_ROUNDS))
+
+
+def memory_over_limit(kind: str) -> float:
+    """Anonymous memory of a process at its peak while it reads, over twice the answer plus 64 MB."""
+    file = {"glstat": _glstat, "matsum": _matsum, "binout": _binout}[kind]()
+    code = (
+        "import sys; from pathlib import Path; from d2rpick.readers import Selection, open_run\n"
+        "def anonymous():\n"
+        "    status = Path('/proc/self/status').read_text().split('RssAnon:')[1]\n"
+        "    return int(status.split()[0]) / 1024\n"
+        "import threading, time\n"
+        "import d2rpick.readers.binout, d2rpick.readers.glstat, d2rpick.readers.matsum\n"
+        "before, peak, done = anonymous(), 0.0, False\n"
+        "def watch():\n"
+        "    global peak\n"
+        "    while not done:\n"
+        "        peak = max(peak, anonymous()); time.sleep(0.0005)\n"
+        "watcher = threading.Thread(target=watch); watcher.start()\n"
+        "run = open_run([sys.argv[1]])\n"
+        "answer = run.part_energies(run.parts) if run.parts else run.history(Selection()).energy\n"
+        "peak = max(peak, anonymous()); done = True; watcher.join()\n"
+        "print(peak - before, 2 * answer.nbytes / 2**20)"
+    )
+    found = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=True)
+    taken, twice = map(float, found.stdout.split())
+    return taken / (twice + _ROOM)
+
+
+def _read(file: Path) -> History:
+    return open_run([str(file)]).history(Selection())
+
+
+def _glstat_loop(file: Path) -> Numbers:
+    times, energies = [], []
+    with file.open("rb") as lines:
+        for line in lines:
+            if line.startswith(b" time..."):
+                times.append(float(line[32:46]))
+            elif line.startswith(b" internal energy..."):
+                energies.append(float(line[32:46]))
+    return times, energies
+
+
+def _matsum_loop(file: Path, start: bytes) -> Numbers:
+    times, energies = [], []
+    with file.open("rb") as lines:
+        for line in lines:
+            if line.startswith(start):
+                energies.append(float(line[31:44]))
+            elif line.startswith(b" time ="):
+                times.append(float(line[7:20]))
+    return times, energies
+
+
+def _bare_read(file: Path) -> None:
+    buffer = bytearray(1 << 20)
+    with file.open("rb", buffering=0) as content:
+        while content.readinto(buffer):
+            pass
+
+
+def _agree(ours: History | tuple[Samples, Samples], loop: Numbers) -> None:
+    time, energy = ours if isinstance(ours, tuple) else (ours.time, ours.energy)
+    assert time.tolist() == loop[0]
+    assert energy.ravel().tolist() == loop[1]
+
+
+def _ratio(one: Callable[[], object], other: Callable[[], object]) -> float:
+    times = [(_seconds(one), _seconds(other)) for _ in range(_ROUNDS)]
+    return median(first for first, _ in times) / median(second for _, second in times)
+
+
+def _seconds(call: Callable[[], object]) -> float:
+    start = perf_counter()
+    call()
+    return perf_counter() - start
+
+
+def _made(name: str, content: bytes | bytearray) -> Path:
+    file = Path(_folder.name, name)
+    file.write_bytes(content)
+    return file
+
+
+@cache
+def _glstat() -> Path:
+    energy = np.random.default_rng(1).normal(size=_STATES)
+    return _made("glstat", glstat_text(np.linspace(0, 9, _STATES), energy))
+
+
+@cache
+def _matsum() -> Path:
+    ids: Sequence[int] = [10 * part + 1 for part in range(_PARTS)]
+    energies = np.random.default_rng(2).normal(size=(_PART_STATES, _PARTS))
+    return _made("matsum", matsum_text(np.linspace(0, 1, _PART_STATES), ids, energies))
+
+
+@cache
+def _binout() -> Path:
+    made = LsdaWriter()
+    for state in range(1, _STATES + 1):
+        made.cd(f"/glstat/d{state:06d}")
+        made.put("cycle", [state], "i4")
+        for name in GLSTAT:
+            made.put(name, [values(name, state)], "f4")
+        made.table()
+    return _made("binout", made.data)

@@ -1,0 +1,34 @@
+"""Contents of files as a run, past the names and folders that a user would give."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from d2rpick.readers import Run, Selection
+from d2rpick.readers.database import Legs
+from d2rpick.readers.source import Source
+
+if TYPE_CHECKING:
+    from d2rpick.history import History
+    from d2rpick.readers import Reader
+
+
+def run_of(reader: Reader, *contents: bytes | str, selection: Selection | None = None, name: str = "run") -> Run:
+    """Open contents as the legs of one run in one format; texts are latin-1."""
+    data = [content.encode("latin-1") if isinstance(content, str) else content for content in contents]
+    names = [name] if len(data) == 1 else [f"{name}{number}" for number in range(1, len(data) + 1)]
+    legs = reader.open_legs([Source(*file) for file in zip(names, data, strict=True)], selection or Selection())
+    return Run(tuple(names), (Legs(legs),))
+
+
+def history_of(
+    reader: Reader, *contents: bytes | str, selection: Selection | None = None, name: str = "run"
+) -> History:
+    """Read the history that is selected, by default the internal energy."""
+    selection = selection or Selection()
+    return run_of(reader, *contents, selection=selection, name=name).history(selection)
+
+
+def states_of(history: History) -> list[tuple[float, float]]:
+    """Time and energy of each state."""
+    return list(zip(history.time.tolist(), history.energy.tolist(), strict=True))

@@ -1,0 +1,187 @@
+"""Histories that are written and read back: extract as csv and hdf5, replay as matsum and hdf5."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from d2rpick.errors import FormatError
+from d2rpick.readers import Selection, open_run, read_history
+from d2rpick.writers import format_of, table_csv, table_hdf5
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.shared import shared
+
+if TYPE_CHECKING:
+    from d2rpick.history import History
+
+REPLAY = ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4")
+SUFFIXES = ["csv", "h5", "hdf5"]
+# all but the sign of zeros, which sums lose
+NUMBERS = st.floats(-1e300, 1e300, allow_nan=False)
+
+
+def same(one: History, other: History) -> bool:
+    """Whether two histories hold the same numbers, bit for bit."""
+    return one.time.tobytes() == other.time.tobytes() and one.energy.tobytes() == other.energy.tobytes()
+
+
+# extract.
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize(("source", "energy"), [(ENERGY, ()), (GLSTAT, ()), (ROLLOVER, ("stepIE_J",))])
+def test_what_is_extracted_reads_back_bit_for_bit(
+    source: str, energy: tuple[str, ...], suffix: str, tmp_path: Path
+) -> None:
+    file = tmp_path / f"energy.{suffix}"
+    options = [option for name in energy for option in ("--energy", name)]
+    result = run("extract", *options, source, "-o", str(file))
+    assert (result.exit_code, result.stdout, result.stderr) == (0, "", "")
+    again = read_history([str(file)])
+    assert again.channel == "internal_energy"
+    assert again.format == ("csv" if suffix == "csv" else "hdf5")
+    assert same(again, read_history([source], Selection(energy=energy)))
+
+
+def test_from_csv_to_hdf5_and_back_the_file_is_the_same(tmp_path: Path) -> None:
+    names = [str(tmp_path / name) for name in ("first.csv", "second.h5", "third.csv")]
+    for source, target in zip([GLSTAT, *names[:2]], names, strict=True):
+        assert run("extract", source, "-o", target).exit_code == 0
+    assert Path(names[0]).read_bytes() == Path(names[2]).read_bytes()
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    times=st.lists(NUMBERS, min_size=2, max_size=20, unique=True),
+    energy=st.lists(NUMBERS, min_size=20, max_size=20),
+)
+def test_any_numbers_read_back_bit_for_bit(
+    tmp_path_factory: pytest.TempPathFactory, times: list[float], energy: list[float]
+) -> None:
+    columns = {"time": np.sort(times) + 0.0, "internal_energy": np.array(energy[: len(times)]) + 0.0}
+    for name, writer in {"any.csv": table_csv, "any.h5": table_hdf5}.items():
+        file = tmp_path_factory.mktemp("any") / name
+        file.write_bytes(writer(columns))
+        again = read_history([str(file)])
+        assert again.time.tobytes() == columns["time"].tobytes()
+        assert again.energy.tobytes() == columns["internal_energy"].tobytes()
+
+
+def test_several_parts_have_a_column_each_beside_their_sum(tmp_path: Path) -> None:
+    source, file = str(shared("openradioss/rollover_referenceT01.gz")), tmp_path / "parts.h5"
+    text = run("extract", "--part", "box,step", source).stdout
+    head, *rows = csv.reader(io.StringIO(text))
+    assert head == ["time", "internal_energy", "part_1", "part_2"]
+    table = np.array(rows, dtype=float)
+    np.testing.assert_array_equal(table[:, 1], table[:, 2] + table[:, 3])
+    expected = open_run([source])
+    np.testing.assert_array_equal(table[:, 2:], expected.part_energies(expected.parts[:2]))
+    assert run("extract", "--part", "box,step", source, "-o", str(file)).exit_code == 0
+    for column in ("part_1", "part_2", "internal_energy"):
+        again = read_history([str(file)], Selection(energy=(column,)))
+        np.testing.assert_array_equal(again.energy, table[:, head.index(column)])
+
+
+def test_one_part_needs_no_column_beside_the_energy() -> None:
+    source = str(shared("openradioss/rollover_referenceT01.gz"))
+    assert run("extract", "--part", "box", source).stdout.startswith("time,internal_energy\n0.0,")
+
+
+def test_without_a_file_csv_goes_to_standard_output_and_notes_do_not(tmp_path: Path) -> None:
+    file = tmp_path / "matsum"
+    run(*REPLAY, "-o", str(file))
+    result = run("extract", str(file))
+    assert result.stdout.startswith("time,internal_energy\n0.0,0.0\n")
+    assert "the energies of all parts were added" in result.stderr
+    assert run("extract", "-q", str(file)).stderr == ""
+    hdf5 = run("extract", "--write-as", "hdf5", "-q", str(file))
+    assert hdf5.stdout_bytes.startswith(b"\x89HDF")
+
+
+def test_the_format_asked_for_comes_before_that_of_the_name(tmp_path: Path) -> None:
+    file = tmp_path / "energy.csv"
+    run("extract", "--write-as", "hdf5", ENERGY, "-o", str(file))
+    assert read_history([str(file)]).format == "hdf5"
+
+
+@pytest.mark.parametrize("name", ["energy.txt", "energy", "energy.glstat", "matsum", "csv"])
+def test_a_name_that_tells_no_format_is_refused_before_anything_is_read(name: str, tmp_path: Path) -> None:
+    result = run("extract", "absent.csv", "-o", str(tmp_path / name))
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.endswith("the name tells no format; give --write-as csv, hdf5\n")
+    assert not (tmp_path / name).exists()
+
+
+def test_an_existing_file_and_an_input_are_kept(tmp_path: Path) -> None:
+    file = tmp_path / "energy.csv"
+    file.write_bytes(Path(ENERGY).read_bytes())
+    assert run("extract", ENERGY, "-o", str(file)).exit_code == 2
+    assert run("extract", str(file), "-o", str(file), "--overwrite").exit_code == 2
+    assert file.read_bytes() == Path(ENERGY).read_bytes()
+    assert run("extract", ENERGY, "-o", str(file), "--overwrite").exit_code == 0
+    assert file.read_bytes() != Path(ENERGY).read_bytes()
+
+
+def test_format_of_takes_only_what_can_be_written() -> None:
+    assert format_of("run.H5", ["csv", "hdf5"]) == "hdf5"
+    with pytest.raises(FormatError, match=r"run\.h5: the name tells no format; give --write-as csv"):
+        format_of("run.h5", ["csv"])
+
+
+# replay, written and read back.
+
+
+def test_a_replayed_hdf5_holds_the_numbers_of_the_csv(tmp_path: Path) -> None:
+    names = [str(tmp_path / name) for name in ("motion.csv", "motion.h5")]
+    for name in names:
+        assert run(*REPLAY, "-o", name).exit_code == 0
+    for column in ("internal_energy", "kinetic_energy", "z", "vy"):
+        one, other = (read_history([name], Selection(energy=(column,))) for name in names)
+        assert same(one, other)
+
+
+@pytest.mark.parametrize("switches", [(), ("--tr", "0.0135867", "--td", "0.0687534")])
+def test_a_replayed_matsum_holds_the_motion_to_five_digits(switches: tuple[str, ...], tmp_path: Path) -> None:
+    file, exact = tmp_path / "matsum", tmp_path / "exact.csv"
+    for name in (file, exact):
+        assert run(*REPLAY, *switches, "-o", str(name)).exit_code == 0
+    opened = open_run([str(file)])
+    table = np.genfromtxt(exact, delimiter=",", names=True)
+    ids = [part.id for part in opened.parts]
+    frame, suspended, spring = opened.parts
+    matsum = opened.databases[0]
+    np.testing.assert_allclose(opened.part_energies([spring])[:, 0], table["internal_energy"], rtol=5e-5)
+    kinetic = matsum.part_channel("kinetic_energy", ids).sum(axis=1)
+    np.testing.assert_allclose(kinetic, table["kinetic_energy"], rtol=5e-5)
+    momentum = matsum.part_channel("z_momentum", [frame.id, suspended.id])
+    np.testing.assert_allclose(momentum, np.stack([15.7 * table["vz"], 31.4 * table["vy"]], axis=1), rtol=5e-5)
+
+
+def test_suggest_gives_the_same_pair_on_a_replayed_matsum(tmp_path: Path) -> None:
+    file = tmp_path / "matsum"
+    run(*REPLAY, "-o", str(file))
+    found, expected = answer("suggest", "--td", "0.064", "--part", "spring", str(file)), answer(
+        "suggest", "--td", "0.064", ENERGY
+    )  # fmt: skip
+    assert found["recommended"]["tr"] == pytest.approx(expected["recommended"]["tr"], rel=1e-5)
+    assert found["better_td"]["td"] == pytest.approx(expected["better_td"]["td"], rel=1e-5)
+    assert found["better_td"]["tr"] == pytest.approx(expected["better_td"]["tr"], rel=1e-5)
+    flight = found["flight"]
+    assert (flight["start"], flight["end"], flight["source"]) == (0.0, None, "momentum")
+    assert [part["title"] for part in flight["parts"]] == ["frame", "suspended mass", "spring"]
+    assert found["history"]["parts"] == [{"id": 3, "title": "spring"}]
+
+
+def test_an_undamped_replay_flies_by_its_constant_momentum(tmp_path: Path) -> None:
+    file = tmp_path / "matsum"
+    undamped = ["0" if value == "50" else value for value in OSCILLATOR]
+    assert run("replay", *undamped, "--t-end", "0.15", "--dt", "1e-4", "-o", str(file)).exit_code == 0
+    flight = answer("suggest", "--td", "0.064", "--part", "spring", str(file))["flight"]
+    assert (flight["start"], flight["end"], flight["source"]) == (0.0, None, "momentum")

@@ -1,0 +1,93 @@
+"""Damaged glstat and matsum: an error of ours, or the numbers that a plain reader finds in the lines."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from hypothesis import given
+
+from d2rpick.errors import FormatError
+from d2rpick.readers import glstat, matsum
+from tests.faults import FAULTS, Fault, cases, damage, glstat_states, is_within, matsum_states
+from tests.text_files import HEAD, glstat_text, matsum_text
+
+IDS = [1, 12, 13]
+GLSTAT = glstat_text(np.arange(8) / 8, np.arange(8) ** 3 - 10)
+MATSUM = {
+    lines: matsum_text(np.arange(8) / 8, IDS, 10.0 * np.arange(8)[:, None] + np.array(IDS), lines) for lines in (3, 4)
+}
+
+
+def borders(text: bytes, start: bytes) -> list[int]:
+    return [match.start() for match in re.finditer(rb"(?m)^" + re.escape(start), text)]
+
+
+def legs(text: bytes) -> int:
+    """How many states may be left out: the last one before each head, and of the file."""
+    return 1 + text.count(b"ls-dyna") - (b"ls-dyna" in b"".join(text.split(b"\n")[1:2]))
+
+
+def check_glstat(faults: list[Fault]) -> bool:
+    """Whether the damaged file could be read."""
+    text = damage(GLSTAT, faults, borders(GLSTAT, b" dt of cycle"))
+    states = glstat_states(text)
+    try:
+        run = glstat.Glstat(text, "glstat", ["internal energy"])
+        energy = run.channel("internal energy").tolist()
+    except FormatError:
+        return False
+    found = list(zip(run.time.tolist(), energy, strict=True))
+    assert is_within(found, states), (found, states)
+    assert len(found) >= len(states) - legs(text), (found, states)
+    assert run.complete or run.notes
+    return True
+
+
+def check_matsum(faults: list[Fault], lines: int) -> bool:
+    whole = MATSUM[lines]
+    text = damage(whole, faults, sorted(borders(whole, b" time =") + borders(whole, b" mat.#=")))
+    readable = 0
+    for ids in ([12], IDS):
+        try:
+            run = matsum.Matsum(text, "matsum")
+            energies = run.part_channel("internal_energy", ids).tolist()
+        except FormatError:
+            continue
+        readable += 1
+        for column, id_ in enumerate(ids):
+            found = [(time, row[column]) for time, row in zip(run.part_time.tolist(), energies, strict=True)]
+            states = matsum_states(text, id_)
+            # Of a part read alone the lines are compared, not those of other parts that may bear its number.
+            assert is_within(found, states, most=1 if ids == IDS else 2), (id_, found, states)
+            assert len(found) >= len(states) - legs(text), (found, states)
+        assert run.complete or run.notes
+    return readable > 0
+
+
+@cases(100)
+@given(FAULTS)
+def test_glstat(faults: list[Fault]) -> None:
+    check_glstat(faults)
+
+
+@cases(100)
+@given(FAULTS)
+def test_matsum_with_four_lines(faults: list[Fault]) -> None:
+    check_matsum(faults, 4)
+
+
+@cases(100)
+@given(FAULTS)
+def test_matsum_with_three_lines(faults: list[Fault]) -> None:
+    check_matsum(faults, 3)
+
+
+def test_many_blocks_that_all_differ_are_read() -> None:
+    """Each state has a controller line of another length: no two blocks in a row are alike."""
+    blocks = GLSTAT[len(HEAD) + 2 :].split(b" dt of cycle")[1:]
+    text = HEAD + b"\n\n" + b"".join(b" dt of cycle" + b"x" * (n % 7) + blocks[n % 8] for n in range(300))
+    run = glstat.Glstat(text, "glstat")
+    assert list(zip(run.time.tolist(), run.channel("internal energy").tolist(), strict=True)) == [
+        (time, energies[0]) for time, energies in glstat_states(text)
+    ]

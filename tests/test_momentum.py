@@ -1,0 +1,279 @@
+"""Free flight found in the momentum: on motions made up of known pieces, and on runs that a solver computed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from d2rpick.history import EXACT, Momenta, Part, Precision
+from d2rpick.momentum import FreeFlight, all_flights, flight_around, flight_of
+from d2rpick.readers import open_run
+from tests.command import answer
+from tests.records import printed
+from tests.shared import shared
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.history import Samples
+
+PARTS = (Part(1, "box"), Part(2, "step"), Part(3, "sled"))
+MASSES = np.array([300.0, 78.0])
+SPEED = 7.0
+END = 0.4
+TD = 0.25
+
+
+class Piece(NamedTuple):
+    """From ``begin`` on, ``force`` of shape (3,) acts on both bodies together, beside weight and damping."""
+
+    begin: float
+    force: tuple[float, float, float]
+
+
+def total(time: Samples, pieces: Sequence[Piece], alpha: float, gravity: float) -> Samples:
+    """Momentum of both bodies, (n, 3), by p' = f + m g - alpha p with f constant in each piece, exactly."""
+    mass = MASSES.sum()
+    p = np.zeros((time.size, 3))
+    now = np.array([mass * SPEED, 0.0, 0.0])
+    ends = [piece.begin for piece in pieces[1:]] + [np.inf]
+    for piece, end in zip(pieces, ends, strict=True):
+        rate = np.array(piece.force) - np.array([0.0, 0.0, mass * gravity]) - alpha * now
+        inside = (time >= piece.begin) & (time < end)
+        p[inside] = now + _lasted(time[inside] - piece.begin, alpha) * rate
+        now = now + (_lasted(np.array([end - piece.begin]), alpha)[0] if np.isfinite(end) else 0.0) * rate
+    return p
+
+
+def _lasted(span: Samples, alpha: float) -> Samples:
+    """Integral of exp(-alpha t) over ``span``, shape (n, 1)."""
+    return np.asarray(span if alpha == 0 else -np.expm1(-alpha * span) / alpha)[:, np.newaxis]
+
+
+def flown(
+    pieces: Sequence[Piece], *, alpha: float = 0.0, gravity: float = 9.81, states: int = 1000, frequency: float = 60.0,
+    share: float = 0.1, digits: int = 17, sled: float = 0.0,
+) -> Momenta:  # fmt: skip
+    """Box and step that vibrate against each other; a sled of momentum ``sled`` that stops at 0.08 if it has any.
+
+    ``share``: amplitude of the momentum they exchange, relative to that of both.
+    """
+    time = np.linspace(0, END, states)
+    p = total(time, pieces, alpha, gravity)[:, np.newaxis] * (MASSES / MASSES.sum())[:, np.newaxis]
+    phases = 2 * np.pi * frequency * time[:, np.newaxis] + np.array([0.3, 1.9, 4.0])
+    exchanged = share * MASSES.sum() * SPEED * np.exp(-alpha / 2 * time)[:, np.newaxis] * np.cos(phases)
+    p[:, 0] += exchanged
+    p[:, 1] -= exchanged
+    if sled:
+        driven = np.zeros((states, 1, 3))
+        driven[:, 0, 0] = sled * np.maximum(0, 1 - time / 0.08)
+        p = np.concatenate([p, driven], axis=1)
+    if digits < EXACT.digits:
+        p = printed(p.ravel(), digits).reshape(p.shape)
+    return Momenta(time, p, PARTS[: p.shape[1]], Precision(digits), chosen=(0,))
+
+
+def trip(start: float = 0.08, end: float = 0.33) -> list[Piece]:
+    """A load until ``start``, flight, and a contact from ``end`` on."""
+    weight = MASSES.sum() * 9.81
+    load = MASSES.sum() * SPEED / start
+    return [
+        Piece(0.0, (-0.4 * load, 0.1 * load, 0.3 * load)),
+        Piece(start, (0, 0, 0)),
+        Piece(end, (-weight, 0, 3 * weight)),
+    ]
+
+
+def pulse(begin: float, end: float, force: float) -> list[Piece]:
+    """A force in x and z that changes four times and then ceases: a constant one is nothing but another gravity."""
+    levels = np.array([1.0, 2.0, 1.5, 0.7])
+    times = np.linspace(begin, end, 5)
+    return [Piece(t, (f, 0.0, f)) for t, f in zip(times.tolist(), [*(force * levels).tolist(), 0.0], strict=True)]
+
+
+def alone(momenta: Momenta) -> Momenta:
+    """The same run of which only the box is written."""
+    assert momenta.parts
+    return replace(momenta, values=momenta.values[:, :1], parts=momenta.parts[:1])
+
+
+def smooth(seed: int, waves: int, digits: int) -> Momenta:
+    """A load that never ends: one momentum of random waves."""
+    random = np.random.default_rng(seed)
+    time = np.linspace(0, 1, 1000)
+    turns = np.arange(1, waves + 1) * random.uniform(0.7, 1, waves)
+    phases = 2 * np.pi * np.outer(time, turns) + random.uniform(0, 2 * np.pi, waves)
+    values = np.zeros((1000, 1, 3))
+    values[:, 0, 0] = printed(np.sin(phases) @ random.normal(size=waves), digits)
+    return Momenta(time, values, None, Precision(digits), chosen=(0,))
+
+
+# Motions made up of pieces.
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    start=st.floats(0.04, 0.16),
+    end=st.floats(0.26, 0.36),
+    td=st.floats(0.17, 0.25),
+    alpha=st.one_of(st.just(0.0), st.floats(0.1, 40.0)),
+    frequency=st.floats(15.0, 300.0),
+    share=st.floats(0.02, 0.5),
+    states=st.integers(300, 3000),
+    digits=st.sampled_from([5, 9, 17]),
+)
+def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchange(
+    *, start: float, end: float, td: float, alpha: float, frequency: float, share: float, states: int, digits: int
+) -> None:
+    momenta = flown(
+        trip(start, end), alpha=alpha, frequency=frequency, share=share, states=states, digits=digits
+    )  # fmt: skip
+    found = flight_around(momenta, td)
+    assert found
+    assert found.parts == PARTS[:2]
+    # In these times the forces change the momentum by two thousandths of its range.
+    load, contact = 5e-3 * start, 5e-4
+    few = 3 * END / (states - 1)
+    assert found.start == pytest.approx(start, abs=few + load)
+    assert found.end == pytest.approx(end, abs=few + contact)
+    assert found.end_seen
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    td=st.floats(0.1, 0.32),
+    frequency=st.floats(20.0, 300.0),
+    share=st.floats(0.05, 0.5),
+    digits=st.sampled_from([5, 17]),
+)
+def test_a_part_alone_does_not_fly_while_another_is_attached(
+    td: float, frequency: float, share: float, digits: int
+) -> None:
+    momenta = flown(trip(), frequency=frequency, share=share, digits=digits, alpha=1.0)
+    assert flight_of(momenta, (0,), td) is None
+    assert flight_around(alone(momenta), td) is None
+
+
+def test_a_load_that_never_ends_has_hardly_ever_a_moment_that_passes_for_flight() -> None:
+    tried = [
+        flight_around(smooth(seed, waves, digits), td)
+        for waves in (1, 2, 3, 5, 10)
+        for seed in range(8)
+        for digits in (5, 17)
+        for td in np.linspace(0.05, 0.95, 10)
+    ]
+    assert sum(found is not None for found in tried) <= 0.01 * len(tried)
+
+
+@pytest.mark.parametrize("sled", [1e3, 1e5])
+def test_a_driven_sled_that_stops_is_not_counted_with_the_parts_that_fly(sled: float) -> None:
+    momenta = flown(trip(), sled=sled)
+    assert flight_around(momenta, TD) == flight_around(flown(trip()), TD)
+
+
+def test_the_set_that_flies_together_can_be_named() -> None:
+    known = replace(flown(trip(), sled=1e3), flying=(0, 1, 2))
+    found = flight_around(known, TD)
+    assert found
+    assert found.parts == PARTS
+    assert flight_around(replace(known, flying=(0,)), TD) is None
+
+
+def test_attached_parts_are_found_among_many() -> None:
+    pair = flown(trip(), share=0.2)
+    others = np.zeros((pair.time.size, 30, 3))
+    others[:, :, 1] = np.cumsum(np.random.default_rng(3).normal(size=(pair.time.size, 30)), axis=0)
+    values = np.concatenate([others[:, :15], pair.values, others[:, 15:]], axis=1)
+    parts = tuple(Part(number, f"part {number}") for number in range(1, 33))
+    found = flight_around(Momenta(pair.time, values, parts, EXACT, chosen=(15,)), TD)
+    assert found
+    assert found.parts == (parts[15], parts[16])
+
+
+def test_all_flights_of_a_run_are_listed_and_the_one_around_td_is_taken() -> None:
+    momenta = flown([*pulse(0.0, 0.06, -4e3), *pulse(0.18, 0.20, 9e4), *pulse(0.30, 0.33, 4e4)])
+    flights = all_flights(momenta)
+    expected = [(0.06, 0.18), (0.20, 0.30), (0.33, END)]
+    np.testing.assert_allclose([(f.start, f.end) for f in flights], expected, atol=1.5e-3)
+    assert [f.end_seen for f in flights] == [True, True, False]
+    assert all(one.end <= next_one.start for one, next_one in pairwise(flights))
+    for flight in flights:
+        around = flight_around(momenta, (flight.start + flight.end) / 2)
+        assert around
+        assert (around.start, around.end) == pytest.approx((flight.start, flight.end), abs=1e-3)
+
+
+@pytest.mark.parametrize("td", [0.03, 0.35])
+def test_there_is_no_flight_around_a_td_in_the_load_or_the_contact(td: float) -> None:
+    assert flight_around(flown([*pulse(0.0, 0.06, -2e4), *pulse(0.33, 0.37, 5e4)]), td) is None
+
+
+@pytest.mark.parametrize("td", [-0.1, END + 0.1])
+def test_there_is_no_flight_around_a_td_outside_the_record(td: float) -> None:
+    assert flight_around(flown(trip()), td) is None
+
+
+@pytest.mark.parametrize("digits", [5, 17])
+def test_a_momentum_that_never_changes_tells_of_flight_throughout(digits: int) -> None:
+    free = flown([Piece(0.0, (0, 0, 0))], gravity=0.0, digits=digits)
+    assert flight_around(free, TD) == FreeFlight(0.0, END, PARTS[:2], end_seen=False)
+
+
+def test_parts_at_rest_do_not_fly() -> None:
+    momenta = flown(trip())
+    assert flight_around(replace(momenta, values=0 * momenta.values), TD) is None
+
+
+def test_a_load_may_hide_behind_the_coarse_digits_of_a_heavy_part() -> None:
+    light = flown(trip(), digits=5)
+    train = np.broadcast_to([1.2345e9, 0.0, 0.0], (light.time.size, 1, 3))
+    heavy = replace(light, values=np.concatenate([light.values, train], axis=1), parts=PARTS, flying=(0, 1, 2))
+    assert flight_around(heavy, TD) is None
+
+
+def test_digits_that_do_not_resolve_a_thousandth_of_the_change_tell_nothing() -> None:
+    pieces = [Piece(0.0, (-2e3, 0, 0)), Piece(0.08, (0, 0, 0)), Piece(0.33, (2e3, 0, 0))]
+    assert flight_around(flown(pieces, gravity=0.0, digits=17), TD)
+    assert flight_around(flown(pieces, gravity=0.0, digits=4), TD) is None
+
+
+# Runs that a solver computed.
+
+
+def test_on_the_rollover_box_and_step_fly_from_the_end_of_the_trip_to_the_ground() -> None:
+    found = answer("suggest", "--td", "0.37", "--part", "box", str(shared("openradioss/rollover_referenceT01.gz")))
+    flight = found["flight"]
+    assert flight["source"] == "momentum"
+    assert [part["title"] for part in flight["parts"]] == ["box", "step"]
+    assert 0.087 <= flight["start"] <= 0.093
+    assert flight["end"] == pytest.approx(0.3819, abs=0.002)
+    assert 0.088 <= found["recommended"]["tr"] <= 0.110
+    assert [part["title"] for part in found["history"]["parts"]] == ["box"]
+
+
+def test_on_the_rollover_the_box_alone_does_not_fly() -> None:
+    run = open_run([str(shared("openradioss/rollover_referenceT01.gz"))])
+    (momenta,) = (one for one in run.momenta(run.parts[:1], None) if one.parts)
+    assert [flight_of(momenta, (0,), td) for td in np.linspace(0.1, 0.38, 15)] == [None] * 15
+
+
+def test_masses_that_are_no_parts_fly_by_the_momentum_of_the_whole_model() -> None:
+    found = answer("suggest", "--td", "0.238", "--part", "1-2", str(shared("openradioss/chain_referenceT01.gz")))
+    assert found["flight"] == {"start": 0.0, "end": None, "source": "momentum", "parts": None}
+
+
+@pytest.mark.parametrize(("run", "start"), [("L1", 0.0197), ("L3", 0.0232)])
+def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(run: str, start: float) -> None:
+    table = np.genfromtxt(shared(f"openradioss/load_{run}_ref.csv"), delimiter=",", names=True)
+    values = np.zeros((table.size, 1, 3))
+    values[:, 0, 0] = table["momentum_x_solver"]
+    found = flight_around(Momenta(table["time_s"], values, None, Precision(7), chosen=(0,)), 0.1)
+    assert found
+    assert found.start == pytest.approx(start, abs=2e-4)
+    assert not found.end_seen

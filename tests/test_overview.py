@@ -1,0 +1,198 @@
+"""What info tells of a run, whatever its files hold."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from d2rpick.writers import table_csv, table_hdf5
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.shared import shared
+from tests.test_output import check_by_schema
+
+REPLAY = ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4")
+FORMATS = ("table", "json", "csv", "markdown")
+
+
+def info(*args: str) -> dict[str, Any]:
+    """Answer of info, held against its schema."""
+    found = answer("info", *args)
+    check_by_schema(found)
+    return found
+
+
+@pytest.fixture
+def matsum(tmp_path: Path) -> Path:
+    """The paper's oscillator as a matsum of three parts."""
+    file = tmp_path / "matsum"
+    assert run(*REPLAY, "-o", str(file)).exit_code == 0
+    return file
+
+
+@pytest.mark.parametrize(
+    ("source", "form", "states", "end", "channel", "unit"),
+    [
+        (ENERGY, "csv", 1501, 0.15, "internal_energy", ""),
+        (GLSTAT, "glstat", 1501, 0.15, "internal energy", ""),
+        (ROLLOVER, "csv", 900, 0.4495097, "boxIE_J", "s"),
+    ],
+)
+def test_info_tells_format_states_span_and_channels(
+    source: str, form: str, states: int, end: float, channel: str, unit: str
+) -> None:
+    found = info(source)
+    assert (found["source"], found["format"], found["states"]) == ([source], form, states)
+    assert (found["time_start"], found["time_end"], found["time_unit"]) == (0.0, end, unit)
+    assert channel in found["channels"]
+    assert found["sampling"]["min"] <= found["sampling"]["median"] <= found["sampling"]["max"]
+    assert found["sampling"]["median"] == pytest.approx(end / (states - 1), rel=0.01)
+    assert (found["complete"], found["parts"], found["flights"]) == (True, [], [])
+
+
+def test_info_tells_version_parts_and_flight_of_a_matsum(matsum: Path) -> None:
+    found = info(str(matsum))
+    assert found["title"] == "floating oscillator"
+    assert "layout of ls-dyna" in found["version"]
+    assert [(part["id"], part["title"]) for part in found["parts"]] == [
+        (1, "frame"), (2, "suspended mass"), (3, "spring"),
+    ]  # fmt: skip
+    assert [part["energy_max"] for part in found["parts"]] == [0.0, 0.0, pytest.approx(140.36, rel=1e-4)]
+    assert found["flights"] == [{"start": 0.0, "end": None, "parts": [
+        {"id": part["id"], "title": part["title"]} for part in found["parts"]
+    ]}]  # fmt: skip
+
+
+def test_info_lists_all_flights_of_the_parts_asked_for() -> None:
+    found = info("--part", "box", str(shared("openradioss/rollover_referenceT01.gz")))
+    first, second = found["flights"]
+    assert [part["title"] for part in first["parts"]] == ["box", "step"]
+    assert 0.087 <= first["start"] <= 0.093
+    assert first["end"] == pytest.approx(0.3819, abs=0.002)
+    assert first["end"] < second["start"]
+    assert second["end"] is None
+    assert "rotation_energy" in found["channels"]
+
+
+def test_companions_are_one_run(matsum: Path, tmp_path: Path) -> None:
+    glstat = tmp_path / "glstat"
+    run(*REPLAY, "-o", str(glstat))
+    found = info(str(tmp_path))
+    assert found["format"] == "glstat + matsum"
+    assert sorted(found["source"]) == [str(glstat), str(matsum)]
+    assert "total energy" in found["channels"]
+    assert len(found["parts"]) == 3
+
+
+@pytest.mark.parametrize("text", ["time,internal_energy\n0.5,1\n", "time,internal_energy\n0.5,1\n0.6,2\n"])
+def test_a_history_may_have_any_number_of_states(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "few.csv"
+    file.write_text(text)
+    found = info(str(file))
+    states = text.count("\n") - 1
+    assert (found["states"], found["time_start"], found["sampling"] is None) == (states, 0.5, states == 1)
+    assert {run("info", str(file), "-f", name).exit_code for name in FORMATS} == {0}
+
+
+def test_columns_that_leave_the_choice_of_the_energy_open_are_listed(tmp_path: Path) -> None:
+    time = np.linspace(0, 1, 20)
+    file = tmp_path / "several.csv"
+    file.write_bytes(table_csv({"time": time, "left": time, "right": time**2}))
+    assert run("suggest", "--td", "0.5", str(file)).exit_code == 2
+    found = info(str(file))
+    assert (found["channels"], found["states"]) == (["left", "right"], 20)
+
+
+def test_hdf5_columns_are_listed(tmp_path: Path) -> None:
+    time = np.linspace(0, 1, 20)
+    file = tmp_path / "run.h5"
+    file.write_bytes(table_hdf5({"a/time": time, "a/internal_energy": time, "a/other": time**2}))
+    found = info(str(file))
+    assert found["states"] == 20
+    assert {"a/internal_energy", "a/other"} <= set(found["channels"])
+
+
+def test_hdf5_columns_that_leave_the_choice_open_are_listed_with_the_reason(tmp_path: Path) -> None:
+    time = np.linspace(0, 1, 20)
+    file = tmp_path / "several.h5"
+    groups = ("a/time", "a/internal_energy", "b/time", "b/internal_energy")
+    file.write_bytes(table_hdf5(dict.fromkeys(groups, time)))
+    found = info(str(file))
+    assert set(groups) <= set(found["channels"])
+    assert (found["states"], found["time_start"], found["sampling"]) == (None, None, None)
+    assert any("2 columns for the internal energy" in note for note in found["notes"])
+    assert {run("info", str(file), "-f", name).exit_code for name in FORMATS} == {0}
+    assert info("--energy", "b/internal_energy", str(file))["states"] == 20
+
+
+def test_a_run_killed_before_its_first_state_has_none(matsum: Path) -> None:
+    head, *_ = matsum.read_text().split("\n time =")
+    matsum.write_text(head)
+    found = info(str(matsum))
+    assert (found["states"], found["time_start"], found["sampling"], found["flights"]) == (0, None, None, [])
+    assert found["title"] == "floating oscillator"
+
+
+def test_a_part_that_comes_and_goes_has_no_highest_energy(matsum: Path) -> None:
+    head, *states = matsum.read_text().split("\n time =")
+    gone = [re.sub(r" mat\.#=    2.*?(?= mat\.#=    3)", "", s, flags=re.DOTALL) if i > 5 else s for i, s in
+            enumerate(states)]  # fmt: skip
+    matsum.write_text("\n time =".join([head, *gone]))
+    found = info(str(matsum))
+    assert [part["energy_max"] is None for part in found["parts"]] == [False, True, False]
+    assert any("only some states have part 2" in note for note in found["notes"])
+
+
+def test_a_killed_run_is_said_to_be_incomplete(tmp_path: Path) -> None:
+    file = tmp_path / "glstat"
+    file.write_bytes(Path(GLSTAT).read_bytes()[:-60])
+    found = info(str(file))
+    assert not found["complete"]
+    assert found["states"] == 1500
+    assert any("stops inside" in note for note in found["notes"])
+    assert "complete           no" in run("info", str(file)).stdout
+
+
+def test_every_format_tells_the_same(matsum: Path) -> None:
+    table = run("info", str(matsum)).stdout
+    assert "states             1501" in table
+    assert "flight             frame, suspended mass, spring from 0 to the end of the record, 0.15" in table
+    assert re.search(r"^   3  spring +140\.36$", table, flags=re.MULTILINE)
+    markdown = run("info", "-f", "markdown", str(matsum)).stdout
+    assert "| states | 1501 |" in markdown
+    assert "| 3 | spring | 140.36 |" in markdown
+
+
+def test_csv_is_one_row_under_the_keys_of_json() -> None:
+    source = str(shared("openradioss/rollover_referenceT01.gz"))
+    found = info("--part", "box", source)
+    (row,) = csv.DictReader(io.StringIO(run("info", "-f", "csv", "--part", "box", source).stdout))
+    assert set(found) - {"schema", "tool_version", "command", "warnings", "sampling"} == {
+        name for name in row if not name.startswith("sampling_")
+    }
+    assert (int(row["states"]), float(row["time_end"])) == (found["states"], found["time_end"])
+    assert float(row["sampling_median"]) == found["sampling"]["median"]
+    assert row["channels"].split("; ") == found["channels"]
+    assert row["parts"] == "1 box; 2 step; 3 sled"
+    assert [flight.startswith("box, step from ") for flight in row["flights"].split("; ")] == [True, True]
+
+
+@pytest.mark.parametrize("options", [("--part", "9"), ("--part", "roof"), ("--flying", "9")])
+def test_a_part_that_is_not_there_is_named_with_those_that_are(options: tuple[str, str], matsum: Path) -> None:
+    result = run("info", *options, str(matsum))
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert options[1] in result.stderr
+    assert "suspended mass" in result.stderr
+
+
+def test_the_result_goes_to_a_file_whole_or_not_at_all(tmp_path: Path) -> None:
+    file = tmp_path / "info.json"
+    assert run("info", "-f", "json", ENERGY, "-o", str(file)).stdout == ""
+    assert file.read_text().startswith('{\n  "schema": "d2rpick/info/1"')
+    assert run("info", "-f", "json", ENERGY, "-o", str(file)).exit_code == 2
+    assert run("info", ENERGY, "-o", ENERGY, "--overwrite").exit_code == 2

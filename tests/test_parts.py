@@ -1,0 +1,124 @@
+"""Parts to be switched and parts that fly with them: --part and --flying, seen from outside."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from d2rpick.cautions import cautions_of
+from d2rpick.history import EXACT, History, Momenta, Part
+from d2rpick.situation import Settings, examine
+from tests.command import OSCILLATOR, answer, codes, run
+from tests.records import ENERGY, TIME
+from tests.shared import shared
+from tests.test_output import check_by_schema
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+BOX, STEP, SLED = ({"id": i, "title": title} for i, title in enumerate(("box", "step", "sled"), start=1))
+
+
+def rolling(*options: str, command: str = "suggest") -> dict[str, Any]:
+    """Answer for the computed rollover at td = 0.37, held against its schema."""
+    tr = ("--tr", "0.1") if command == "verify" else ()
+    found = answer(command, "--td", "0.37", *tr, *options, str(shared("openradioss/rollover_referenceT01.gz")))
+    check_by_schema(found)
+    return found
+
+
+@pytest.mark.parametrize("command", ["suggest", "verify"])
+@pytest.mark.parametrize("part", ["box", "1", "BOX"])
+def test_a_part_is_chosen_by_number_or_title_and_named_with_what_flies(part: str, command: str) -> None:
+    found = rolling("--part", part, command=command)
+    assert found["history"]["parts"] == [BOX]
+    assert found["history"]["channel"] == "internal energy of box"
+    assert (found["flight"]["source"], found["flight"]["parts"]) == ("momentum", [BOX, STEP])
+    assert "flight-from-energy" not in codes(found)
+    assert "no-free-flight" not in codes(found)
+
+
+def test_energies_of_several_parts_are_added() -> None:
+    both, box, step = (rolling("--part", part) for part in ("1,2", "1", "2"))
+    assert both["history"]["parts"] == [BOX, STEP]
+    assert both["energy_td"] == pytest.approx(box["energy_td"] + step["energy_td"], rel=1e-12)
+    assert rolling("--part", "1-2")["candidates"] == rolling("--part", "1", "--part", "step")["candidates"]
+
+
+def test_without_parts_the_whole_model_is_taken_and_parts_are_null() -> None:
+    found = rolling()
+    assert (found["history"]["parts"], found["history"]["channel"]) == (None, "internal_energy")
+
+
+def test_the_parts_that_fly_can_be_named() -> None:
+    named = rolling("--part", "box", "--flying", "box,step,sled")["flight"]
+    assert (named["source"], named["parts"]) == ("momentum", [BOX, STEP, SLED])
+    assert named["end"] == pytest.approx(0.3819, abs=1e-3)
+
+
+def test_parts_that_do_not_fly_together_are_no_flight_and_that_is_said() -> None:
+    found = rolling("--part", "box", "--flying", "box")
+    assert found["flight"]["source"] == "energy"
+    assert {"no-free-flight", "flight-from-energy"} <= codes(found)
+    (message,) = (w["message"] for w in found["warnings"] if w["code"] == "no-free-flight")
+    assert message == "the momentum shows no free flight around td = 0.37; its start was read off the energy instead"
+
+
+def test_a_given_start_keeps_the_end_that_the_momentum_shows() -> None:
+    flight = rolling("--part", "box", "--after", "0.12")["flight"]
+    assert (flight["start"], flight["source"], flight["parts"]) == (0.12, "given", [BOX, STEP])
+    assert flight["end"] == pytest.approx(0.3819, abs=1e-3)
+
+
+def test_td_behind_the_contact_that_the_momentum_shows_is_no_free_flight() -> None:
+    source = str(shared("openradioss/rollover_referenceT01.gz"))
+    found = answer("suggest", "--td", "0.3822", "--part", "box", source)
+    assert found["flight"]["source"] != "momentum"
+    assert found["recommended"] is None
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--part", "bax"), ["no part 'bax'", "did you mean", "box"]),
+        (("--part", "7"), ["no part 7", "1 'box', 2 'step', 3 'sled'"]),
+        (("--part", "box", "--flying", "7"), ["no part 7", "1 'box'"]),
+        (("--part", "box", "--energy", "1"), ["--energy and --part exclude each other"]),
+    ],
+)
+def test_parts_that_are_not_there_are_named_with_those_that_are(options: tuple[str, ...], says: list[str]) -> None:
+    result = run("suggest", "--td", "0.37", *options, str(shared("openradioss/rollover_referenceT01.gz")))
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert [word for word in says if word.lower() not in result.stderr.lower()] == []
+
+
+def test_a_part_without_energy_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "matsum"
+    run("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "-o", str(file))
+    found = answer("suggest", "--td", "0.064", "--part", "1,3", str(file))
+    (note,) = found["history"]["notes"]
+    assert "frame" in note
+    assert "spring" not in note
+
+
+def test_an_oscillator_that_its_momentum_does_not_show_to_fly_is_said_so() -> None:
+    shaken = np.zeros((TIME.size, 1, 3))
+    shaken[:, 0, 0] = np.sin(300 * TIME)
+    momenta = (Momenta(TIME, shaken, (Part(1, "box"),), EXACT, chosen=(0,)),)
+    history = History(TIME, ENERGY, source=("run",), format="matsum", channel="E", momenta=momenta)
+    found = {c.code: c.message for c in cautions_of(examine(history, 0.0687, Settings()))}
+    assert found["no-free-flight"].endswith("its start was read off the oscillator instead")
+    plain = History(TIME, ENERGY, source=("run",), format="matsum", channel="E")
+    assert "no-free-flight" not in {c.code for c in cautions_of(examine(plain, 0.0687, Settings()))}
+    given = {c.code for c in cautions_of(examine(history, 0.0687, Settings(after=0.001)))}
+    assert "no-free-flight" not in given
+
+
+def test_where_nothing_can_be_chosen_the_table_says_so(tmp_path: Path) -> None:
+    file = tmp_path / "matsum"
+    run("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "-o", str(file))
+    result = run("suggest", "--td", "0.064", "--part", "frame", str(file))
+    assert result.exit_code == 1
+    assert "\nno candidates\n" in result.stdout

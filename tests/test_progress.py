@@ -1,0 +1,97 @@
+"""The sign of life while files are read: on a terminal only, after a second only, and gone afterwards."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.cli import progress
+from tests.command import ENERGY, ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+pty = pytest.importorskip("pty", reason="terminals are a matter of POSIX")
+PERIOD = 0.02
+
+
+class Terminal(io.StringIO):
+    """A stderr that is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def shown(stream: io.StringIO, names: Sequence[str], *, periods: float, quiet: bool = False) -> str:
+    """Give what is on ``stream`` after that many periods of reading."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "stderr", stream)
+        patch.setattr(progress, "PERIOD", PERIOD)
+        patch.setenv("COLUMNS", "40")
+        with progress.reading(names, quiet=quiet):
+            time.sleep(periods * PERIOD)
+    return stream.getvalue()
+
+
+def test_a_line_counts_the_time_and_is_erased() -> None:
+    pieces = shown(Terminal(), ["glstat"], periods=10).split("\r")
+    assert pieces[0] == pieces[-1] == ""
+    assert pieces[1] == "reading glstat ... 0 s"
+    assert pieces[-2] == " " * len(pieces[-3])
+    assert len(pieces) > 5
+
+
+def test_several_files_are_counted_and_a_long_name_does_not_wrap() -> None:
+    long = shown(Terminal(), ["a/very/long/name/" * 5 + "binout0000", "b", "c"], periods=5).split("\r")[1]
+    assert long.endswith("/binout0000 and 2 more ... 0 s")
+    assert len(long) == 39
+
+
+@pytest.mark.parametrize("case", ["no terminal", "quiet", "fast"])
+def test_nothing_is_shown_otherwise(case: str) -> None:
+    stream = io.StringIO() if case == "no terminal" else Terminal()
+    assert shown(stream, ["glstat"], periods=0 if case == "fast" else 5, quiet=case == "quiet") == ""
+
+
+def test_an_error_is_shown_on_a_clean_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "PERIOD", PERIOD)
+
+    def fail() -> None:
+        with progress.reading(["glstat"], quiet=False):
+            time.sleep(5 * PERIOD)
+            raise ValueError("broken")
+
+    with pytest.raises(ValueError, match="broken"):
+        fail()
+    assert stream.getvalue().endswith(" \r")
+
+
+def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
+    master, slave = pty.openpty()
+    args = [sys.executable, "-m", "d2rpick", "info", "-f", "csv", "-"]
+    with subprocess.Popen(
+        args, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=slave, cwd=ROOT
+    ) as process:  # fmt: skip
+        os.close(slave)
+        first = os.read(master, 1000)  # blocks until there is something
+        result, _ = process.communicate(Path(ENERGY).read_bytes(), timeout=30)
+    rest = b""
+    try:
+        while piece := os.read(master, 1000):
+            rest += piece
+    except OSError:  # how Linux tells that the other end is closed
+        pass
+    os.close(master)
+    assert first.startswith(b"\rreading standard input ... 1 s")
+    assert rest.endswith(b" \r")
+    assert process.returncode == 0
+    assert result.startswith(b"source,format,")

@@ -1,0 +1,152 @@
+"""Curves one after the other: what LS-PrePost, T/HIS and DYNAFORM export, and what is refused."""
+
+from __future__ import annotations
+
+import contextlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.errors import FormatError
+from d2rpick.history import History, Precision
+from d2rpick.readers import Selection, csv_table
+from tests.reading import history_of, run_of, states_of
+
+CURVEPLOT = """\
+Curveplot
+Deck title
+Time (ms)
+Internal Energy
+Component
+A12 #pts=3
+* Minval=     1.0000000000e+00 at time=         0.0000000000
+* Maxval=     4.0000000000e+00 at time=         2.5000000000
+    0.0000000000e+00    1.0000000000e+00
+    1.0000000000e+00   -3.2500000000e+00
+    2.5000000000e+00    4.0000000000e+00
+endcurve
+Kinetic Energy #pts=2
+* Minval=     5.0000000000e+00 at time=         0.0000000000
+    0.0000000000e+00    5.0000000000e+00
+    0.5000000000e+00    6.0000000000e+00
+endcurve
+"""
+T_HIS = """\
+$ exported by hand
+Run 7
+Time
+Internal Energy
+box
+0.0 1.0
+1.0 -3.25
+2.5 4.0
+CONTINUE
+Run 7
+Time
+Kinetic Energy
+step
+0.0 5.0
+0.5 6.0
+"""
+DYNAFORM = "2\n1 'Internal Energy'\n0.0, 1.0\n1.0, -3.25\n2.5, 4.0\n2 'Kinetic Energy'\n0.0, 5.0\n0.5, 6.0\n"
+TEXTS = {"Curveplot": CURVEPLOT, "T/HIS": T_HIS, "DYNAFORM": DYNAFORM}
+FIRST, SECOND = [(0.0, 1.0), (1.0, -3.25), (2.5, 4.0)], [(0.0, 5.0), (0.5, 6.0)]
+CHANNELS = {
+    "Curveplot": ("A12: Internal Energy", "Kinetic Energy: Internal Energy"),
+    "T/HIS": ("box: Internal Energy", "step: Kinetic Energy"),
+    "DYNAFORM": ("Internal Energy", "Kinetic Energy"),
+}
+
+
+def read(text: str, *energy: str, time: str | None = None) -> History:
+    return history_of(csv_table, text, selection=Selection(time, energy), name="curves")
+
+
+@pytest.mark.parametrize("form", TEXTS)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_each_curve_has_its_own_times(form: str, end: str) -> None:
+    text = TEXTS[form].replace("\n", end)
+    first, second = CHANNELS[form]
+    assert run_of(csv_table, text, selection=Selection(energy=("2",))).databases[0].channels == (first, second)
+    history = read(text, "1")
+    assert (history.channel, states_of(history), history.complete) == (first, FIRST, True)
+    assert states_of(read(text, second.upper())) == states_of(read(text, "2")) == SECOND
+    with pytest.raises(FormatError, match="has other times than the first curve"):
+        read(text, "1", "2")
+
+
+@pytest.mark.parametrize("form", ["T/HIS", "DYNAFORM"])
+def test_the_internal_energy_is_taken_by_default(form: str) -> None:
+    assert states_of(read(TEXTS[form])) == FIRST
+
+
+@pytest.mark.parametrize("form", TEXTS)
+def test_a_single_curve_needs_no_name(form: str) -> None:
+    ends = {"Curveplot": "Kinetic Energy #pts", "T/HIS": "CONTINUE", "DYNAFORM": "2 'Kin"}
+    history = read(TEXTS[form].partition(ends[form])[0].replace("Internal Energy", "Heat"))
+    assert states_of(history) == FIRST
+
+
+def test_what_the_labels_say() -> None:
+    history = read(CURVEPLOT, "1")
+    assert history.time_unit == "ms"
+    assert (history.time_precision, history.energy_precision) == (Precision(digits=11), Precision(digits=11))
+    assert (
+        "'Displacement'; it was taken for the time"
+        in read(CURVEPLOT.replace("Time (ms)", "Displacement"), "1").notes[0]
+    )
+    assert "no internal energy by its name" in read(CURVEPLOT, "2").notes[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "energy", "reason"),
+    [
+        (
+            CURVEPLOT.replace("Kinetic Energy #", "B13 #"),
+            [],
+            "2 curves are named like an internal energy.*1 'A12: Internal Energy', 2 'B13: Internal Energy'",
+        ),
+        (CURVEPLOT, ["3"], "no '3'; there are: A12"),
+        (CURVEPLOT, ["A21: Internal Energy"], "did you mean 'A12: Internal Energy'"),
+        (CURVEPLOT.replace("pts=3", "pts=4"), ["1"], "curves:12: 3 pairs, 4 were expected in the curve 'A12'"),
+        (
+            CURVEPLOT.replace("-3.2500000000e+00", ""),
+            ["1"],
+            "curves:10: '1.0000000000e.00', a pair of numbers was expected",
+        ),
+        (CURVEPLOT.replace("-3.2500000000e+00", "NaN"), ["1"], "curves:10: 'NaN' of 'A12: Internal Energy'"),
+        (T_HIS.replace("1.0 -3.25", "1.0 -3.25 7"), ["1"], "curves:7: '1.0 -3.25 7', a pair of numbers"),
+        (DYNAFORM.replace("1.0, -3.25", "1.0; -3.25"), ["1"], "curves:4: '1.0;' of 'Internal Energy'"),
+    ],
+)
+def test_refused(text: str, energy: list[str], reason: str) -> None:
+    with pytest.raises(FormatError, match=reason):
+        read(text, *energy)
+
+
+def test_a_curve_has_its_own_times_and_no_others() -> None:
+    assert states_of(read(CURVEPLOT, "1", time="Time")) == FIRST
+    with pytest.raises(FormatError, match="each curve has its own times; leave --time '2' out"):
+        read(CURVEPLOT, "1", time="2")
+
+
+@pytest.mark.parametrize("form", TEXTS)
+def test_a_text_cut_anywhere_never_yields_a_wrong_number(form: str) -> None:
+    counts = set()
+    for cut in range(len(TEXTS[form])):
+        text = TEXTS[form][:cut]
+        for number, true in (("1", FIRST), ("2", SECOND)):
+            with contextlib.suppress(FormatError):
+                history = read(text, number)
+                found = states_of(history)
+                assert found == true[: len(found)]
+                counts.add((number, len(found)))
+                assert history.complete or history.notes
+    assert counts >= {("1", 1), ("1", 2), ("1", 3), ("2", 1)}
+
+
+@given(st.text(alphabet="01.,eE+- \n'$CONTIUE#pts=curve", max_size=120), st.sampled_from([*TEXTS]))
+def test_no_text_raises_anything_else(text: str, form: str) -> None:
+    with contextlib.suppress(FormatError):
+        read(TEXTS[form][:90] + text + TEXTS[form][90:])

@@ -1,0 +1,161 @@
+"""HDF5 files of every layout: the numbers that were put in, or a refusal that lists what there is."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given
+
+from d2rpick.errors import FormatError
+from d2rpick.readers import Selection, hdf5_file
+from d2rpick.readers.hdf5_file import SavedBinout
+from d2rpick.readers.source import Source
+from tests.faults import FAULTS, Fault, cases, damage
+from tests.hdf5_files import ENERGY, KINETIC, LAYOUTS, PARTS, TIME, lasso, plain, written
+from tests.reading import history_of
+
+if TYPE_CHECKING:
+    from d2rpick.history import History
+
+
+def read(file: io.BytesIO, *energy: str, time: str | None = None) -> History:
+    return history_of(hdf5_file, file.getvalue(), selection=Selection(time, energy), name="run.h5")
+
+
+def saved(file: io.BytesIO) -> SavedBinout:
+    (leg,) = hdf5_file.open_legs([Source("run.h5", file.getvalue())], Selection())
+    assert isinstance(leg, SavedBinout)
+    return leg
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_every_layout_gives_the_numbers_put_in(layout: str) -> None:
+    file = written(LAYOUTS[layout])
+    assert hdf5_file.recognises(file.getvalue()[:520])
+    history = read(file)
+    expected = ENERGY.astype("f4") if layout == "columns_upright" else ENERGY
+    assert history.time.tolist() == TIME.tolist()
+    assert history.energy.tolist() == expected.tolist()
+
+
+def test_lasso_branches_have_each_their_own_time_and_parts_by_number() -> None:
+    run = saved(written(lasso))
+    assert (run.title, run.version) == ("Sphere", "smp s 365")
+    assert run.channels == ("internal_energy", "kinetic_energy")
+    assert run.channel("kinetic_energy").tolist() == KINETIC.tolist()
+    assert run.time.tolist() == TIME.tolist()
+    assert run.part_time.tolist() == (TIME + 1e-6).tolist()
+    assert [(part.id, part.title) for part in run.parts] == [(1, "ground"), (101, "box")]
+    assert run.part_channel("internal_energy", [101, 1]).tolist() == PARTS[:, ::-1].tolist()
+    with pytest.raises(FormatError, match="matsum has not exactly one part 7; choose from 1, 101"):
+        run.part_channel("internal_energy", [7])
+
+
+def test_a_single_part_or_state_may_lack_its_axis() -> None:
+    def one_part(file: h5py.File) -> None:
+        file["matsum/time"], file["matsum/internal_energy"], file["matsum/ids"] = TIME, ENERGY, np.array([3])
+
+    run = saved(written(one_part))
+    assert run.part_channel("internal_energy", [3])[:, 0].tolist() == ENERGY.tolist()
+    with pytest.raises(FormatError, match="no glstat in this saved binout"):
+        run.channel("internal_energy")
+
+
+def test_matrix_of_another_shape_is_refused() -> None:
+    def turned(file: h5py.File) -> None:
+        lasso(file)
+        del file["matsum/internal_energy"]
+        file["matsum/internal_energy"] = PARTS.T
+
+    with pytest.raises(FormatError, match=r"has shape \(2, 4\), \(4, 2\) was expected"):
+        saved(written(turned)).part_channel("internal_energy", [1])
+
+
+def test_several_candidates_are_listed() -> None:
+    def two(file: h5py.File) -> None:
+        file["a/time"], file["a/internal_energy"] = TIME, ENERGY
+        file["b/time"], file["b/internal_energy"] = TIME[:3], ENERGY[:3]
+
+    with pytest.raises(FormatError, match=r"2 columns .* a/internal_energy \(4\), b/internal_energy \(3\)"):
+        read(written(two))
+    assert read(written(two), "/b/internal_energy").time.tolist() == TIME[:3].tolist()
+
+
+def test_explicit_paths_win() -> None:
+    history = read(written(plain), "kinetic_energy", "internal_energy", time="/time")
+    assert history.energy.tolist() == (KINETIC + ENERGY).tolist()
+    assert read(written(lasso), "glstat/kinetic_energy").energy.tolist() == KINETIC.tolist()
+    with pytest.raises(FormatError, match=r"'kinetic' names 0 columns.*choose one of .*kinetic_energy \(4\)"):
+        read(written(plain), "kinetic")
+
+
+def test_unnamed_columns_have_to_be_named_by_the_user() -> None:
+    def unnamed(file: h5py.File) -> None:
+        file["data"] = np.column_stack([TIME, ENERGY])
+
+    with pytest.raises(FormatError, match=r"no column .* data\[0\] \(4\), data\[1\] \(4\)"):
+        read(written(unnamed))
+    assert read(written(unnamed), "data[1]", time="data[0]").energy.tolist() == ENERGY.tolist()
+
+
+@pytest.mark.parametrize(
+    ("energy", "message"),
+    [(ENERGY[:3], "has 3 values, time has 4"), (np.array([1, np.nan, 2, 3]), "is nan at state 2")],
+)
+def test_what_makes_no_history_is_refused(energy: object, message: str) -> None:
+    def write(file: h5py.File) -> None:
+        file["time"], file["internal_energy"] = TIME, energy
+
+    with pytest.raises(FormatError, match=message):
+        read(written(write))
+
+
+def test_links_into_other_files_are_not_followed() -> None:
+    def write(file: h5py.File) -> None:
+        file["time"] = TIME
+        file["internal_energy"] = h5py.ExternalLink("other.h5", "/internal_energy")
+
+    with pytest.raises(FormatError, match="no column for the internal energy"):
+        read(written(write))
+
+
+def test_shape_far_too_large_for_the_file_is_refused() -> None:
+    def write(file: h5py.File) -> None:
+        file["time"] = TIME
+        file.create_dataset("internal_energy", (4,), "f8")
+        file.create_dataset("t", (10**12,), "f8", chunks=(1000,))
+
+    with pytest.raises(FormatError, match="the file is damaged"):
+        read(written(write), "internal_energy", time="t")
+
+
+SMALL = {layout: written(LAYOUTS[layout]).getvalue() for layout in ("plain", "compound", "lasso")}
+
+
+def check(layout: str, faults: list[Fault]) -> None:
+    """What can be read of a damaged file must be the numbers that h5py finds at the path."""
+    data = damage(SMALL[layout], faults, [])
+    group = {"plain": "/", "compound": "/", "lasso": "glstat"}[layout]
+    try:
+        (leg,) = hdf5_file.open_legs([Source("run.h5", data)], Selection())
+        for name in leg.channels:
+            values = leg.channel(name)
+            with h5py.File(io.BytesIO(data)) as file:
+                path, _, field = name.rpartition("/")
+                found = file[path][field] if layout == "compound" else file[group][name][()]
+            assert values.tolist() == np.ravel(found).astype(float).tolist()
+        if leg.parts:
+            leg.part_channel("internal_energy", [part.id for part in leg.parts])
+    except FormatError:
+        return
+
+
+@cases(25)
+@given(FAULTS)
+def test_damaged_files(faults: list[Fault]) -> None:
+    for layout in SMALL:
+        check(layout, faults)

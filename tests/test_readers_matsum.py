@@ -1,0 +1,207 @@
+"""What a matsum may look like, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from d2rpick.errors import FormatError
+from d2rpick.readers import matsum
+from tests.shared import shared_bytes
+from tests.text_files import HEAD, matsum_head, matsum_part, matsum_state, matsum_text
+
+TIMES = [0.0, 0.1, 0.25, 0.3]
+IDS = [10, 1, 123456]
+ENERGIES = np.array([[0.0, 1.0, 2.0], [3.0, -4.5, 5.0], [6.0, 7.0, 1e-22], [9.0, 10.0, 11.0]])
+TEXT = matsum_text(TIMES, IDS, ENERGIES)
+MASS = b"       Maximum mass increase in solid elements      =   0.2122E-07 ID=   36456\n"
+LUMPED = matsum_part(0, 0.0, lines=3)
+STATES = [matsum_state(time, IDS, row) for time, row in zip(TIMES, ENERGIES, strict=True)]
+BEHIND_HEAD = TEXT.index(b"{BEGIN")
+
+
+def read(text: bytes) -> matsum.Matsum:
+    return matsum.Matsum(text, "matsum")
+
+
+def assert_as_written(run: matsum.Matsum) -> None:
+    assert run.part_time.tolist() == TIMES
+    assert run.part_channel("internal_energy", IDS).tolist() == ENERGIES.tolist()
+    for column, id_ in enumerate(IDS):
+        assert run.part_channel("internal_energy", [id_])[:, 0].tolist() == ENERGIES[:, column].tolist()
+
+
+SAME = {
+    "four lines": TEXT,
+    "three lines": matsum_text(TIMES, IDS, ENERGIES, lines=3),
+    "CRLF": TEXT.replace(b"\n", b"\r\n"),
+    "trailing blanks": TEXT.replace(b"\n", b" \n"),
+    "no legend": HEAD + b"\n\n" + TEXT[TEXT.index(b" time =") :],
+    "no head": TEXT[TEXT.index(b" time =") :],
+    "legend in another order": TEXT.replace(matsum_head(IDS), matsum_head(IDS[::-1])),
+    "titles like data": TEXT.replace(b"Part 10 ", b"mat.#=   10  inten=   1.0000E+00 "),
+    "mass increase lines": TEXT.replace(b" time =   2.5", MASS + b" time =   2.5"),
+    "lumped masses": TEXT.replace(b" mat.#=   10", LUMPED + b" mat.#=   10"),
+    "old, no eroded energies": TEXT.replace(b"     eroded_ie=   0.0000E+00     eroded_ke=   0.0000E+00", b""),
+    "added mass": TEXT.replace(
+        b"hgeng=   0.0000E+00", b"hgeng=   0.0000E+00     +mass=   0.0000E+00     eroded_he=   0.0000E+00"
+    ),
+    "parts in another order in state 3": TEXT.replace(STATES[2], matsum_state(TIMES[2], IDS[::-1], ENERGIES[2][::-1])),
+}
+
+
+@pytest.mark.parametrize("text", SAME.values(), ids=SAME.keys())
+def test_every_form_gives_the_same_numbers(text: bytes) -> None:
+    run = read(text)
+    assert_as_written(run)
+    assert (run.complete, run.notes) == (True, ())
+    assert [part.id for part in run.parts] == IDS
+
+
+def test_parts_swapped_within_blocks_of_one_size_are_not_shifted() -> None:
+    """States look alike from their time lines; only when a part is read does the difference show."""
+    ids, energies = [11, 12, 13], ENERGIES
+    states = [matsum_state(time, ids, row) for time, row in zip(TIMES, energies, strict=True)]
+    states[2] = matsum_state(TIMES[2], [13, 11, 12], energies[2][[2, 0, 1]])
+    run = read(matsum_head(ids) + b"".join(states))
+    assert run.part_channel("internal_energy", ids).tolist() == energies.tolist()
+    run = read(matsum_head(ids) + b"".join(states))
+    assert run.part_channel("internal_energy", [12])[:, 0].tolist() == energies[:, 1].tolist()
+
+
+def test_part_that_comes_or_goes_is_refused_and_the_others_are_read() -> None:
+    states = [
+        *STATES[:2],
+        *(matsum_state(t, IDS[1:], e[1:]) for t, e in zip(TIMES[2:], ENERGIES[2:], strict=True)),
+    ]
+    run = read(matsum_head(IDS) + b"".join(states))
+    assert run.notes == ("only some states have part 10",)
+    assert run.part_channel("internal_energy", [1])[:, 0].tolist() == ENERGIES[:, 1].tolist()
+    with pytest.raises(FormatError, match="matsum:51: inten of part 10 is missing, cut or doubled"):
+        run.part_channel("internal_energy", [10])
+
+
+def test_part_replaced_by_one_of_the_same_size_is_refused() -> None:
+    states = [STATES[0].replace(b"=   10", b"=   20"), *STATES[1:]]
+    run = read(matsum_head([*IDS, 20]) + b"".join(states))
+    with pytest.raises(FormatError, match=r"inten of part .* is missing"):
+        run.part_channel("internal_energy", [10])
+    assert run.part_channel("internal_energy", [1])[:, 0].tolist() == ENERGIES[:, 1].tolist()
+
+
+def test_part_of_the_legend_that_is_in_no_state() -> None:
+    run = read(TEXT.replace(matsum_head(IDS), matsum_head([*IDS, 7])))
+    assert_as_written(run)
+    assert run.notes == ("no state has part 7 of the legend",)
+    with pytest.raises(FormatError, match="matsum: no part 7; choose from 10, 1, 123456"):
+        run.part_channel("internal_energy", [7])
+
+
+def test_id_that_overflows_is_the_one_of_the_legend() -> None:
+    text = TEXT.replace(b"=  123456", b"=********").replace(b"   123456 ", b"123456789 ")
+    run = read(text)
+    assert run.part_channel("internal_energy", [123456789])[:, 0].tolist() == ENERGIES[:, 2].tolist()
+    assert run.notes == ()
+
+
+def test_two_ids_that_overflow_are_left_out() -> None:
+    ids = [10, 123456, 223456]
+    text = matsum_text(TIMES, ids, ENERGIES).replace(b"=  123456", b"=********").replace(b"=  223456", b"=********")
+    text = text.replace(b"   123456 ", b"123456789 ").replace(b"   223456 ", b"223456789 ")
+    run = read(text)
+    assert [part.id for part in run.parts] == [10]
+    assert "parts whose number is damaged or too wide for its columns were left out" in run.notes
+    assert run.part_channel("internal_energy", [10])[:, 0].tolist() == ENERGIES[:, 0].tolist()
+
+
+def test_id_that_pushes_its_line() -> None:
+    run = read(TEXT.replace(b"=  123456", b"=1234567890"))
+    assert run.part_channel("internal_energy", [1234567890])[:, 0].tolist() == ENERGIES[:, 2].tolist()
+
+
+@pytest.mark.parametrize("id_text", [b"=    1             i", b"=   10            i", b"=   1 0             i"])
+def test_damaged_id_makes_no_other_part(id_text: bytes) -> None:
+    """A digit or a blank lost, or one put in: the columns no longer fit."""
+    damaged = STATES[2].replace(b"=   10             i", id_text.replace(b"    1 ", b"   1 "))
+    run = read(matsum_head(IDS) + b"".join([*STATES[:2], damaged, STATES[3]]))
+    with pytest.raises(FormatError, match="inten of part 10 is missing"):
+        run.part_channel("internal_energy", [10])
+    assert run.part_channel("internal_energy", [1])[:, 0].tolist() == ENERGIES[:, 1].tolist()
+
+
+@pytest.mark.parametrize("field", [b"*************", b"          NaN", b"             ", b"   6.0000E+0 "])
+def test_what_is_no_number_is_refused_with_its_line(field: bytes) -> None:
+    run = read(TEXT.replace(b"   6.0000E+00", field))
+    with pytest.raises(FormatError, match=r"^matsum:52: inten of part 10 is '"):
+        run.part_channel("internal_energy", [1, 10])
+    assert run.part_channel("internal_energy", [1, 123456]).tolist() == ENERGIES[:, 1:].tolist()
+
+
+def test_three_digit_exponents() -> None:
+    run = read(TEXT.replace(b"   1.0000E-22", b"  -1.2346-100"))
+    assert run.part_channel("internal_energy", [123456])[2, 0] == -1.2346e-100
+
+
+def test_quantity_that_was_not_written_is_refused() -> None:
+    run = read(matsum_text(TIMES, IDS, ENERGIES, lines=3))
+    with pytest.raises(FormatError, match="hgeng of part 1 is missing"):
+        run.part_channel("hourglass_energy", [1])
+    with pytest.raises(FormatError, match="no quantity 'mass' in a matsum, only internal_energy"):
+        run.part_channel("mass", [1])
+    with pytest.raises(FormatError, match="a matsum has parts only"):
+        run.channel("internal energy")
+
+
+@pytest.mark.parametrize("text", [b"", b"\n", b"time,energy\n0,1\n", bytes(5000)], ids=range(4))
+def test_something_else_is_no_matsum(text: bytes) -> None:
+    assert not matsum.recognises(text)
+    with pytest.raises(FormatError, match="this is no matsum"):
+        read(text)
+
+
+@pytest.mark.parametrize("lines", [3, 4])
+@pytest.mark.parametrize("legend", [True, False])
+def test_cut_at_every_byte_gives_whole_states_only(lines: int, legend: bool) -> None:
+    text = matsum_text(TIMES, IDS, ENERGIES, lines)
+    first = text.index(b" time =")
+    if not legend:
+        text = HEAD + b"\n\n" + text[first:]
+        first = text.index(b" time =")
+    starts = [at for at in range(len(text)) if text.startswith(b" time =", at)]
+    for end in range(len(HEAD), len(text)):
+        run = read(text[:end])
+        n = run.part_time.size
+        assert run.part_time.tolist() == TIMES[:n]
+        if n:
+            assert run.part_channel("internal_energy", IDS).tolist() == ENERGIES[:n].tolist(), end
+        begun = sum(start + 20 < end for start in starts)
+        assert begun - 1 <= n <= begun, end
+        assert run.complete == (n == begun and not text[:end].rpartition(b"\n")[2].strip()), end
+
+
+def test_each_part_of_a_real_file() -> None:
+    """Numbers cut out of the file by awk: state (from 1), time and the internal energies of the parts."""
+    run = read(shared_bytes("real/histories/PILLARS-LSDyna__Bolt_B_Explicit-matsum"))
+    titles = {
+        10: "Plate 1", 20: "Plate 2", 100: "Bolt", 110: "Bolt Head", 120: "Bolt Nut",
+        101: "Contact Beam Bolt (imp only)", 310: "Contact Beams Plates",
+    }  # fmt: skip
+    assert {part.id: part.title for part in run.parts} == titles
+    internal = run.part_channel("internal_energy", list(titles))
+    assert {state: [run.part_time[state - 1], *internal[state - 1]] for state in (2, 50, 1001)} == {
+        2: [4.8730e-03, 0.0, 0.0, 1.1260e-05, 1.2170e-06, 1.2170e-06, 0.0, 0.0],
+        50: [2.4490e-01, 4.2235, 0.86697, 13.671, 0.94142, 0.92748, 0.0, 0.0],
+        1001: [4.9999, 7.9869, 1.7680, 34.151, 6.2484, 6.1190, 0.0, 0.0],
+    }
+    assert run.part_channel("kinetic_energy", list(titles))[-1].tolist() == [
+        9.9113e-02, 1.0965e-01, 1.5108e-02, 3.3402e-02, 4.0127e-02, 0.0, 0.0,
+    ]  # fmt: skip
+    momentum = [run.part_channel(f"{axis}_momentum", [110])[-1, 0] for axis in "xyz"]
+    assert momentum == [2.1572e-02, -1.5911e-02, 1.7556e-04]
+
+
+def test_titles_of_a_real_file_are_found_by_number() -> None:
+    """Its legend is in another order than its blocks."""
+    run = read(shared_bytes("real/histories/lasso-python__sph_models-R7_1_2-binout.l2a-matsum"))
+    assert [(part.id, part.title) for part in run.parts] == [(1, "null shells for visualization"), (101, "")]
+    assert run.part_channel("internal_energy", [101])[[1, 49, 87], 0].tolist() == [0.0, 2.3528, 2.3516]

@@ -1,0 +1,284 @@
+"""Several files as one run: families, legs, companions; what of them is taken for the energy."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.errors import FormatError
+from d2rpick.overview import survey
+from d2rpick.readers import (
+    READERS,
+    Run,
+    Selection,
+    binout,
+    csv_table,
+    glstat,
+    matsum,
+    open_run,
+    radioss_th,
+    read_history,
+    reader,
+)
+from d2rpick.readers.companions import check_companions
+from d2rpick.readers.database import Legs
+from d2rpick.readers.source import Source
+from tests.made_binout import binout as made_binout
+from tests.made_binout import values
+from tests.made_t01 import MadePart, t01
+from tests.reading import history_of, run_of, states_of
+from tests.shared import shared
+from tests.text_files import HEAD, glstat_text, matsum_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+SAMPLES = Path(__file__).parents[1] / "sample_data"
+TIMES = np.arange(1, 9) / 8
+GLSTAT = glstat_text(TIMES, 10 * TIMES)
+MATSUM = matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))
+
+
+def opened(files: Mapping[str, bytes], selection: Selection | None = None) -> Run:
+    """Open files of different formats, all of a format as legs."""
+    legs = {
+        kind: [Source(name, data) for name, data in files.items() if name.startswith(kind)]
+        for kind in READERS
+        if any(name.startswith(kind) for name in files)
+    }
+    databases = tuple(Legs(reader(kind).open_legs(sources, selection or Selection())) for kind, sources in legs.items())
+    check_companions(databases)
+    return Run(tuple(files), databases)
+
+
+# Families of binouts.
+
+
+def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() -> None:
+    """Branches lie in the files of different ranks, and one goes on in %001; the restart has a folder of its own."""
+    whole, parts = made_binout(range(1, 6)), made_binout(range(1, 6), glstat=False)
+    globals_only = bytes(whole.data).replace(b"matsum", b"nodout")
+    files = {
+        "a/binout0004": bytes(parts.data),
+        "b/binout0000": bytes(made_binout(range(1, 4), shift=4).data),
+        "a/binout0000": globals_only,
+    }
+    run = Run(tuple(files), (Legs(binout.open_legs([Source(*file) for file in files.items()], Selection())),))
+    assert run.history(Selection()).energy.tolist() == [values("internal_energy", state) for state in range(1, 8)]
+    assert run.part_energies(run.parts).tolist() == [
+        [values("internal_energy", state, id_) for id_ in (7, 3)] for state in range(1, 8)
+    ]
+    assert run.notes == ("1 states have the same printed time as the next one; of equal times the last counts",)
+
+
+def test_a_missing_branch_is_named_with_what_there_is() -> None:
+    data = bytes(made_binout([1, 2]).data)
+    no_parts, no_globals = (
+        run_of(binout, data.replace(b"matsum", b"nodout")),
+        run_of(binout, data.replace(b"glstat", b"nodout")),
+    )
+    with pytest.raises(
+        FormatError, match="no matsum in it, but glstat, nodout; name the binout of the run that holds it"
+    ):
+        no_parts.history(Selection(parts=("3",)))
+    with pytest.raises(FormatError, match="no glstat in it, but matsum, nodout"):
+        no_globals.history(Selection(energy=("internal_energy",)))
+    assert no_globals.history(Selection()).channel == "internal energy of all parts"
+
+
+# Legs.
+
+
+def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
+    legs = [glstat_text([3, 4, 5], [30, 40, 50]), glstat_text([1, 2, 3, 4], [1, 2, 3, 4]), glstat_text([5.5], [55])]
+    history = history_of(glstat, *legs)
+    assert states_of(history) == [(1, 1), (2, 2), (3, 30), (4, 40), (5, 50), (5.5, 55)]
+    assert "time steps back once (restart); where legs overlap the newer one counts" in history.notes[0]
+
+
+def test_legs_of_time_histories_may_overlap_too() -> None:
+    first, second = bytes(t01(6).data), bytes(t01(4, start=3).data)
+    run = run_of(radioss_th, second, first)
+    assert run.history(Selection()).time.tolist() == [state / 8 for state in range(7)]
+    assert "where legs overlap the newer one counts" in run.notes[0]
+
+
+def test_a_leg_that_gives_no_state_is_named() -> None:
+    """Two runs that start alike are hardly legs."""
+    history = history_of(glstat, glstat_text([1, 2], [1, 2]), glstat_text([1, 2], [3, 4]))
+    assert states_of(history) == [(1, 3), (2, 4)]
+    assert "run1 was not used: a newer leg begins at or before its first time" in history.notes
+
+
+def test_a_leg_without_states_does_not_hide_the_others() -> None:
+    history = history_of(glstat, HEAD, GLSTAT)
+    assert history.time.tolist() == TIMES.tolist()
+    with pytest.raises(FormatError, match="no states, a history has at least one"):
+        history_of(glstat, HEAD)
+
+
+def test_a_part_that_only_some_legs_have_is_left_out_and_named() -> None:
+    first, second = t01(3, [MadePart(1, "box"), MadePart(2, "step")]), t01(3, [MadePart(1, "box")], start=3)
+    run = run_of(radioss_th, bytes(first.data), bytes(second.data))
+    assert [part.id for part in run.parts] == [1]
+    assert "only some legs have part 2, which was left out" in run.notes[0]
+    with pytest.raises(FormatError, match="no part 2; there are: 1 'box'"):
+        run.history(Selection(parts=("2",)))
+
+
+def test_a_column_that_a_leg_lacks_is_refused() -> None:
+    with pytest.raises(FormatError, match="run2: no column 'IE', only heat"):
+        history_of(csv_table, "time,IE,x\n0,1,2\n1,2,3\n", "time,heat,x\n2,1,2\n3,2,3\n")
+
+
+def test_real_legs() -> None:
+    """th_to_csv gives 50 states to 2.451106 and 50 from 2.50147; of the fluid 69, 69 and 552."""
+    stem = "real/histories/OpenRadioss__miniqa-{}T0{}"
+    crash = open_run([str(shared(stem.format("RESTART-cra2-reference-CRA2V44", n))) for n in (2, 1)])
+    history = crash.history(Selection())
+    assert (history.time.size, history.notes) == (100, ())
+    assert history.time[[49, 50]] == pytest.approx([2.451106, 2.50147], rel=1e-6)
+    assert history.energy[[49, 50]] == pytest.approx([146200.3, 148146.4], rel=1e-6)
+    fluid = open_run([str(shared(stem.format("FLUIDE_NEW-EBCS-INIV-reference-INIV", n))) for n in (1, 2, 3)])
+    assert fluid.history(Selection()).time.size == 690
+
+
+# Companions.
+
+
+def test_glstat_and_matsum_of_one_run_are_joined_by_their_printed_times() -> None:
+    """94 of the 1001 times are printed alike, in six and in five digits."""
+    stem = "real/histories/PILLARS-LSDyna__Bolt_B_Explicit-"
+    run = open_run([str(shared(f"{stem}{kind}")) for kind in ("matsum", "glstat")])
+    assert run.notes == ()
+    whole, bolt = run.history(Selection()), run.history(Selection(parts=("bolt", "110-120")))
+    assert (whole.format, whole.channel, whole.time.size) == ("glstat + matsum", "internal energy", 1001)
+    assert bolt.channel == "internal energy of Bolt, Bolt Head, Bolt Nut"
+    assert bolt.energy[-1] == pytest.approx(34.151 + 6.2484 + 6.1190, rel=1e-12)
+    every = run.part_energies(run.parts).sum(axis=1)
+    assert np.abs(every - whole.energy).max() < 6.1e-4
+
+
+def test_companions_of_other_times_are_doubted() -> None:
+    assert opened({"glstat": GLSTAT, "matsum": MATSUM}).notes == ()
+    coarse = matsum_text(TIMES[::2], [7, 3], np.ones((4, 2)))
+    assert opened({"glstat": GLSTAT, "matsum": coarse}).notes == ()
+    shifted = matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))
+    (note,) = opened({"glstat": GLSTAT, "matsum": shifted}).notes
+    assert note == "glstat and matsum have only 0 of 7 states at the same times; are they of one run?"
+    with pytest.raises(FormatError, match="glstat and matsum have no time in common, files of one run were expected"):
+        opened({"glstat": GLSTAT, "matsum": matsum_text(TIMES + 5, [7], np.ones((8, 1)))})
+
+
+def test_companions_have_legs_of_their_own() -> None:
+    run = opened(
+        {
+            "glstat1": glstat_text([1, 2], [1, 2]),
+            "matsum": matsum_text([1, 2, 3], [7], [[5], [6], [7]]),
+            "glstat2": glstat_text([2, 3], [20, 30]),
+        }
+    )
+    assert run.history(Selection()).energy.tolist() == [1, 20, 30]
+    assert run.history(Selection(parts=("7",))).energy.tolist() == [5, 6, 7]
+
+
+# What is taken for the energy.
+
+
+def test_the_energy_of_the_whole_model_is_the_default_and_binary_files_are_preferred() -> None:
+    data = bytes(made_binout(range(1, 9)).data)
+    run = opened({"glstat": GLSTAT, "binout": data, "matsum": MATSUM})
+    assert run.history(Selection()).energy[0] == values("internal_energy", 1)
+    assert run.history(Selection(energy=("internal energy",))).channel == "internal_energy"
+    assert run.history(Selection(energy=("time step",))).channel == "time_step"
+
+
+def test_without_it_all_parts_are_added_with_a_note() -> None:
+    history = history_of(matsum, MATSUM)
+    assert (history.channel, history.parts) == ("internal energy of all parts", None)
+    assert history.energy.tolist() == TIMES.tolist()
+    assert history.notes == (
+        "never any internal energy: part 3 'Part 3'; rigid, or without elements?",
+        "the energies of all parts were added, those that stay deformable among them; choose with --part",
+    )
+
+
+def test_chosen_parts_are_added_and_named() -> None:
+    history = history_of(matsum, MATSUM, selection=Selection(parts=("part 7",)))
+    assert (history.channel, history.notes) == ("internal energy of Part 7", ())
+    assert [part.id for part in history.parts or ()] == [7]
+    idle = history_of(matsum, MATSUM, selection=Selection(parts=("3,7",)))
+    assert idle.energy.tolist() == TIMES.tolist()
+    assert idle.notes == ("never any internal energy: part 3 'Part 3'; rigid, or without elements?",)
+
+
+@pytest.mark.parametrize(
+    ("files", "selection", "reason"),
+    [
+        ({"glstat": GLSTAT}, Selection(parts=("7",)), "glstat: a glstat has no parts; add the matsum of the run"),
+        ({"matsum": MATSUM}, Selection(energy=("internal energy",)), "a matsum has parts only; choose with --part"),
+        ({"csv": b"time,IE\n0,1\n"}, Selection(parts=("7",)), "a table has no parts; choose its columns with --energy"),
+        ({"radioss-th": bytes(t01(2, []).data)}, Selection(parts=("7",)), "no parts with histories of their own"),
+        ({"glstat": GLSTAT, "matsum": MATSUM}, Selection(energy=("inernal energy",)), "did you mean 'internal energy'"),
+        ({"glstat": GLSTAT}, Selection(energy=("time step", "Time Step")), "an energy is asked for twice"),
+        (
+            {"glstat": GLSTAT.replace(b" internal energy", b" infernal energy")},
+            Selection(),
+            "glstat: no internal energy; choose with --energy: time step",
+        ),
+    ],
+)
+def test_what_is_not_there_is_refused_with_what_there_is(
+    files: Mapping[str, bytes], selection: Selection, reason: str
+) -> None:
+    with pytest.raises(FormatError, match=reason):
+        opened(files, selection).history(selection)
+
+
+def test_times_at_random_are_refused_in_every_format(tmp_path: Path) -> None:
+    file = tmp_path / "history"
+    for content in (glstat_text([5, 1, 4, 2, 3], np.ones(5)), matsum_text([5, 1, 4, 2, 3], [7], np.ones((5, 1)))):
+        file.write_bytes(content)
+        with pytest.raises(FormatError, match="time steps back at 2 of 4 states"):
+            open_run([str(file)]).history(Selection())
+
+
+def test_a_time_column_is_no_choice_where_there_is_one_only(tmp_path: Path) -> None:
+    file = tmp_path / "history"
+    file.write_bytes(GLSTAT)
+    assert open_run([str(file)], Selection(time="Time")).history(Selection()).time.tolist() == TIMES.tolist()
+    with pytest.raises(FormatError, match="no time 'cycle' in glstat, the time is 'time'; leave --time out"):
+        open_run([str(file)], Selection(time="cycle"))
+
+
+def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
+    """No states, and curves of which none is the one that is meant."""
+    empty = survey(run_of(glstat, HEAD), Selection())
+    assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (0, None, None, ())
+    curves = survey(run_of(csv_table, "2\n1 'a IE'\n0,1\n1,2\n2 'b IE'\n0,1\n2,3\n3,4\n"), Selection())
+    assert (curves.states, curves.channels) == (None, ("a IE", "b IE"))
+    assert "2 curves are named like an internal energy; choose with --energy: 1 'a IE', 2 'b IE'" in curves.notes[0]
+    doubtful = opened({"glstat": GLSTAT, "matsum": matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))})
+    assert "are they of one run?" in survey(doubtful, Selection()).notes[0]
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7, 0.999])
+def test_packed_data_that_ends_early_is_read_as_far_as_it_goes(tmp_path: Path, share: float) -> None:
+    whole = (SAMPLES / "energy.glstat").read_bytes()
+    packed = gzip.compress(whole)
+    file = tmp_path / "glstat.gz"
+    file.write_bytes(packed[: int(share * len(packed))])
+    history, full = read_history([str(file)]), read_history([str(SAMPLES / "energy.glstat")])
+    assert not history.complete
+    assert "ends early" in history.notes[0]
+    assert 0 < history.time.size <= full.time.size
+    assert history.energy.tolist() == full.energy[: history.time.size].tolist()
+
+
+def test_a_long_gap_between_legs_is_told() -> None:
+    legs = [str(shared(f"openradioss/rollover_r100_{leg}.gz")) for leg in ("T01", "T03")]
+    assert any("no states between 0.0999564 and 0.370008" in note for note in open_run(legs).history(Selection()).notes)

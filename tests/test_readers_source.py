@@ -1,0 +1,113 @@
+"""Where the bytes come from: files, folders, globs, gzip and standard input, for all formats."""
+
+from __future__ import annotations
+
+import gzip
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.errors import FormatError
+from d2rpick.readers import READERS, Selection, open_run, read_history
+from d2rpick.readers.source import expand
+from tests.hdf5_files import plain, written
+from tests.made_binout import binout
+from tests.made_t01 import t01
+from tests.text_files import glstat_text, matsum_text
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+TIMES = [0.125, 0.25, 0.375]
+CONTENTS = {
+    "binout": bytes(binout([1, 2, 3]).data),
+    "radioss-th": bytes(t01(3).data),
+    "glstat": glstat_text(TIMES, [1, 2, 3]),
+    "matsum": matsum_text(TIMES, [7, 3], np.ones((3, 2))),
+    "hdf5": written(plain).getvalue(),
+    "csv": b"time,IE\n0,1\n1,2\n",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def names(*files: str) -> Sequence[str]:
+    for file in files:
+        Path(file).parent.mkdir(exist_ok=True)
+        Path(file).write_bytes(b"x")
+    return files
+
+
+def test_there_is_an_example_of_each_format() -> None:
+    assert list(CONTENTS) == list(READERS)
+
+
+@pytest.mark.parametrize("kind", CONTENTS)
+def test_every_format_is_read_by_its_content_from_a_file_gzip_and_standard_input(
+    kind: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = CONTENTS[kind]
+    Path("plain").write_bytes(content)
+    Path("packed").write_bytes(gzip.compress(content))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(content)))
+    histories = [read_history([name]) for name in ("plain", "packed", "-")]
+    assert {history.format for history in histories} == {kind}
+    for history in histories:
+        assert history.time.tolist() == histories[0].time.tolist()
+        assert history.energy.tolist() == histories[0].energy.tolist()
+    assert read_history([str(folder / "plain")], input_format=kind).energy.tolist() == histories[0].energy.tolist()
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_folder_holds_the_databases_of_one_run() -> None:
+    run = names("run/binout0000", "run/binout0000%001", "run/binout0004", "run/GLSTAT", "run/matsum.gz")
+    names("run/d3plot", "run/messag", "run/glstat.txt", "run/nodout", "run/binout.log")
+    assert expand(["run"]) == tuple(sorted(run))
+    legs = names("rad/box_T01", "rad/box_T02.gz", "rad/box_T03")
+    names("rad/box_0001.out", "rad/box_T01.csv")
+    assert expand(["rad", "run/GLSTAT", "rad/box_T01"]) == (*legs, "run/GLSTAT")
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_glob_takes_what_has_such_a_name() -> None:
+    files = names("leg1/binout", "leg2/binout")
+    assert expand(["leg*/binout"]) == files
+    assert expand(["leg[2-9]/*"]) == files[1:]
+    with pytest.raises(FormatError, match=r"leg\*/glstat: no file has such a name"):
+        expand(["leg*/glstat"])
+    names("run[1]")
+    assert expand(["run[1]"]) == ("run[1]",)  # a file is a file, whatever its name
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    ("files", "reason"),
+    [
+        (("run/aT01", "run/bT01", "run/bT02"), r"run: this folder holds several runs \(aT01, bT01\)"),
+        (("run/aT01", "run/binout"), r"several runs \(aT01, one of LS-DYNA\)"),
+        (("run/d3plot",), "run: no glstat, matsum, binout or T01 in this folder; name the file"),
+    ],
+)
+def test_a_folder_of_several_runs_or_none_is_refused(files: Sequence[str], reason: str) -> None:
+    names(*files)
+    with pytest.raises(FormatError, match=reason):
+        expand(["run"])
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_folder_is_read_as_one_run() -> None:
+    for name in ("binout", "glstat", "matsum"):
+        Path(name).write_bytes(CONTENTS[name])
+    run = open_run(["."])
+    assert run.sources == ("binout", "glstat", "matsum")
+    assert run.notes == ()
+    history = run.history(Selection())
+    assert (history.format, history.channel) == ("binout + glstat + matsum", "internal_energy")
+    assert history.time.tolist() == TIMES

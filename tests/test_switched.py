@@ -1,0 +1,321 @@
+"""Finished switched runs held against their reference: computed by a solver, and by the closed form."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from d2rpick.errors import RangeError
+from d2rpick.history import History, Track
+from d2rpick.switched import MOST_MOMENTUM_ERROR, Comparison, compare
+from tests.command import OSCILLATOR, answer, run
+from tests.shared import shared
+from tests.test_output import check_by_schema
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from d2rpick.history import Samples
+
+TR, TD = 0.0135867, 0.0687534
+ROLLOVER = ("verify", "--tr", "0.1", "--td", "0.37", "--part", "box")
+
+
+def scan(run_name: str) -> dict[str, float]:
+    """Row of the table in which the solver's runs were evaluated when they were computed."""
+    table = np.genfromtxt(shared("openradioss/rollover_scan.csv"), delimiter=",", names=True, dtype=None)
+    assert table.dtype.names
+    (row,) = table[table["run"].astype(str) == run_name]
+    return {name: float(row[name]) for name in table.dtype.names[1:]}
+
+
+def rollover(*options: str) -> dict[str, Any]:
+    """Answer of verify for the rollover switched at 100 ms, its three legs given by a glob."""
+    reference, legs = (shared(f"openradioss/rollover_{name}") for name in ("referenceT01.gz", "r100_T01.gz"))
+    return answer(*ROLLOVER, str(reference), "--switched", str(legs).replace("T01", "T0*"), *options)
+
+
+# A rollover, computed by a solver whose rigid parts report neither kinetic energy nor momentum.
+
+
+def test_a_switched_rollover_flies_as_its_reference_with_less_vibration() -> None:
+    found, expected = rollover(), scan("r100")
+    check_by_schema(found)
+    switched = found["switched"]
+    assert [name[-6:] for name in switched["source"]] == ["T01.gz", "T02.gz", "T03.gz"]
+    assert switched["energy_frozen"] == pytest.approx(expected["IEfrozen_J"], rel=1e-5)
+    assert switched["energy_td"] == pytest.approx(1.7492, abs=1e-4)
+    assert switched["energy_ratio"] == switched["energy_frozen"] / switched["energy_td"]
+    # that table's means reach to 380 ms and were taken of every tenth state; contact is at 381.9 ms
+    assert switched["mean_after"] == pytest.approx(expected["IEmean_td_to_380ms_J"], rel=0.01)
+    assert switched["mean_after_reference"] == pytest.approx(expected["IEmean_ref_J"], rel=0.06)
+    assert switched["spread_after"] < switched["spread_after_reference"]
+    assert switched["end"] == pytest.approx(0.3819, abs=1e-4)
+    assert switched["momentum_error"] < 1e-6
+    # of the centre at td, in mm; the largest distance afterwards is no smaller
+    at_td = np.hypot(expected["dx_td_mm"], expected["dz_td_mm"]) / 1e3
+    assert switched["displacement"] == pytest.approx(at_td, rel=0.15)
+    assert (found["verified"], switched["notes"]) == (True, [])
+
+
+def test_the_table_sets_the_switched_run_beside_the_reference() -> None:
+    reference, legs = (str(shared(f"openradioss/rollover_{name}")) for name in ("referenceT01.gz", "r100_T01.gz"))
+    result = run(*ROLLOVER, reference, "--switched", legs.replace("T01", "T0*"))
+    lines = [line.split() for line in result.stdout.splitlines()]
+    assert ["energy", "locked", "in,", "at", "td", "1.45057", "1.74924"] in lines
+    assert ["largest", "displacement", "after", "td", "0.000135"] in lines
+    assert result.exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("pair", "said"),
+    [
+        (("0.2", "0.37"), "is rigid from 0.1 to 0.370008 by its energy, not from tr 0.2"),
+        (("0.1", "0.36"), "not from tr 0.1 to td 0.36"),
+        (("0.2", "0.37"), "is not that of the reference at tr 0.2"),
+    ],
+)
+def test_a_run_that_was_switched_at_other_times_is_an_objection(pair: tuple[str, str], said: str) -> None:
+    reference, legs = (str(shared(f"openradioss/rollover_{name}")) for name in ("referenceT01.gz", "r100_T01.gz"))
+    options = ("verify", "--tr", pair[0], "--td", pair[1], "--part", "box", reference, "--switched")
+    found = answer(*options, legs.replace("T01", "T0*"))
+    assert found["verified"] is False
+    assert any(said in reason for reason in found["reasons"])
+
+
+def test_a_run_that_was_never_rigid_is_an_objection() -> None:
+    reference = str(shared("openradioss/rollover_referenceT01.gz"))
+    found = answer(*ROLLOVER, reference, "--switched", reference)
+    assert found["verified"] is False
+
+
+def test_the_energy_that_was_locked_in_is_judged() -> None:
+    reference, other = (str(shared(f"openradioss/rollover_{name}.csv")) for name in ("ref", "r20"))
+    found = answer("verify", "--tr", "0.02", "--td", "0.37", "--energy", "boxIE_J", reference, "--switched", other)
+    assert found["verified"] is False
+    assert any("locked in, 11.1" in reason for reason in found["reasons"])
+
+
+def test_all_files_behind_the_option_are_of_the_switched_run() -> None:
+    reference, legs = (str(shared(f"openradioss/rollover_{name}")) for name in ("referenceT01.gz", "r100_T01.gz"))
+    spread = [legs.replace("T01", leg) for leg in ("T01", "T02", "T03")]
+    found = answer(*ROLLOVER, reference, "--switched", *spread)
+    assert found["switched"]["source"] == spread
+    assert found["history"]["source"] == [reference]
+
+
+# The floating oscillator of the paper, computed by a solver, as tables without momentum.
+
+
+@pytest.mark.parametrize(
+    ("name", "tr", "td", "frozen"),
+    [("13_64", 0.013, 0.064, 1.143063), ("6_80", 0.006, 0.080, 140.262), ("13p587_68p753", TR, TD, 6.07041)],
+)
+def test_a_switched_table_is_compared_by_its_energy(name: str, tr: float, td: float, frozen: float) -> None:
+    reference, other = (shared(f"openradioss/oscillator_{which}.csv") for which in ("ref", f"d2r_{name}"))
+    found = answer(
+        *("verify", "--tr", str(tr), "--td", str(td), "--energy", "IE_J"), str(reference), "--switched", str(other)
+    )
+    check_by_schema(found)
+    switched = found["switched"]
+    assert switched["energy_frozen"] == pytest.approx(frozen, rel=1e-9)
+    assert (switched["momentum_error"], switched["displacement"]) == (None, None)
+    means = []
+    for path in (other, reference):
+        table = np.genfromtxt(path, delimiter=",", names=True)
+        means.append(table["IE_J"][(table["time_s"] >= td) & (table["time_s"] <= switched["end"])].mean())
+    assert [switched["mean_after"], switched["mean_after_reference"]] == pytest.approx(means, rel=1e-12)
+    assert switched["notes"] == []
+
+
+# The closed form, written as a solver would.
+
+
+@pytest.fixture
+def replayed(tmp_path: Path) -> Callable[..., str]:
+    """Write a replay as a matsum: with these options, and with a change of its text."""
+
+    def write(name: str, *options: str, change: Callable[[str], str] = str, v0: str = "6") -> str:
+        file = tmp_path / f"{name}.matsum"
+        written = run("replay", *OSCILLATOR[:-1], v0, "--t-end", "0.15", "--dt", "1e-4", *options, "-o", str(file))
+        assert written.exit_code == 0, written.stderr
+        file.write_text(change(file.read_text()))
+        return str(file)
+
+    return write
+
+
+def while_rigid(text: str, pattern: str, number: float) -> str:
+    """Write ``number`` for what matches in the states between the switches."""
+    head, *states = text.split("\n time =")
+    rigid = re.compile(rf"({pattern}=) *[-+.\dE]+")
+    new = [rigid.sub(rf"\g<1>{number:13.4E}", s) if TR < float(s.split()[0]) < TD + 1e-4 else s for s in states]
+    assert new != states
+    return "\n time =".join([head, *new])
+
+
+def verified(reference: str, switched: str, *options: str) -> dict[str, Any]:
+    found = answer("verify", "--tr", str(TR), "--td", str(TD), reference, "--switched", switched, *options)
+    check_by_schema(found)
+    return found
+
+
+SWITCHES = ("--tr", str(TR), "--td", str(TD))
+
+
+def test_a_right_switched_run_verifies_and_shows_what_was_locked_in(replayed: Callable[..., str]) -> None:
+    found = verified(replayed("reference"), replayed("switched", *SWITCHES), "--part", "spring")
+    switched = found["switched"]
+    assert found["flight"]["source"] == "momentum"
+    assert switched["energy_ratio"] == pytest.approx(1, abs=1e-3)
+    assert switched["mean_after"] == pytest.approx(switched["mean_after_reference"], rel=1e-3)
+    assert switched["spread_after"] == pytest.approx(switched["spread_after_reference"], rel=1e-3)
+    assert switched["momentum_error"] < 5e-4
+    assert (switched["displacement"], switched["notes"]) == (None, [])
+    assert found["verified"]
+
+
+def test_another_motion_of_the_switched_run_is_an_objection(replayed: Callable[..., str]) -> None:
+    reference, slower = replayed("reference"), replayed("slower", *SWITCHES, v0="5")
+    args = ("verify", *SWITCHES, reference, "--switched", slower)
+    assert run(*args).exit_code == 1
+    assert run(*args, "--exit-zero").exit_code == 0
+    found = verified(reference, slower)
+    assert not found["verified"]
+    assert found["tr_ok"]
+    assert any("its motion is another one" in reason for reason in found["reasons"])
+    assert "not verified" in run(*args).stdout
+
+
+def test_rigid_parts_that_report_no_motion_are_no_finding(replayed: Callable[..., str]) -> None:
+    silent = replayed("silent", *SWITCHES, change=lambda text: while_rigid(text, "(?:z-mom|kinen)", 0.0))
+    found = verified(replayed("reference"), silent)
+    assert (found["verified"], found["switched"]["notes"]) == (True, [])
+    assert found["switched"]["momentum_error"] < 5e-4
+
+
+def test_a_wrong_energy_while_rigid_is_a_note_and_not_what_came_back(replayed: Callable[..., str]) -> None:
+    right = replayed("right", *SWITCHES)
+    wrong = replayed("wrong", *SWITCHES, change=lambda text: while_rigid(text, "inten", 55.5))
+    reference = replayed("reference")
+    found, expected = (verified(reference, which, "--part", "3") for which in (wrong, right))
+    assert found["switched"]["energy_frozen"] == pytest.approx(expected["switched"]["energy_frozen"], rel=2e-3)
+    (note,) = found["switched"]["notes"]
+    assert "while rigid the run reports an energy of 55.5" in note
+    assert found["verified"]
+    assert f"note: {note}" in run("verify", *SWITCHES, "--part", "3", reference, "--switched", wrong).stdout
+
+
+def test_what_a_reader_has_to_say_of_the_switched_run_is_not_lost(replayed: Callable[..., str]) -> None:
+    cut = replayed("cut", *SWITCHES, change=lambda text: text[:-200])
+    found = verified(replayed("reference"), cut, "--part", "3")
+    assert any("stops inside" in note for note in found["switched"]["notes"])
+    assert found["history"]["notes"] == []
+
+
+def test_csv_and_markdown_hold_the_comparison_too(replayed: Callable[..., str]) -> None:
+    args = ("verify", *SWITCHES, replayed("reference"), "--switched", replayed("switched", *SWITCHES))
+    switched = answer(*args)["switched"]
+    head, row = (line.split(",") for line in run(*args, "-f", "csv").stdout.splitlines())
+    cells = dict(zip(head, row, strict=True))
+    assert float(cells["switched_energy_frozen"]) == switched["energy_frozen"]
+    assert cells["switched_displacement"] == ""
+    assert f"| switched_mean_after | {switched['mean_after']:.6g} |" in run(*args, "-f", "markdown").stdout
+    assert "switched" not in run(*args[:-2], "-f", "csv").stdout
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [("", "the file is empty"), ("time,energy\n0,1\n0.01,1\n", "energy"), ("a,b\n1,x\n", "number")],
+)
+def test_what_is_wrong_with_the_switched_file_names_it(
+    content: str, says: str, tmp_path: Path, replayed: Callable[..., str]
+) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text(content)
+    result = run("verify", *SWITCHES, "--part", "3", replayed("reference"), "--switched", str(bad))
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith("d2rpick: ")
+    assert "bad.csv" in result.stderr
+    assert says in result.stderr or "no parts" in result.stderr
+
+
+def test_a_switched_run_that_lacks_a_part_that_flies_has_no_momentum_to_compare(replayed: Callable[..., str]) -> None:
+    def without_frame(text: str) -> str:
+        pieces = re.split(r"(?= mat\.#=)", text.replace("        1     frame", "        2     frame"))
+        return "".join(piece for piece in pieces if not piece.startswith(" mat.#=    1"))
+
+    switched = replayed("switched", *SWITCHES, change=without_frame)
+    found = verified(replayed("reference"), switched, "--part", "3")
+    assert found["switched"]["momentum_error"] is None
+    assert found["verified"]
+
+
+# The comparison itself.
+
+TIME: Samples = np.linspace(0.0, 1.0, 101)
+NONE = (None, None)
+
+
+def history(energy: Samples, time: Samples = TIME, name: str = "run") -> History:
+    return History(time, energy, source=(name,), format="csv", channel="E")
+
+
+def held(momenta: tuple[Track | None, Track | None], td: float = 0.5) -> Comparison:
+    """Compare two runs of one energy by their momenta."""
+    return compare(history(1 + TIME), history(1 + TIME), (0.1, td), np.inf, 0.2, momenta, NONE)
+
+
+def track(values: Samples) -> Track:
+    return Track(TIME, np.stack([values, 0 * TIME, 0 * TIME], axis=1))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.04, 0.06, 2.0])
+def test_the_momentum_error_is_relative_to_the_largest_momentum_of_the_reference_after_td(share: float) -> None:
+    reference = track(np.where(TIME < 0.3, 20.0, 10.0))
+    found = held((reference, track(reference.values[:, 0] + 10 * share * TIME)))
+    assert found.momentum_error == pytest.approx(share)
+    assert any("momentum" in one for one in found.objections) == (share > MOST_MOMENTUM_ERROR)
+
+
+def test_what_has_come_to_rest_is_not_off_by_its_noise() -> None:
+    reference = track(np.where(TIME < 0.3, 20.0, 1e-9))
+    found = held((reference, track(3 * reference.values[:, 0])))
+    assert not any("momentum" in one for one in found.objections)
+
+
+def test_before_td_and_at_its_first_state_the_momentum_does_not_count() -> None:
+    silent = np.where(TIME <= 0.5, 0.0, 10.0)
+    assert held((track(0 * TIME + 10), track(silent))).momentum_error == 0
+
+
+@pytest.mark.parametrize("momenta", [NONE, (track(TIME), None), (None, track(TIME)), (track(0 * TIME), track(TIME))])
+def test_a_momentum_that_one_run_does_not_have_is_no_error(momenta: tuple[Track | None, Track | None]) -> None:
+    found = held(momenta)
+    assert found.momentum_error is None
+    assert not any("momentum" in one for one in found.objections)
+
+
+def test_displacement_is_the_largest_distance_of_the_centres() -> None:
+    places = np.stack([TIME, TIME**2, 0 * TIME], axis=1)
+    moved = places + np.outer(TIME, [0.03, 0.0, 0.04])
+    found = compare(
+        history(1 + TIME), history(1 + TIME), (0.1, 0.5), 0.8, 0.2, NONE, (Track(TIME, places), Track(TIME, moved))
+    )
+    assert found.displacement == pytest.approx(0.8 * 0.05)
+
+
+def test_a_reference_without_energy_at_td_has_no_ratio() -> None:
+    assert compare(history(0 * TIME), history(1 + TIME), (0.1, 0.5), 1.0, 0.2, NONE, NONE).energy_ratio is None
+
+
+@pytest.mark.parametrize("short", ["reference", "switched"])
+def test_a_run_that_ends_at_td_is_named(short: str) -> None:
+    runs = {name: history(1 + TIME, name=name) for name in ("reference", "switched")}
+    runs[short] = history(1 + TIME[:52], TIME[:52], short)
+    with pytest.raises(RangeError, match=rf"^{short}: fewer than 3 states from td 0.5 to 0.51; "):
+        compare(runs["reference"], runs["switched"], (0.1, 0.5), np.inf, 0.2, NONE, NONE)
