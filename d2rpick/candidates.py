@@ -127,7 +127,8 @@ def _from_mode(situation: Situation) -> list[Found]:
     before = start - _ZERO / mode.fastest  # the first sample counts like any other
     times = np.maximum(mode.level_crossings(td, before), start)
     slopes = mode.energy_slopes(times)[0]
-    turns = np.array([t for t in np.maximum(mode.extrema(before, td), start) if situation.measured(t)])
+    after = td - _ZERO / mode.fastest  # td may be an extremum itself
+    turns = np.array([t for t in np.maximum(mode.extrema(before, after), start) if situation.measured(t)])
     near = measures.lock_in_error(situation.vibration or mode, turns, td) <= situation.settings.tolerance
     return [
         *(Found(t, "crossing", bool(up > 0)) for t, up in zip(times.tolist(), slopes, strict=True)),
