@@ -135,18 +135,14 @@ def _page(answer: Suggestion, run: Run, command: tuple[str, ...]) -> str:
 
 def _card(answer: Suggestion, output: Output) -> bool:
     """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
-    from d2rpick.cards import ls_dyna
     from d2rpick.cli.card import all_cautions
-    from d2rpick.judged_card import judged
+    from d2rpick.judged_card import of_suggestion
 
-    pair, history = answer.recommended, answer.situation.history
-    if pair is None:
+    found = of_suggestion(answer)
+    if found is None:
         output.content(b"")
         return False
-    ids = [part.id for part in history.parts or ()]
-    card, verdict = judged(
-        lambda remarks: ls_dyna(pair.tr, pair.td, ids, remarks=remarks), history, answer.situation.settings
-    )
+    card, verdict = found
     said = set(answer.cautions)
     output.notes(card.notes, [caution for caution in all_cautions(verdict) if caution not in said])
     output.content(card.text.encode())

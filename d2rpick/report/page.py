@@ -7,6 +7,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from d2rpick import __version__
+from d2rpick.judged_card import of_suggestion
 from d2rpick.report.health import measures_of
 from d2rpick.report.html import Markup, join, pairs, table, tag
 from d2rpick.report.situation import heading
@@ -166,10 +167,19 @@ def _health(answer: Suggestion) -> Iterator[Markup]:
 
 
 def _card(answer: Suggestion) -> Iterator[Markup]:
-    """Give the times for the solver's input."""
-    if answer.recommended:
-        pair = answer.recommended
-        yield _section("For the solver's input", tag("pre", f"rigid at       {pair.tr!r}\ndeformable at  {pair.td!r}"))
+    """Give the solver's input: LS-DYNA's card where the parts are known, else the command that prints one."""
+    pair, history = answer.recommended, answer.situation.history
+    if pair is None:
+        return
+    found = None if history.format.startswith("radioss") else of_suggestion(answer)
+    if found:
+        yield _section("For the solver's input", tag("pre", found[0].text))
+        return
+    solver = "--solver radioss --node IDS" if history.format.startswith("radioss") else "--part IDS"
+    command = f"d2rpick card --tr {pair.tr!r} --td {pair.td!r} {solver} --history {shlex.quote(history.source[0])}"
+    yield _section(
+        "For the solver's input", tag("p", "Printed, and judged once more as printed, by"), tag("pre", command)
+    )
 
 
 def _resource(name: str) -> Markup:
