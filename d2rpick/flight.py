@@ -46,12 +46,14 @@ class Flight:
 
     ``source`` tells how the start was found: "given", "momentum", "oscillator", "energy", or None.  ``parts`` are
     those that were seen to fly together, None where the momentum did not tell, or told it of the whole model.
+    ``damping`` is alpha of their momentum [1/time], 0 where it did not tell.
     """
 
     start: float | None
     end: float | None
     source: str | None
     parts: tuple[Part, ...] | None = None
+    damping: float = 0.0
 
 
 class Span(NamedTuple):

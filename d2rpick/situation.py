@@ -290,7 +290,7 @@ def _flight(history: History, td: float, after: float | None, seen: FreeFlight |
     if seen:
         end = seen.end if seen.end_seen else None
         start, source = (seen.start, "momentum") if after is None else (after, "given")
-        return Flight(start, end, source, seen.parts)
+        return Flight(start, end, source, seen.parts, seen.damping)
     end = span.end if span and span.end < history.time[-1] else None
     if after is not None:
         return Flight(after, end, "given")

@@ -72,8 +72,12 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     expected = answer.expected
     if expected:
         at_level = f"{expected.ratio_at_level:.0%} with the energy of td"
-        own = "" if expected.ratio is None else f"about {expected.ratio:.0%} of the reference's, "
-        lines.append(("mean after", f"{own}{at_level}; mean in flight {expected.mean_energy:.6g} (estimate)"))
+        own = (
+            ""
+            if expected.ratio is None
+            else f"{expected.ratio:.0%} of the reference's ({expected.ratio_low:.0%} if all of it vibrates), "
+        )
+        lines.append(("mean after", f"about {own}{at_level}; mean in flight {expected.mean_energy:.6g}"))
     return lines
 
 
