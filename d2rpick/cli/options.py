@@ -18,12 +18,12 @@ Decorated = Any  # a command function; click's decorators do not say more
 
 
 class Number(click.ParamType[float]):
-    """A finite number with a point, not below ``low`` (or above it, when ``above``)."""
+    """A finite number with a point, not below ``low`` (or above it, when ``above``) and not above ``high``."""
 
     name = "number"
 
-    def __init__(self, low: float = -math.inf, *, above: bool = False) -> None:
-        self.low, self.above = low, above
+    def __init__(self, low: float = -math.inf, high: float = math.inf, *, above: bool = False) -> None:
+        self.low, self.high, self.above = low, high, above
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Read a number or fail with what was found and what was expected."""
@@ -39,6 +39,8 @@ class Number(click.ParamType[float]):
                 param,
                 ctx,
             )
+        if number > self.high:
+            self.fail(f"{value} was found, a number of at most {self.high:g} was expected", param, ctx)
         return number
 
 
@@ -56,6 +58,7 @@ NAMES = Names()
 TIME = Number()
 POSITIVE = Number(0.0, above=True)
 NOT_NEGATIVE = Number(0.0)
+FRACTION = Number(0.0, high=1.0)
 
 
 def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
@@ -167,6 +170,13 @@ def choosing_options(function: Decorated) -> Decorated:
         click.option("--max-residual", type=NOT_NEGATIVE, metavar="R", help="Object to a pair with a larger residual."),
         oscillator_options(required=False),
         click.option("--fit-window", type=(TIME, TIME), metavar="LO HI", help="Identify the oscillator here only."),
+        click.option(
+            "--cost-share", type=FRACTION, metavar="C",
+            help="Share of the cost of a step that the switched parts' elements take; tells the run time.",
+        ),
+        click.option(
+            "--step-ratio", type=POSITIVE, metavar="N", help="Time step while rigid over that before.  [default: 1]",
+        ),
         click.option("--no-verify", is_flag=True, help="Judge by the energy level alone, without an oscillator."),
         click.option("--plot", metavar="FILE", help="Draw energy and motion to FILE (png, svg, pdf)."),
     )(function)  # fmt: skip
@@ -231,6 +241,8 @@ def settings(options: dict[str, Any]) -> Settings:
     chosen = [name for name, value in ways.items() if value]
     if len(chosen) > 1:
         raise click.UsageError(f"{chosen[0]} and {chosen[1]} exclude each other")
+    if options["step_ratio"] is not None and options["cost_share"] is None:
+        raise click.UsageError("--step-ratio needs --cost-share too: together they tell the run time")
     if window and not window[0] < window[1]:
         raise click.UsageError(f"--fit-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
     return Settings(
@@ -242,6 +254,8 @@ def settings(options: dict[str, Any]) -> Settings:
         oscillator=to_mode(given, options["v0"]) if given else None,
         fit_window=window,
         replay=not options["no_verify"],
+        cost_share=options["cost_share"],
+        step_ratio=options["step_ratio"] or 1.0,
     )
 
 
