@@ -106,13 +106,14 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
 def _answer(history: History, td: float | None, window: tuple[float, float] | None, settings: Settings) -> Suggestion:
     """Choose tr for ``td``, or both in ``window``; UsageError with what the record tells when neither is given."""
     from d2rpick.choice import suggest
+
+    if td is not None:
+        return suggest(history, td, settings)
     from d2rpick.window import advice, suggest_in_window
 
-    if window:
-        return suggest_in_window(history, window, settings)
-    if td is None:
+    if window is None:
         raise click.UsageError(advice(history, settings))
-    return suggest(history, td, settings)
+    return suggest_in_window(history, window, settings)
 
 
 def _page(answer: Suggestion, run: Run, command: tuple[str, ...]) -> str:

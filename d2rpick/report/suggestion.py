@@ -53,10 +53,10 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
             "td": answer.situation.td,
             "td_window": list(answer.td_window) if answer.td_window else None,
             **mechanics(answer.situation),
-            "candidates": [asdict(candidate) for candidate in answer.candidates],
+            "candidates": [{**asdict(c), "parts": [part._asdict() for part in c.parts]} for c in answer.candidates],
             "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
             "health": asdict(answer.health) if answer.health else None,
-            "expected": asdict(answer.expected) if answer.expected else None,
+            "expected": answer.expected._asdict() if answer.expected else None,
             "better_td": {"td": better.td, "tr": better.tr, "residual": better.residual} if better else None,
         }
     )
