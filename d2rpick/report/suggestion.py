@@ -38,10 +38,11 @@ def as_markdown(answer: Suggestion, limit: int) -> str:
 
 
 def as_csv(answer: Suggestion) -> str:
-    """All candidates, a column for each key of the JSON output but ``parts``."""
+    """All candidates, a column for each key of the JSON output but ``parts``, and the td they belong to."""
     names = [field.name for field in fields(Candidate) if field.name not in ("parts", "notes")]
-    cells = ([getattr(c, n) for n in names] + ["; ".join(c.notes)] for c in answer.candidates)
-    return tables.as_csv([*names, "notes"], cells).rstrip("\n")
+    td = answer.situation.td
+    cells = ([*(getattr(c, n) for n in names), td, "; ".join(c.notes)] for c in answer.candidates)
+    return tables.as_csv([*names, "td", "notes"], cells).rstrip("\n")
 
 
 def as_json(answer: Suggestion, command: Sequence[str]) -> str:
