@@ -151,7 +151,7 @@ def test_the_command_line_offers_the_formats_there_are() -> None:
     assert tuple(TRAJECTORY_WRITERS) == replay.FORMATS
 
 
-SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check")]
+SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check", "reproduce")]
 
 
 @pytest.mark.parametrize("name", ["py.typed", *SCHEMAS])
