@@ -1,5 +1,6 @@
 """The command line as a program: ``d2rpick`` and ``python -m d2rpick``."""
 
+import gc
 import os
 
 
@@ -7,9 +8,11 @@ def main() -> None:
     """Run the command line.
 
     One thread for linear algebra, unless the environment says otherwise: the systems solved here are small, and
-    starting the others costs a quarter of numpy's import.
+    starting the others costs a quarter of numpy's import.  Garbage is looked for less often: of what imports make
+    none is garbage, and looking for it costs a thirtieth of a run on an ordinary file.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    gc.set_threshold(100_000)
     from d2rpick.cli import d2rpick
 
     d2rpick()

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,8 +15,7 @@ POOR_KINETIC_SHARE = 0.5
 _NOTABLE_PLASTIC = 0.05
 
 
-@dataclass(frozen=True)
-class Caution:
+class Caution(NamedTuple):
     """Something the user should know: a stable ``code`` for scripts, and a sentence."""
 
     code: str

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.candidates import Candidate, Found, find_candidates, judge
 from d2rpick.cautions import POOR_KINETIC_SHARE, Caution, cautions_of
 from d2rpick.errors import RangeError
 from d2rpick.expectation import Expectation, expectation
-from d2rpick.health import Health, assess, cautions_of_health
 from d2rpick.situation import Settings, Situation, examine
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from d2rpick.balance import Balance
+    from d2rpick.health import Health
     from d2rpick.history import History
     from d2rpick.switched import Comparison
 
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 EQUALLY_GOOD = 0.02
 
 
-@dataclass(frozen=True)
-class Pair:
+class Pair(NamedTuple):
     """A recommended (tr, td) [time] with its residual, None on basis "energy"."""
 
     tr: float
@@ -32,8 +31,7 @@ class Pair:
     residual: float | None
 
 
-@dataclass(frozen=True)
-class Suggestion:
+class Suggestion(NamedTuple):
     """Answer of ``suggest``: ranked candidates, the recommended pair, a better td, and what to be aware of.
 
     ``td_window`` is where td was chosen, if it was; ``expected`` what the energy alone tells of the time after td.
@@ -49,8 +47,7 @@ class Suggestion:
     expected: Expectation | None = None
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(NamedTuple):
     """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
 
     ``tr_ok`` and ``td_ok`` are None where the record does not tell.
@@ -114,18 +111,19 @@ def with_health(answer: Suggestion, balance: Balance) -> Suggestion:
 
     ``balance`` is that of the reference run up to td: what comes later does not matter for the choice.
     """
+    from d2rpick.health import assess, cautions_of_health
+
     history, td = answer.situation.history, answer.situation.td
     start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
     health = assess(balance, window, locked)
-    return replace(answer, health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
+    return answer._replace(health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
 
 
 def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:
     """Add what a finished switched run shows; a wrong motion of it overrules the verdict."""
-    return replace(
-        verdict,
+    return verdict._replace(
         switched=comparison,
         verified=verdict.verified and not comparison.objections,
         reasons=verdict.reasons + comparison.objections,

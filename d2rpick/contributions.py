@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick import measures
 
@@ -16,8 +15,7 @@ if TYPE_CHECKING:
 _MOST = 0.8
 
 
-@dataclass(frozen=True)
-class PartMatch:
+class PartMatch(NamedTuple):
     """One part: whether its deformation has the same sign at tr and td, and its share in the square of D.
 
     Both None where the part has no sign; ``reason`` says why.

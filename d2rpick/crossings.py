@@ -5,8 +5,7 @@ Between samples the energy is taken as linear: on piecewise linear data the answ
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,16 +13,14 @@ if TYPE_CHECKING:
     from d2rpick.history import Samples
 
 
-@dataclass(frozen=True)
-class Crossing:
+class Crossing(NamedTuple):
     """The energy passes a level at ``time`` [time], upwards when ``rising``."""
 
     time: float
     rising: bool
 
 
-@dataclass(frozen=True)
-class Extremum:
+class Extremum(NamedTuple):
     """The energy turns at ``time`` [time] with the value ``energy``; a ``peak`` or a valley."""
 
     time: float

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,8 +12,7 @@ if TYPE_CHECKING:
     from d2rpick.history import Samples
 
 
-@dataclass(frozen=True)
-class Envelope:
+class Envelope(NamedTuple):
     """An exponential that lies on the highest peaks of an energy: ``energy`` at time ``origin``, falling at ``rate``.
 
     The vibration energy V = E + T falls smoothly, as exp(-alpha t) where damping is proportional to mass, and E

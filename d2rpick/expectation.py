@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,8 +12,7 @@ if TYPE_CHECKING:
     from d2rpick.situation import Situation
 
 
-@dataclass(frozen=True)
-class Expectation:
+class Expectation(NamedTuple):
     r"""Estimates for a vibration of many modes; fields are the keys of the JSON output.
 
     Such a vibration shares its energy equally between internal and kinetic energy, and what is locked in above the

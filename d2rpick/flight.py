@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from d2rpick.crossings import find_crossings
-from d2rpick.history import Samples
-from d2rpick.identify import Identification, identify
+from d2rpick.identify import identify
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
-    from d2rpick.history import History, Part
+    from d2rpick.history import History, Part, Samples
+    from d2rpick.identify import Identification
+
+    Fitter = Callable[[Samples, Samples], Identification]
 
 # Where windows that are tried for an oscillator begin, as shares of what comes before td, and where they end, of what
 # comes after: by such steps one of them lies in any flight of some periods and fills most of it.
@@ -37,11 +37,7 @@ _MOST_REFITS = 8
 _BAND_RESERVE = 0.25
 
 
-Fitter = Callable[[Samples, Samples], Identification]
-
-
-@dataclass(frozen=True)
-class Flight:
+class Flight(NamedTuple):
     """Window of free flight [time]; ``start`` None when unknown, ``end`` None when no next contact was seen.
 
     ``source`` tells how the start was found: "given", "momentum", "oscillator", "energy", or None.  ``parts`` are
@@ -177,7 +173,7 @@ def _grow(
         least = max(_LEAST_PERIODS * 2 * np.pi / fit.mode.omega, _MOST * (window.end - window.start))
         if grown is None or grown.end - grown.start < least:
             reason = "the record soon leaves the oscillator that fits a part of it"
-            return None, replace(fit, describes_record=False, reason=reason)
+            return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
             return _cleared(history, grown, fit, bounds, fitter)
         span = grown

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from d2rpick.errors import HistoryError, RangeError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-Samples = NDArray[np.float64]
+    from numpy.typing import ArrayLike, NDArray
+
+# in quotes: numpy.typing costs start-up
+Samples: TypeAlias = "NDArray[np.float64]"
 
 
-@dataclass(frozen=True)
-class Precision:
+class Precision(NamedTuple):
     """How finely the numbers of a column were written.
 
     ``digits`` significant digits (17 restores every double), or, when ``decimals`` is given, a fixed
@@ -80,8 +81,7 @@ class Momenta:
         return sum(self.precision.quantum(float(value)) for value in largest) / 2
 
 
-@dataclass(frozen=True, eq=False)
-class Track:
+class Track(NamedTuple):
     """Vectors over time: ``time`` of shape (n,), ``values`` of shape (n, 3); a momentum, or the place of a part."""
 
     time: Samples

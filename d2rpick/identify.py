@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.fitting import VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, rates
-from d2rpick.fitting_several import fit_several
 from d2rpick.mode import Mode, energy_and_jacobian
-from d2rpick.modes import Modes, sum_and_jacobian
 
 if TYPE_CHECKING:
     from d2rpick.history import Samples
+    from d2rpick.modes import Modes
 
 # Thresholds of acceptance.  White noise may be large; what a true model must not leave over is structure, the
 # part of the misfit that neighbouring samples share.
@@ -41,8 +39,7 @@ _PERIODS_OF_SEVERAL: Final = 2.0
 _APART: Final = np.pi / 2
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(NamedTuple):
     """The mode that was fitted to an energy history, and whether it describes it.
 
     Parameters
@@ -153,6 +150,8 @@ def identify_several(time: Samples, energy: Samples) -> Identification:
     >>> found.describes_record, [f"{mode.omega:.6f}" for mode in found.mode.modes]
     (True, ['5.000000', '8.000000'])
     """
+    from d2rpick.fitting_several import fit_several
+
     lacking = _lacking(time, energy)
     if lacking:
         return _nothing(time, lacking)
@@ -185,7 +184,7 @@ def assess(mode: Mode, time: Samples, energy: Samples) -> Identification:
     parameters = np.array([mode.omega, mode.alpha, cosine, sine, mode.energy_plastic, mode.preload])
     held, follows = _judged(_one(parameters / record.units, WITH_PRELOAD, record), 0.0, record)
     reason = None if follows else held.reason
-    return replace(held, mode=mode, describes_record=follows, reason=reason, covariance=np.zeros((6, 6)))
+    return held._replace(mode=mode, describes_record=follows, reason=reason, covariance=np.zeros((6, 6)))
 
 
 class _Record(NamedTuple):
@@ -238,6 +237,8 @@ def _one(parameters: Samples, size: int, record: _Record) -> _Attempt:
 
 def _sum(parameters: Samples, record: _Record) -> _Attempt:
     """Fit of several modes."""
+    from d2rpick.modes import Modes, sum_and_jacobian
+
     fitted, jacobian = sum_and_jacobian(parameters, record.s)
     rate, root = record.units[1], record.units[2]
     count = parameters.size // 3

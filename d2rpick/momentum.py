@@ -7,8 +7,7 @@ attached to it and vibrates against it, so the set of parts that flies is looked
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -38,8 +37,7 @@ _LOOK_BACK, _LOOK_STATES = 0.1, 200
 _MOST_ATTACHED = 12
 
 
-@dataclass(frozen=True)
-class FreeFlight:
+class FreeFlight(NamedTuple):
     """Window [time] in which ``parts`` fly freely together; None for parts: the whole model.
 
     ``end_seen`` is False where the record ends while it still flies.  ``damping`` is alpha, by which the momentum
@@ -110,7 +108,7 @@ def all_flights(momenta: Momenta) -> tuple[FreeFlight, ...]:
         if not found or moment > found[-1].end:
             flight = flight_around(momenta, float(moment))
             if flight:  # the tolerance may let it begin some samples before the last one has ended
-                found.append(replace(flight, start=max(flight.start, found[-1].end)) if found else flight)
+                found.append(flight._replace(start=max(flight.start, found[-1].end)) if found else flight)
     return tuple(found)
 
 

@@ -13,14 +13,17 @@ from the frozen deformation with both masses at one speed.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from d2rpick.errors import RangeError
 
-Values = NDArray[np.float64]
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+# in quotes: numpy.typing costs start-up
+Values: TypeAlias = "NDArray[np.float64]"
 
 
 class State(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -108,8 +108,7 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
     return Mode(omega=omega, alpha=oscillator.alpha, cosine=0.0, sine=float(sine), origin=0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(NamedTuple):
     """Motion on an even grid of ``time`` (n,): ``state`` and both energies, arrays of the same shape."""
 
     time: Samples

@@ -10,18 +10,17 @@ import numpy as np
 
 from d2rpick import measures
 from d2rpick.crossings import find_extrema
-from d2rpick.envelope import upper_envelope
 from d2rpick.errors import RangeError
 from d2rpick.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
 from d2rpick.identify import Identification, assess, identify, identify_several
-from d2rpick.modes import Modes
-from d2rpick.momentum import FreeFlight, flight_around, to_be_asked
-from d2rpick.profile import Profile
-from d2rpick.signs import Parts, PartVibration, read_parts
 
 if TYPE_CHECKING:
     from d2rpick.history import History, Samples
     from d2rpick.mode import Mode
+    from d2rpick.modes import Modes
+    from d2rpick.momentum import FreeFlight
+    from d2rpick.profile import Profile
+    from d2rpick.signs import Parts, PartVibration
 
 # Of the fastest mode: what a parabola through three of them misses of a minimum is of the order of 1e-4 of a period.
 _POINTS_PER_PERIOD = 64
@@ -195,15 +194,19 @@ class Situation:
     @cached_property
     def profile(self) -> Profile | None:
         """Lock-in error over all times before td that can be compared with it; None where it has a closed form."""
+        vibration: measures.Vibration
         if self.part_vibration:
             parts = self.part_vibration.parts
-            known = parts.time[parts.time >= parts.comparable_since(self.td)]
-            return Profile.of(self.part_vibration, known, self.td)
-        if isinstance(self.mode, Modes) and self.span:
+            vibration, times = self.part_vibration, parts.time[parts.time >= parts.comparable_since(self.td)]
+        elif self.mode and len(self.mode.modes) > 1 and self.span:
             step = 2 * np.pi / self.mode.fastest / _POINTS_PER_PERIOD
             count = max(3, int(np.ceil((self.td - self.span.start) / step)) + 1)
-            return Profile.of(self.mode, np.linspace(self.span.start, self.td, count), self.td)
-        return None
+            vibration, times = self.mode, np.linspace(self.span.start, self.td, count)
+        else:
+            return None
+        from d2rpick.profile import Profile
+
+        return Profile.of(vibration, times, self.td)
 
     def turns_since(self, time: float) -> int:
         """How often the sampled energy turns between ``time`` and td."""
@@ -238,7 +241,7 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
         raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
     if settings.after is not None:
         _inside(history, settings.after, "--after")
-    seen = next(filter(None, (flight_around(momenta, td) for momenta in to_be_asked(history.momenta))), None)
+    seen = _seen_flight(history, td) if history.momenta else None
     fit, span = _oscillator(history, td, settings, seen)
     situation = Situation(history, td, settings, _flight(history, td, settings.after, seen, span), fit, span)
     if history.part_energies is None or not settings.replay:
@@ -246,6 +249,13 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
     # without a sign of the next contact nothing is known of what comes after td
     end = situation.flight.end or (float(history.time[-1]) if seen or span else td)
     return _with_parts(situation, history.part_energies, end)
+
+
+def _seen_flight(history: History, td: float) -> FreeFlight | None:
+    """Find the free flight around ``td`` in the momenta."""
+    from d2rpick.momentum import flight_around, to_be_asked
+
+    return next(filter(None, (flight_around(momenta, td) for momenta in to_be_asked(history.momenta))), None)
 
 
 def _oscillator(
@@ -274,6 +284,9 @@ def _oscillator(
 
 def _with_parts(situation: Situation, energies: Samples, end: float) -> Situation:
     """Add what the energies of single parts, (n, k), tell of the flight up to ``end``."""
+    from d2rpick.envelope import upper_envelope
+    from d2rpick.signs import PartVibration, read_parts
+
     history, td, start = situation.history, situation.td, situation.flight.start
     first = min(td, float(history.time[0]) if start is None else start)
     inside = slice(*np.searchsorted(history.time, [first, np.nextafter(end, np.inf)]))

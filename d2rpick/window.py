@@ -39,7 +39,7 @@ def suggest_in_window(history: History, window: tuple[float, float], settings: S
         peaks = situation.peaks(*window_in_flight)
         td = _best_td(situation, peaks) or _best_td(situation, window_in_flight) or window[1]
         found = suggest(history, td, settings)
-    return replace(found, td_window=window)
+    return found._replace(td_window=window)
 
 
 def advice(history: History, settings: Settings) -> str:
@@ -102,8 +102,7 @@ def _highest(situation: Situation, window: tuple[float, float]) -> Suggestion:
 
 def _recommending(found: Suggestion, best: Candidate) -> Suggestion:
     """Give the suggestion with another candidate recommended."""
-    return replace(
-        found,
+    return found._replace(
         candidates=tuple(replace(c, recommended=c is best) for c in found.candidates),
         recommended=Pair(best.tr, found.situation.td, best.residual),
         expected=expectation(found.situation, best.energy),

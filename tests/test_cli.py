@@ -231,6 +231,15 @@ def test_options_come_from_the_environment_too() -> None:
     assert run("suggest", ENERGY, env={"D2RPICK_SUGGEST_TD": "soon"}).exit_code == 2
 
 
+def test_a_time_on_the_command_line_overrules_a_window_in_the_environment_and_the_reverse() -> None:
+    td, window = ("--td", "0.064"), ("--td-window", "0.06", "0.07")
+    for args, env in ((td, {"D2RPICK_SUGGEST_TD_WINDOW": "0.06 0.07"}), (window, {"D2RPICK_SUGGEST_TD": "0.064"})):
+        result = run("suggest", *args, "-f", "value", ENERGY, env=env)
+        assert (result.exit_code, result.stdout) == (0, run("suggest", *args, "-f", "value", ENERGY).stdout)
+    both = {"D2RPICK_SUGGEST_TD_WINDOW": "0.06 0.07", "D2RPICK_SUGGEST_TD": "0.064"}
+    assert run("suggest", ENERGY, env=both).exit_code == 2
+
+
 @pytest.mark.parametrize("source", [ENERGY, GLSTAT])
 def test_a_history_comes_through_standard_input(source: str) -> None:
     data = Path(source).read_bytes()
@@ -248,6 +257,20 @@ def test_without_a_command_the_help_is_an_error_message() -> None:
 def test_the_shell_completes_the_names_of_commands(command: str) -> None:
     env = {"_D2RPICK_COMPLETE": "bash_complete", "COMP_WORDS": f"d2rpick {command[:4]}", "COMP_CWORD": "1"}
     assert run(env=env).stdout.strip() == f"plain,{command}"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "suggest --td 0.1 ener", "verify --switched ener", "info ener", "extract ener -o ener", "check swi",
+        "check --history ener", "card --history ener", "suggest --report rep", "suggest --plot pic",
+        "replay --plot pic", "reproduce --output-dir pap", "reproduce --solver osc",
+    ],
+)  # fmt: skip
+def test_the_shell_completes_the_names_of_files(words: str) -> None:
+    typed = words.split()
+    env = {"_D2RPICK_COMPLETE": "bash_complete", "COMP_WORDS": f"d2rpick {words}", "COMP_CWORD": f"{len(typed)}"}
+    assert run(env=env).stdout.strip() == f"file,{typed[-1]}"
 
 
 # Help.

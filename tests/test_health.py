@@ -187,7 +187,11 @@ def test_a_window_that_reaches_into_the_next_contact_is_warned_of() -> None:
     assert "contact-in-window" in codes(found)
 
 
-@pytest.mark.parametrize("source", [ENERGY, GLSTAT])
-def test_files_without_a_balance_leave_it_unknown(source: str) -> None:
-    found = answer("suggest", "--td", "0.064", source)
+def test_of_files_with_nothing_to_judge_nothing_is_said() -> None:
+    assert answer("suggest", "--td", "0.064", ENERGY)["health"] is None
+    assert answer("info", ENERGY)["health"] is None
+
+
+def test_terms_that_leave_everything_open_leave_it_unknown() -> None:
+    found = answer("suggest", "--td", "0.064", GLSTAT)
     assert {value for key, value in found["health"].items() if key != "window"} == {None}

@@ -80,6 +80,7 @@ def test_csv_holds_the_numbers_of_json_to_the_last_digit(args: tuple[str, ...]) 
     expected = found["candidates"] if args[0] == "suggest" else [found]
     assert len(rows) == len(expected)
     for row, one in zip(rows, expected, strict=True):
+        assert row.pop("td") == found["td"]
         assert row == {key: "; ".join(one[key]) if isinstance(one[key], list) else one[key] for key in row}
     if args[0] == "suggest":
         assert set(rows[0]) | {"parts"} == set(expected[0])

@@ -63,8 +63,8 @@ def test_one_spring_is_compared_as_its_oscillator_tells(
     rate: float, phase: float, damping: float, per_period: int, tr: float
 ) -> None:
     time = np.arange(0, 8 * np.pi / rate, 2 * np.pi / rate / per_period)
-    tr = tr / 6 * time[-1]
     td = 0.9 * time[-1]
+    tr = tr / 6 * td
     deformation = np.exp(-damping * rate * time) * np.sin(rate * time + phase)
     found = read_parts(time, deformation[:, np.newaxis] ** 2, ["one"])
     assert found.signed

@@ -131,12 +131,27 @@ def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
     assert not modules & HEAVY
 
 
+# What a plain table without parts, balance or a window of td does without.
+UNNEEDED = {
+    f"d2rpick.{name}"
+    for name in ("window", "signs", "envelope", "profile", "modes", "fitting_several", "momentum", "health", "balance",
+                 "judged_card", "cards", "plots", "report.page", "report.health", "readers.fixed_text", "readers.lsda")
+} | {"pathlib", "json", "csv", "tempfile", "hashlib", "numpy.typing", "numpy.polynomial", "numpy.random"}  # fmt: skip
+
+
+def test_a_plain_table_loads_only_what_its_answer_needs() -> None:
+    libraries = [sys.executable, "-c", "import sys, numpy, click; print(*sys.modules)"]
+    theirs = set(subprocess.run(libraries, capture_output=True, text=True, check=True).stdout.split())
+    assert "d2rpick" not in theirs
+    assert not (loaded("suggest", "-q", "--td", "0.064", ENERGY) - theirs) & UNNEEDED
+
+
 def test_the_command_line_offers_the_formats_there_are() -> None:
     assert tuple(READERS) == options.FORMATS
     assert tuple(TRAJECTORY_WRITERS) == replay.FORMATS
 
 
-SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check")]
+SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check", "reproduce")]
 
 
 @pytest.mark.parametrize("name", ["py.typed", *SCHEMAS])

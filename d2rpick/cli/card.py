@@ -90,13 +90,11 @@ def _judged(
     write: Writer, reference: tuple[Run, Settings], options: dict[str, Any], output: Output
 ) -> tuple[PrintedCard, bool]:
     """Write the card with the verdict of the history in its comments, and tell it on stderr too."""
-    from dataclasses import replace
-
     from d2rpick.judged_card import judged
 
     run, settings = reference
     parts = () if options["energy"] or not run.parts else options["part"]
-    history = run.history(replace(shared.selection({**options, "part": ()}), parts=parts), with_momenta=True)
+    history = run.history(shared.selection({**options, "part": ()})._replace(parts=parts), with_momenta=True)
     card, verdict = judged(write, history, settings)
     output.notes(history.notes, all_cautions(verdict))
     return card, verdict.verified

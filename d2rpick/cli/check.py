@@ -28,7 +28,7 @@ Examples:
 
 
 @click.command("check", epilog=EXAMPLES)
-@click.argument("deck", metavar="DECK...", nargs=-1, required=True)
+@click.argument("deck", metavar="DECK...", nargs=-1, required=True, type=shared.FILE)
 @shared.reference_options
 @click.option(
     "--select",

@@ -10,6 +10,8 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from click.shell_completion import CompletionItem
+
     from d2rpick.oscillator import Oscillator
     from d2rpick.readers import Run, Selection
     from d2rpick.situation import Settings
@@ -48,6 +50,18 @@ class Number(click.ParamType[float]):
 FORMATS = ("binout", "radioss-th", "glstat", "matsum", "hdf5", "csv")
 
 
+class File(click.types.StringParamType):
+    """Name of a file or folder, for the shell to complete."""
+
+    envvar_list_splitter = ";"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        """Leave it to the shell."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="file")]
+
+
 class Names(click.types.StringParamType):
     """Names that an environment variable parts by semicolons, since labels hold blanks."""
 
@@ -55,6 +69,7 @@ class Names(click.types.StringParamType):
 
 
 NAMES = Names()
+FILE = File()
 TIME = Number()
 POSITIVE = Number(0.0, above=True)
 NOT_NEGATIVE = Number(0.0)
@@ -94,7 +109,7 @@ _FLYING = click.option("--flying", metavar="IDS", multiple=True, type=NAMES, hel
 def history_options(function: Decorated) -> Decorated:
     """HISTORY... and how to read it; collected by ``selection`` and ``open_run``."""
     return _stack(
-        click.argument("history", metavar="HISTORY...", nargs=-1, required=True),
+        click.argument("history", metavar="HISTORY...", nargs=-1, required=True, type=FILE),
         _FORMAT, _TIME, _ENERGY,
         click.option(
             "--part", metavar="IDS", multiple=True, type=NAMES,
@@ -108,7 +123,7 @@ def reference_options(function: Decorated) -> Decorated:
     """``--history``, how to read it, and how to judge by it; for commands that also do without one."""
     return _stack(
         click.option(
-            "--history", metavar="HISTORY", multiple=True, type=NAMES,
+            "--history", metavar="HISTORY", multiple=True, type=FILE,
             help="Energy history of the run without switching, to judge by: file, folder or glob; repeatable.",
         ),
         _FORMAT, _TIME, _ENERGY, _FLYING, _AFTER, _MARGIN, _TOLERANCE,
@@ -133,7 +148,9 @@ def output_options(*formats: str) -> Callable[[Decorated], Decorated]:
 def file_options(function: Decorated) -> Decorated:
     """Where the result goes."""
     return _stack(
-        click.option("-o", "--output-file", metavar="FILE", help="Write the result to FILE, whole or not at all."),
+        click.option(
+            "-o", "--output-file", metavar="FILE", type=FILE, help="Write the result to FILE, whole or not at all."
+        ),
         click.option("--overwrite", is_flag=True, help="Replace files that exist."),
         click.option("-q", "--quiet", is_flag=True, help="No notes and warnings on stderr."),
         click.option(
@@ -178,7 +195,7 @@ def choosing_options(function: Decorated) -> Decorated:
             "--step-ratio", type=POSITIVE, metavar="N", help="Time step while rigid over that before.  [default: 1]",
         ),
         click.option("--no-verify", is_flag=True, help="Judge by the energy level alone, without an oscillator."),
-        click.option("--plot", metavar="FILE", help="Draw energy and motion to FILE (png, svg, pdf)."),
+        click.option("--plot", metavar="FILE", type=FILE, help="Draw energy and motion to FILE (png, svg, pdf)."),
     )(function)  # fmt: skip
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -19,8 +18,7 @@ if TYPE_CHECKING:
 OBJECTION = 1
 
 
-@dataclass(frozen=True)
-class Output:
+class Output(NamedTuple):
     """Results to stdout or ``file``, everything else to stderr unless ``quiet``; ``inputs`` are never written to."""
 
     file: str | None
@@ -51,7 +49,7 @@ class Output:
     def spare(self, inputs: Iterable[str]) -> None:
         """Raise D2RPickError when the result would replace one of further inputs, known only since they were read."""
         if self.file is not None:
-            replace(self, inputs=tuple(inputs)).claim(self.file)
+            self._replace(inputs=tuple(inputs)).claim(self.file)
 
     def claim(self, name: str) -> None:
         """Raise D2RPickError when ``name`` cannot be written, is an input, or exists and was not to be replaced."""

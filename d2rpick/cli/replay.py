@@ -31,7 +31,9 @@ Examples:
     type=click.Choice(FORMATS),
     help="Format of the result.  [default: by the name of -o, else csv]",
 )
-@click.option("--plot", metavar="FILE", help="Draw displacements and energies to FILE (png, svg, pdf).")
+@click.option(
+    "--plot", metavar="FILE", type=shared.FILE, help="Draw displacements and energies to FILE (png, svg, pdf)."
+)
 @shared.file_options
 def command(
     tr: float | None, td: float | None, t_end: float, dt: float, write_as: str | None, plot: str | None, **options: Any

@@ -26,10 +26,17 @@ PICTURES = ("svg", "png")
 
 
 @click.command("reproduce", epilog=EXAMPLES)
-@click.option("--output-dir", metavar="DIR", required=True, help="Folder for figures and tables; made where missing.")
+@click.option(
+    "--output-dir",
+    metavar="DIR",
+    required=True,
+    type=shared.FILE,
+    help="Folder for figures and tables; made where missing.",
+)
 @click.option(
     "--solver",
     metavar="FILE",
+    type=shared.FILE,
     help=f"A solver's run of the same oscillator to be drawn beside: a table of time_s, {', '.join(SOLVER)}.",
 )
 @shared.output_options("table", "json", "csv", "markdown")

@@ -41,7 +41,9 @@ Examples:
 )
 @shared.history_options
 @shared.choosing_options
-@click.option("--report", metavar="FILE", help="Write all of it to FILE, one HTML page to read, print and sign.")
+@click.option(
+    "--report", metavar="FILE", type=shared.FILE, help="Write all of it to FILE, one HTML page to read, print and sign."
+)
 @shared.output_options("table", "json", "csv", "markdown", "value", "card")
 @click.pass_context
 def command(
@@ -63,6 +65,10 @@ def command(
     from d2rpick.readers.balance import balance_of
     from d2rpick.report import suggestion as report
 
+    if _only_in_environment(ctx, "td", overruled_by="td_window"):
+        td = None
+    if _only_in_environment(ctx, "td_window", overruled_by="td"):
+        td_window = None
     _check_usage(td, td_window, card=output_format == "card", parts=options["part"])
     with reading(options["history"], quiet=options["quiet"]):
         run = shared.open_run(options)
@@ -93,6 +99,12 @@ def command(
     finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
 
 
+def _only_in_environment(ctx: click.Context, option: str, *, overruled_by: str) -> bool:
+    """Whether an option comes from the environment, and one that excludes it from the command line."""
+    sources = [ctx.get_parameter_source(name) for name in (option, overruled_by)]
+    return sources == [click.core.ParameterSource.ENVIRONMENT, click.core.ParameterSource.COMMANDLINE]
+
+
 def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: bool, parts: tuple[str, ...]) -> None:
     """Raise UsageError where what is asked for makes no sense, before a file is opened."""
     if td is not None and window:
@@ -106,13 +118,14 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
 def _answer(history: History, td: float | None, window: tuple[float, float] | None, settings: Settings) -> Suggestion:
     """Choose tr for ``td``, or both in ``window``; UsageError with what the record tells when neither is given."""
     from d2rpick.choice import suggest
+
+    if td is not None:
+        return suggest(history, td, settings)
     from d2rpick.window import advice, suggest_in_window
 
-    if window:
-        return suggest_in_window(history, window, settings)
-    if td is None:
+    if window is None:
         raise click.UsageError(advice(history, settings))
-    return suggest(history, td, settings)
+    return suggest_in_window(history, window, settings)
 
 
 def _page(answer: Suggestion, run: Run, command: tuple[str, ...]) -> str:

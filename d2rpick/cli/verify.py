@@ -47,6 +47,7 @@ class _Verify(click.Command):
     "--switched",
     metavar="FILE",
     multiple=True,
+    type=shared.FILE,
     help="Compare a finished switched run with the reference: all files, folders and globs up to the next option.",
 )
 @shared.history_options

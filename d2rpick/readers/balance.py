@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.balance import Balance
 from d2rpick.errors import FormatError
 from d2rpick.readers.names import is_internal_energy, normalised
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from d2rpick.balance import Balance
     from d2rpick.history import Part, Samples
     from d2rpick.readers.database import Legs
     from d2rpick.readers.run import Run
@@ -30,6 +30,10 @@ _NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     "ratio": ("totalenergyinitialenergy", "energyratio"),
     "eroded": ("erodedinternalenergy",),
 }
+# Without one of these nothing can be said of the health.
+_JUDGED: Final = frozenset(
+    name for term in ("hourglass", "sliding", "external_work", "total", "ratio", "eroded") for name in _NAMES[term]
+)
 _TOTAL_INTERNAL: Final = ("ietotal", "totalinternalenergy")
 _VELOCITIES: Final = (
     ("globalxvelocity", "globalyvelocity", "globalzvelocity"),
@@ -40,12 +44,17 @@ _VELOCITIES: Final = (
 def balance_of(run: Run, parts: Sequence[Part] | None, until: float = np.inf) -> Balance | None:
     """Read the balance of the whole model, and the hourglass energy of ``parts``, up to a time [time].
 
-    None where the files have neither, or leave open which columns are meant.
+    None where the files have nothing of it that can be judged, or leave open which columns are meant.
     """
     whole = next((database for database in run.databases if database.channels), None)
     of_parts = _hourglass_of(run, parts, until) if parts else ()
+    judged = whole is not None and not _JUDGED.isdisjoint(map(normalised, whole.channels))
+    if not (judged or of_parts):
+        return None
+    from d2rpick.balance import Balance  # not above: plain tables do without it
+
     if whole is None:
-        return Balance(run.databases[0].part_time, hourglass_of_parts=of_parts) if of_parts else None
+        return Balance(run.databases[0].part_time, hourglass_of_parts=of_parts)
     try:
         columns = _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
     except FormatError:

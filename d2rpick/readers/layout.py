@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from dataclasses import dataclass, replace
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import FormatError
 from d2rpick.readers.names import is_time, is_unit, listing, unit_of
@@ -33,8 +32,7 @@ _LOOK_AT = 60
 _SHORT = 60
 
 
-@dataclass(frozen=True)
-class Layout:
+class Layout(NamedTuple):
     """Form of a table whose rows begin at line index ``start`` and have ``columns`` values each.
 
     ``names`` and ``units`` are empty where the file has none.  Where there are more names than columns, only
@@ -203,7 +201,7 @@ def _with_header(source: str, lines: Sequence[str], table: Layout) -> Layout:
     if len(rows) > 1 and len(rows[-1]) == table.columns and all(map(is_unit, rows[-1])):
         units = tuple(rows.pop())
     if not rows:
-        return replace(table, names=_commented_names(lines, table), units=units)
+        return table._replace(names=_commented_names(lines, table), units=units)
     names, title = rows[-1], ""
     if len(names) > 1 and not names[-1]:
         names = names[:-1]
@@ -212,7 +210,7 @@ def _with_header(source: str, lines: Sequence[str], table: Layout) -> Layout:
     if table.columns == 2 and len(names) == 1 and is_time(names[0]):
         names, title = [names[0], title], ""
     if len(names) == 1:
-        return replace(table, units=units, title=names[0])
+        return table._replace(units=units, title=names[0])
     if len(names) < table.columns or (len(names) > table.columns and not is_time(names[0])):
         raise FormatError(
             f"{source}:{table.start + 1}: {table.columns} values below a header of {len(names)} names "
@@ -220,7 +218,7 @@ def _with_header(source: str, lines: Sequence[str], table: Layout) -> Layout:
         )
     if table.columns == 2 < len(names):
         title = " ".join(filter(None, names[2:]))  # 3DEXPERIENCE: the third name is the curve's
-    return replace(table, names=tuple(names), units=units, title=title)
+    return table._replace(names=tuple(names), units=units, title=title)
 
 
 def _header_rows(lines: Sequence[str], table: Layout) -> Iterator[list[str]]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import FormatError
 from d2rpick.readers.names import listing, near_miss
@@ -17,8 +16,7 @@ if TYPE_CHECKING:
 _RANGE = re.compile(r"(\d+)(?:\s*-\s*(\d+))?")
 
 
-@dataclass(frozen=True)
-class Selection:
+class Selection(NamedTuple):
     """Columns or labels by name, columns also by 1-based number; parts by number, range or title.
 
     Nothing asked: the time and the internal energy of the whole model.  Several energies, and the energies of

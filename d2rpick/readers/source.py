@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import mmap
+import os
 import re
 import sys
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import FormatError
 from d2rpick.readers.names import listing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
 STDIN = "-"
 Content = bytes | mmap.mmap
@@ -25,8 +25,7 @@ _DATABASE = re.compile(r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?
 _stdin = b""
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """The unpacked bytes of one file, mapped where it lies on a disk, under the name the user gave it.
 
     ``cut`` is True when packed data ends early: ``data`` is what could be unpacked.
@@ -76,17 +75,20 @@ def sha256(name: str) -> str:
 
     if name == STDIN:
         return hashlib.sha256(_stdin).hexdigest()
-    with Path(name).open("rb") as file:
+    with open(name, "rb") as file:  # noqa: PTH123
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _files(name: str) -> Sequence[str]:
+    # os.path, not pathlib: start-up
+    if name == STDIN or os.path.isfile(name):  # noqa: PTH113
+        return [name]
+    from pathlib import Path
+
     path = Path(name)
     try:
-        is_file, is_folder = path.is_file(), path.is_dir()
+        is_folder = path.is_dir()
     except OSError:  # a name too long; what is wrong with it shows when it is opened
-        return [name]
-    if name == STDIN or is_file:
         return [name]
     if is_folder:
         return _databases(path)
@@ -120,7 +122,7 @@ def _read_stdin() -> bytes:
 
 def _mapped(name: str) -> Content:
     try:
-        with Path(name).open("rb") as file:
+        with open(name, "rb") as file:  # noqa: PTH123
             try:
                 return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
             except (OSError, ValueError):  # empty, or a pipe

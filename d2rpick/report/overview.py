@@ -78,7 +78,7 @@ def as_json(overview: Overview, command: Sequence[str]) -> str:
         for f in overview.flights
     ]
     front: dict[str, Any] = {"schema": SCHEMA, "tool_version": __version__, "command": list(command)}
-    front["warnings"] = [asdict(caution) for caution in cautions(overview)]
+    front["warnings"] = [caution._asdict() for caution in cautions(overview)]
     return tables.as_json({**front, **facts})
 
 

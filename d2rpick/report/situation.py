@@ -6,7 +6,6 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
-from d2rpick.modes import Modes
 from d2rpick.report.tables import measure
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ def frame(situation: Situation, schema: str, command: Sequence[str], cautions: I
         "schema": schema,
         "tool_version": __version__,
         "command": list(command),
-        "warnings": [{"code": c.code, "message": c.message} for c in cautions],
+        "warnings": [caution._asdict() for caution in cautions],
         "history": {
             "source": list(history.source),
             "sha256": [sha256(name) for name in history.source],
@@ -110,7 +109,7 @@ def _oscillator(situation: Situation) -> dict[str, Any] | None:
     fit = situation.fit
     if fit is None:
         return None
-    several = isinstance(fit.mode, Modes)
+    several = fit.mode is not None and len(fit.mode.modes) > 1
     mode = None if several else fit.mode
     return {
         "omega": mode.omega if mode else None,
@@ -126,9 +125,10 @@ def _oscillator(situation: Situation) -> dict[str, Any] | None:
 
 def _modes(situation: Situation) -> list[dict[str, float]] | None:
     """Give the modes whose sum describes the record, or null where one or none does."""
-    if not isinstance(situation.mode, Modes):
+    modes = situation.mode.modes if situation.mode else ()
+    if len(modes) < 2:
         return None
     return [
         {"omega": one.omega, "alpha": one.alpha, "vibration_energy_td": float(one.vibration_energy(situation.td))}
-        for one in situation.mode.modes
+        for one in modes
     ]

@@ -38,10 +38,11 @@ def as_markdown(answer: Suggestion, limit: int) -> str:
 
 
 def as_csv(answer: Suggestion) -> str:
-    """All candidates, a column for each key of the JSON output but ``parts``."""
+    """All candidates, a column for each key of the JSON output but ``parts``, and the td they belong to."""
     names = [field.name for field in fields(Candidate) if field.name not in ("parts", "notes")]
-    cells = ([getattr(c, n) for n in names] + ["; ".join(c.notes)] for c in answer.candidates)
-    return tables.as_csv([*names, "notes"], cells).rstrip("\n")
+    td = answer.situation.td
+    cells = ([*(getattr(c, n) for n in names), td, "; ".join(c.notes)] for c in answer.candidates)
+    return tables.as_csv([*names, "td", "notes"], cells).rstrip("\n")
 
 
 def as_json(answer: Suggestion, command: Sequence[str]) -> str:
@@ -53,10 +54,10 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
             "td": answer.situation.td,
             "td_window": list(answer.td_window) if answer.td_window else None,
             **mechanics(answer.situation),
-            "candidates": [asdict(candidate) for candidate in answer.candidates],
+            "candidates": [{**asdict(c), "parts": [part._asdict() for part in c.parts]} for c in answer.candidates],
             "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
             "health": asdict(answer.health) if answer.health else None,
-            "expected": asdict(answer.expected) if answer.expected else None,
+            "expected": answer.expected._asdict() if answer.expected else None,
             "better_td": {"td": better.td, "tr": better.tr, "residual": better.residual} if better else None,
         }
     )

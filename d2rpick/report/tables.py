@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -82,6 +79,9 @@ def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     >>> as_csv(["tr", "sign_match", "residual"], [[0.1, True, None]])
     'tr,sign_match,residual\n0.1,true,\n'
     """
+    import csv
+    import io
+
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
@@ -91,4 +91,6 @@ def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
 
 def as_json(result: dict[str, Any]) -> str:
     """Write a result as JSON: full precision, null for what is not known; a NaN would be a fault and raises."""
+    import json
+
     return json.dumps(result, indent=2, allow_nan=False, ensure_ascii=False)

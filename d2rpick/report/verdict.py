@@ -51,7 +51,7 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
             **frame(situation, SCHEMA, command, answer.cautions),
             **mechanics(situation),
             **_measures(answer),
-            "parts": [asdict(part) for part in answer.candidate.parts],
+            "parts": [part._asdict() for part in answer.candidate.parts],
             "reasons": list(answer.reasons),
             "switched": asdict(answer.switched) if answer.switched else None,
         }

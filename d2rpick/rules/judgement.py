@@ -49,7 +49,7 @@ class HistoryJudge:
     def cautions(self) -> list[Caution]:
         """What to be aware of, by what was judged so far."""
         return [
-            replace(caution, message=f"{name_units(parts)}: {caution.message}" if parts else caution.message)
+            caution._replace(message=f"{name_units(parts)}: {caution.message}") if parts else caution
             for caution, parts in self._cautions.items()
         ]
 
@@ -61,7 +61,7 @@ class HistoryJudge:
     def history(self, part: int | None) -> History:
         """Give the energy of a part, or of the whole model."""
         if part not in self._histories:
-            selection = self.selection if part is None else replace(self.selection, parts=(str(part),))
+            selection = self.selection if part is None else self.selection._replace(parts=(str(part),))
             known = next(iter(self._histories.values()), None)  # all parts share the momenta, which take long to read
             history = self.run.history(selection, with_momenta=known is None)
             momenta = history.momenta if known is None else known.momenta
