@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from d2rpick import choice
 from d2rpick.choice import EQUALLY_GOOD, suggest
 from d2rpick.errors import RangeError
 from d2rpick.expectation import expectation, shortfall
 from d2rpick.history import EXACT, History, Momenta, Part
 from d2rpick.readers import Selection, open_run
-from d2rpick.situation import Settings
+from d2rpick.situation import Settings, examine
 from d2rpick.window import suggest_in_window
 from tests import chain, paper
 from tests.command import ENERGY, ROLLOVER, answer, run
@@ -20,6 +21,7 @@ from tests.shared import shared
 
 if TYPE_CHECKING:
     from d2rpick.history import Samples
+    from d2rpick.situation import Situation
 
 PLAIN = Settings()
 T01 = str(ROLLOVER).replace(".csv", "T01.gz")
@@ -80,6 +82,20 @@ def test_on_energy_alone_the_highest_peaks_up_to_twice_the_mean() -> None:
     assert own <= min(shortfall(c.energy, mean) for c in allowed) + EQUALLY_GOOD
     assert found.expected.ratio_low == pytest.approx(history.energy_at(found.recommended.tr) / (2 * mean))
     assert found.expected.kinetic_share == pytest.approx(1 - found.situation.energy_td / (2 * mean))
+
+
+def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr(monkeypatch: pytest.MonkeyPatch) -> None:
+    sought: list[float] = []
+
+    def counted(history: History, td: float, settings: Settings) -> Situation:
+        sought.append(td)
+        return examine(history, td, settings)
+
+    monkeypatch.setattr(choice, "examine", counted)
+    late = Settings(after=0.34)  # no tr lies between the end of the load and these peaks
+    found = suggest_in_window(rollover(), (0.30, 0.335), late)
+    assert found.recommended is None
+    assert len(sought) == 1
 
 
 def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:
