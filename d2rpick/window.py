@@ -32,7 +32,7 @@ def suggest_in_window(history: History, window: tuple[float, float], settings: S
     for time in window:
         history.energy_at(time)
     situation = _flying(history, window, settings)
-    window_in_flight = window[0], min(window[1], situation.latest_td)
+    window_in_flight = window[0], max(window[0], min(window[1], situation.latest_td))
     if situation.vibration is None:
         found = _highest(situation, window_in_flight)
     else:

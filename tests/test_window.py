@@ -128,6 +128,12 @@ def test_a_window_that_reaches_over_the_next_contact_ends_there() -> None:
     assert found.recommended.td < 0.3819
 
 
+def test_no_td_is_taken_before_a_window_that_the_margin_cuts_off() -> None:
+    found = suggest_in_window(rollover(), (0.3815, 0.382), Settings(margin=0.01))
+    assert found.recommended is None
+    assert found.situation.td == 0.3815
+
+
 def test_the_record_ends_before_the_flight_of_an_oscillator_is_left() -> None:
     time = np.arange(0, 3, 0.01)
     energy = np.sin(2 * np.pi * time) ** 2 + np.where(time > 2.5, 40 * (time - 2.5), 0)
