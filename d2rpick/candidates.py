@@ -180,7 +180,7 @@ def _reach(situation: Situation, found: Sequence[Found], times: Samples) -> Samp
     """How far the true tr may lie away: of a match half a cell of the profile, else what the level leaves open."""
     history, td, profile = situation.history, situation.td, situation.profile
     fit, mode = situation.fit, situation.mode
-    reach = sampled_reach(history, times, td)
+    reach = sampled_reach(history, times, td, situation.energy_td)
     if mode and fit:
         described = np.array([situation.described(float(t)) for t in times])
         reach = np.where(described, fitted_reach(history, fit, mode, times, td), reach)

@@ -26,6 +26,9 @@ MIN_PLASTIC: Final = -0.05  # of the energy range: plastic work is positive but 
 # The energy below which a rest is not held against a mode: a solver errs by 1e-5 of the maximum anywhere.
 _FLOOR: Final = 1e-4  # of the highest vibration energy
 
+# A parameter with no larger derivatives, of energies of the size of 1, changes nothing; squares below it underflow.
+_NO_EFFECT: Final = 1e-100
+
 # Free parameters of the models, simplest first, and the vibration periods it takes to tell them apart.
 _MODELS: Final = ((VIBRATION, 1.25), (WITH_PLASTIC, 1.5), (WITH_PRELOAD, 2.0))
 
@@ -335,7 +338,7 @@ def _structure(rest: Samples) -> float:
 def _covariance(jacobian: Samples, rest: Samples) -> Samples:
     """s**2 (J J^T)^-1, by the pseudo-inverse of the matrix scaled to a unit diagonal."""
     norm = np.linalg.norm(jacobian, axis=1)
-    norm[norm == 0] = 1.0
+    norm[norm < _NO_EFFECT] = 1.0
     unit = jacobian / norm[:, None]
     variance = float(rest @ rest) / (rest.size - norm.size)
     covariance: Samples = variance * np.linalg.pinv(unit @ unit.T, hermitian=True) / (norm * norm[:, None])

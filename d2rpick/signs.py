@@ -217,5 +217,9 @@ class PartVibration:
         """Energy of the vibration, V = E + T [energy]."""
         return self._energy(t) + self.kinetic_energy(t)
 
+    def sunk(self, t: float) -> bool:
+        """Whether the estimated energy of the vibration is below a solver's errors at ``t``; a model tells more."""
+        return isinstance(self.whole, Envelope) and bool(self.whole.vibration_energy(t) < self.whole.floor)
+
     def _energy(self, t: Samples | float) -> Samples:
         return np.asarray(np.sum(self.amplitudes(t) ** 2, axis=0))

@@ -61,7 +61,7 @@ class Situation:
 
     ``fit`` is None only where no oscillator was looked for; ``span`` is the window in which it describes the record.
     ``parts`` are the deformations of single parts, where their energies are known and an oscillator was looked for;
-    ``part_vibration`` is their vibration, where they have a sign.
+    ``signed_parts`` is their vibration, where they have a sign.
     """
 
     history: History
@@ -71,7 +71,7 @@ class Situation:
     fit: Identification | None
     span: Span | None
     parts: Parts | None = None
-    part_vibration: PartVibration | None = None
+    signed_parts: PartVibration | None = None
 
     @cached_property
     def mode(self) -> Mode | Modes | None:
@@ -101,9 +101,19 @@ class Situation:
         return _drowned(self.history, self.td, self.fitted, self.span)
 
     @property
+    def part_vibration(self) -> PartVibration | None:
+        """Vibration of the parts, where it can be relied on at td."""
+        return None if self._parts_sunk else self.signed_parts
+
+    @cached_property
+    def _parts_sunk(self) -> bool:
+        """Whether the vibration of the parts, estimated for want of an oscillator, is below a solver's errors at td."""
+        return self.signed_parts is not None and self.signed_parts.sunk(self.td)
+
+    @property
     def drowned(self) -> bool:
-        """Whether an oscillator describes the record at td, but has sunk into its scatter there."""
-        return self.mode is None and self.fitted is not None and self._in_span(self.td)
+        """Whether the vibration is known, but has sunk into the scatter of the record at td."""
+        return self._parts_sunk or (self.mode is None and self.fitted is not None and self._in_span(self.td))
 
     @property
     def basis(self) -> str:
@@ -126,7 +136,8 @@ class Situation:
         if self.vibration:
             return None
         unsigned = self.parts.unsigned if self.parts else ()
-        return "; ".join([self.no_mode or "", *(f"{part.name}: {part.reason}" for part in unsigned)])
+        sunk = ("at td the parts vibrate no more than a solver errs",) if self._parts_sunk else ()
+        return "; ".join([self.no_mode or "", *sunk, *(f"{part.name}: {part.reason}" for part in unsigned)])
 
     @property
     def kinetic_share(self) -> float | None:
@@ -295,7 +306,7 @@ def _with_parts(situation: Situation, energies: Samples, end: float) -> Situatio
     parts = read_parts(history.time[inside], energies[inside], history.part_names)
     whole = situation.mode or upper_envelope(history.time[inside], history.energy[inside])
     vibration = PartVibration(parts, whole) if parts.signed and whole else None
-    return replace(situation, parts=parts, part_vibration=vibration)
+    return replace(situation, parts=parts, signed_parts=vibration)
 
 
 def _flight(history: History, td: float, after: float | None, seen: FreeFlight | None, span: Span | None) -> Flight:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,21 +23,25 @@ _DEVIATIONS = 3.0
 # Rounding errors are many, independent and of either sign: 2.6 standard deviations of their sum hold 99 % of it, and
 # they add to the error of the bend as independent errors do.
 _ROUNDING_DEVIATIONS = 2.6
+# The systematic rest of a fit is mostly a vibration: its peaks are the root of 2 of its rms.
+_PEAK_OF_REST = sqrt(2)
 # However well a fit follows the samples, it is a model of what happens between them: this share of the output
 # interval is kept in reserve.
 _BETWEEN_SAMPLES = 1e-3
 
 
-def sampled_reach(history: History, times: Samples, td: float) -> Samples:
+def sampled_reach(history: History, times: Samples, td: float, level: float) -> Samples:
     """Distance to the true crossing where tr comes from the samples themselves, linear between them.
 
     Parameters
     ----------
     history : History
     times : array of shape (n,)
-        Switch times tr found at the level of ``td`` [time].
+        Switch times tr found at ``level`` [time].
     td : float
         [time]
+    level : float
+        Energy taken for that at td: of the samples or, where a fit tells it, off them by the fit's own error [energy].
 
     Returns
     -------
@@ -55,20 +60,34 @@ def sampled_reach(history: History, times: Samples, td: float) -> Samples:
     )
     rounded = np.minimum(most, _ROUNDING_DEVIATIONS * np.sqrt(square))
     slope = np.abs((energy[cell + 1] - energy[cell]) / interval)
-    return np.minimum(reach(slope, bend, np.hypot(curved, rounded)), 2 * interval)
+    error = np.hypot(curved, rounded) + abs(level - history.energy_at(td))
+    return np.minimum(reach(slope, bend, error), 2 * interval)
 
 
 def fitted_reach(history: History, fit: Identification, mode: Mode | Modes, times: Samples, td: float) -> Samples:
     """Distance to the true crossing where tr and the level come from the fitted oscillator.
 
     The energy error is that of the fitted curve at tr and at td: its standard deviation from the scatter of the
-    record about it, and what of the misfit is no scatter.  Arguments and result as in ``sampled_reach``.
+    record about it, and what of the misfit is no scatter.  Arguments and result as in ``sampled_reach``, without level.
     """
-    deviation = fit.energy_deviation(np.append(times, td))
-    error = _DEVIATIONS * (deviation[:-1] + deviation[-1]) + fit.structure
+    both = np.append(times, td)
+    off = _DEVIATIONS * fit.energy_deviation(both) + _PEAK_OF_REST * _local_rest(history, fit, mode, both)
+    error = off[:-1] + off[-1]
     slope, bend = mode.energy_slopes(times)
     distance = reach(np.abs(slope), np.abs(bend), error)
-    return np.minimum(distance, 2 * history.step) + _BETWEEN_SAMPLES * history.step + _time_quanta(history, times, td)
+    # the fit, not the output interval, bounds how far a crossing can be off: it stays within a quarter of a period
+    return (
+        np.minimum(distance, np.pi / 2 / mode.fastest)
+        + _BETWEEN_SAMPLES * history.step
+        + _time_quanta(history, times, td)
+    )
+
+
+def _local_rest(history: History, fit: Identification, mode: Mode | Modes, at: Samples) -> Samples:
+    """Systematic rest of a fit near each time: its rms, and more where the vibration is above its own rms [energy]."""
+    window = slice(*np.searchsorted(history.time, [fit.start, np.nextafter(fit.end, np.inf)]))
+    usual = np.sqrt(np.mean(mode.vibration_energy(history.time[window]) ** 2))
+    return np.asarray(fit.structure * np.maximum(1.0, mode.vibration_energy(at) / usual))
 
 
 def _cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:

@@ -32,7 +32,7 @@ def suggest_in_window(history: History, window: tuple[float, float], settings: S
     for time in window:
         history.energy_at(time)
     situation = _flying(history, window, settings)
-    window_in_flight = window[0], min(window[1], situation.latest_td)
+    window_in_flight = window[0], max(window[0], min(window[1], situation.latest_td))
     if situation.vibration is None:
         found = _highest(situation, window_in_flight)
     else:
@@ -87,6 +87,8 @@ def _highest(situation: Situation, window: tuple[float, float]) -> Suggestion:
         peaks = [t for t in situation.peaks(*window) if shortfall(history.energy_at(t), mean) < 1]
         peaks_before = set(situation.peaks(float(history.time[0]), window[1]))
         for td in sorted(peaks, key=lambda t: shortfall(history.energy_at(t), mean)):
+            if not any(c.acceptable and not c.same_swing for c in find_candidates(situation.at(td))):
+                continue  # an oscillator is not sought again for each peak
             found = suggest(history, td, settings)
             errors = [
                 (shortfall(c.energy, mean), c)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from d2rpick.identify import Identification, identify
+from d2rpick.identify import Identification, _covariance, identify
 from d2rpick.mode import Mode
 from tests.records import ENERGY, MODE, TIME, noisy, printed, vibration
 from tests.shared import columns
@@ -249,3 +249,8 @@ def test_a_real_rollover_is_refused() -> None:
 @pytest.mark.parametrize("channel", ["IE_total_J", "IE_spring1_J", "IE_spring2_J"])
 def test_a_real_chain_of_two_modes_is_refused(channel: str) -> None:
     assert "more than" in refused(*columns("openradioss/chain_ref.csv", channel))
+
+
+def test_a_parameter_that_changes_next_to_nothing_leaves_no_overflow() -> None:
+    jacobian = np.stack([np.ones(30), np.linspace(0, 1, 30), np.full(30, 1e-155)])
+    assert np.all(np.isfinite(_covariance(jacobian, np.linspace(-1, 1, 30))))

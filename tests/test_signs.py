@@ -135,13 +135,40 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
             whole = upper_envelope(situation.history.time, situation.history.energy)
             assert whole is not None
             vibration = replace(situation.part_vibration, whole=whole)
-            situation = replace(situation, fit=None, span=None, part_vibration=vibration)
+            situation = replace(situation, fit=None, span=None, signed_parts=vibration)
             assert situation.kinetic_share_estimated
         runs = [run for run in chain.scan() if abs(run["td_s"] - td) < 1e-3]  # a step of the solver late
         errors += [abs(predicted(situation.at(run["td_s"]), run["tr_s"]) - run["R_sim"]) for run in runs]
     assert len(errors) == len(chain.scan())
     assert np.quantile(errors, 0.95) < 0.05
     assert max(errors) < 0.025  # what is reached
+
+
+def test_the_envelope_is_that_of_the_vibration_above_the_errors_of_the_solver() -> None:
+    time = np.arange(0, 12, 0.005)
+    scatter = 1e-5 * np.abs(np.random.default_rng(1).normal(size=time.size))
+    found = upper_envelope(time, np.exp(-2 * time) * np.sin(40 * time) ** 2 + scatter)
+    assert found is not None
+    assert found.rate == pytest.approx(2, rel=0.05)
+    assert found.vibration_energy(3.0) == pytest.approx(np.exp(-6), rel=0.2)
+    assert found.vibration_energy(6.0) < found.floor
+
+
+def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> None:
+    situation = examine(chain.history(), chain.TD_LATE, PLAIN)
+    assert situation.part_vibration is not None
+    whole = upper_envelope(situation.history.time, situation.history.energy)
+    assert whole is not None
+    sunk = whole._replace(floor=1.01 * float(whole.vibration_energy(chain.TD_LATE)))
+    parts = replace(situation.part_vibration, whole=sunk)
+    situation = replace(situation, fit=None, span=None, signed_parts=parts)
+    assert (situation.basis, situation.kinetic_share, situation.drowned) == ("energy", None, True)
+    (candidate,) = judge(situation, [Found(0.18, "given", None)])
+    assert (candidate.acceptable, candidate.residual, candidate.sign_match) == (False, None, None)
+    assert "the level at td has sunk into the scatter of the record" in candidate.notes
+    assert any("no more than a solver errs" in note for note in candidate.notes)
+    earlier = situation.at(chain.TD_PEAK)
+    assert earlier.basis == "parts"
 
 
 def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:

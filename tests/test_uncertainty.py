@@ -7,10 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.choice import suggest
 from d2rpick.crossings import find_crossings
 from d2rpick.history import History, Precision
 from d2rpick.identify import identify
 from d2rpick.mode import Mode
+from d2rpick.modes import Modes
+from d2rpick.situation import Settings
 from d2rpick.uncertainty import curvature, fitted_reach, reach, sampled_reach
 
 
@@ -43,7 +46,7 @@ def covered(samples_per_period: int, digits: int, *, jitter: float, runs: int) -
             continue
         times = np.array([c.time for c in found])
         rising = np.array([float(mode.deformation(t) * mode.velocity(t)) > 0 for t in true])
-        half = sampled_reach(history, times, td)
+        half = sampled_reach(history, times, td, history.energy_at(td))
         for one, width in zip(found, half, strict=True):
             same = np.array(true)[rising == one.rising]
             distance = np.abs(same - one.time).min()
@@ -86,6 +89,35 @@ def test_intervals_of_a_fit_hold_the_true_crossing() -> None:
                 inside += [bool(np.any(np.abs(times - t) <= half)) for t in true]
     assert len(inside) > 200
     assert np.mean(inside) >= 0.99
+
+
+@pytest.mark.parametrize("samples_per_period", [40, 200])
+def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(samples_per_period: int) -> None:
+    rng = np.random.default_rng(11)
+    inside = []
+    for _ in range(40):
+        main = random_mode(rng)
+        other = Mode(2 * np.pi * rng.uniform(1.6, 2.7), main.alpha, 0.04 * rng.normal(), 0.04 * rng.normal(), 0.0)
+        both = Modes((main, other))
+        time = np.arange(0, 6, 1 / samples_per_period)
+        history = History(time, both.energy(time), source=("test",), format="csv", channel="E")
+        found = suggest(history, 4.3, Settings(after=0.0))
+        true = np.array(both.level_crossings(4.3, 0.0))
+        sharp = [c for c in found.candidates if c.kind == "crossing" and (c.timing_tolerance or 0) < 0.02]
+        for one in sharp:
+            assert one.tr_low is not None
+            assert one.tr_high is not None
+            if np.abs(true - one.tr).min() < 0.25 / 2:  # the level is passed, not only nearly touched
+                inside.append(bool(np.any((one.tr_low <= true) & (true <= one.tr_high))))
+    assert len(inside) > 200
+    assert np.mean(inside) >= 0.99
+
+
+def test_an_interval_from_samples_grows_by_what_the_level_is_off_them() -> None:
+    time = np.linspace(0, 1, 101)
+    history = History(time, 3 * time, source=("test",), format="csv", channel="E")
+    (exact,), (off,) = (sampled_reach(history, np.array([0.3]), 0.755, 2.265 + error) for error in (0.0, 0.009))
+    assert off - exact == pytest.approx(0.009 / 3)
 
 
 # zero, or of a size whose squares still are numbers

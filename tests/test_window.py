@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from d2rpick import choice
 from d2rpick.choice import EQUALLY_GOOD, suggest
 from d2rpick.errors import RangeError
 from d2rpick.expectation import expectation, shortfall
 from d2rpick.history import EXACT, History, Momenta, Part
 from d2rpick.readers import Selection, open_run
-from d2rpick.situation import Settings
+from d2rpick.situation import Settings, examine
 from d2rpick.window import suggest_in_window
 from tests import chain, paper
 from tests.command import ENERGY, ROLLOVER, answer, run
@@ -20,6 +21,7 @@ from tests.shared import shared
 
 if TYPE_CHECKING:
     from d2rpick.history import Samples
+    from d2rpick.situation import Situation
 
 PLAIN = Settings()
 T01 = str(ROLLOVER).replace(".csv", "T01.gz")
@@ -82,6 +84,20 @@ def test_on_energy_alone_the_highest_peaks_up_to_twice_the_mean() -> None:
     assert found.expected.kinetic_share == pytest.approx(1 - found.situation.energy_td / (2 * mean))
 
 
+def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr(monkeypatch: pytest.MonkeyPatch) -> None:
+    sought: list[float] = []
+
+    def counted(history: History, td: float, settings: Settings) -> Situation:
+        sought.append(td)
+        return examine(history, td, settings)
+
+    monkeypatch.setattr(choice, "examine", counted)
+    late = Settings(after=0.34)  # no tr lies between the end of the load and these peaks
+    found = suggest_in_window(rollover(), (0.30, 0.335), late)
+    assert found.recommended is None
+    assert len(sought) == 1
+
+
 def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:
     time = np.arange(0, 10, 0.02)
     rng = np.random.default_rng(2)
@@ -110,6 +126,12 @@ def test_a_window_that_reaches_over_the_next_contact_ends_there() -> None:
     assert found.recommended is not None
     assert found.situation.flight.end == pytest.approx(0.3819, abs=1e-3)
     assert found.recommended.td < 0.3819
+
+
+def test_no_td_is_taken_before_a_window_that_the_margin_cuts_off() -> None:
+    found = suggest_in_window(rollover(), (0.3815, 0.382), Settings(margin=0.01))
+    assert found.recommended is None
+    assert found.situation.td == 0.3815
 
 
 def test_the_record_ends_before_the_flight_of_an_oscillator_is_left() -> None:
