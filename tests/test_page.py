@@ -243,6 +243,7 @@ def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> No
 def test_where_nothing_can_be_recommended_it_says_so(tmp_path: Path) -> None:
     page = page_of(tmp_path, "--td", "0.064", "--max-residual", "0.1", ENERGY, code=1)
     assert "No tr can be recommended" in page.text
+    assert "card chosen" not in page.source
     assert "no-candidate" in page.text
     assert "rigid at  " not in page.text
 

@@ -45,15 +45,17 @@ def _sections(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
 
 def _choice(answer: Suggestion) -> Markup:
     better = better_pair(answer)
-    cards = [_pair(answer, "Recommended", answer.recommended, class_="card chosen")]
+    if answer.recommended:
+        cards = [_pair(answer, "Recommended", answer.recommended, class_="card chosen")]
+    else:
+        nothing = tag("p", "No tr can be recommended for this td.")
+        cards = [tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")]
     if better:
         cards.append(_pair(answer, "Better pair: td at the nearest peak", better, class_="card"))
     return tag("section", tag("div", *cards, class_="choice"), page.remarks(answer.cautions), pairs(outlook(answer)))
 
 
-def _pair(answer: Suggestion, title: str, pair: Pair | None, class_: str) -> Markup:
-    if pair is None:
-        return tag("div", tag("h2", title), tag("p", "No tr can be recommended for this td."), class_=class_)
+def _pair(answer: Suggestion, title: str, pair: Pair, class_: str) -> Markup:
     return page.pair(title, (pair.tr, pair.td), pair.residual, answer.situation.history, class_)
 
 
