@@ -102,6 +102,10 @@ def test_who_does_not_see_it_can_follow_it(paper: Page) -> None:
     assert not paper.unnamed
 
 
+def test_it_is_signed_where_the_times_stand(paper: Page) -> None:
+    assert paper.text.index("signature") < paper.text.index("0.0128853")
+
+
 def test_it_is_the_same_every_time(tmp_path: Path) -> None:
     pages = []
     for _ in range(2):

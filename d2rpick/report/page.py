@@ -54,12 +54,10 @@ def document(run: Run, sections: Iterable[Markup]) -> str:
         tag("title", f"Switch times: {name}"),
         tag("style", _resource("style.css")),
     )
-    body = tag(
-        "body",
-        tag("header", tag("h1", f"Switch times: {name}"), tag("p", f"d2rpick {__version__}", class_="soft")),
-        tag("main", *sections),
-        tag("p", *(tag("span", line) for line in ("chosen by", "date", "signature")), class_="sign"),
-    )
+    # on top, beside the times: behind a card of any length it may stand on a sheet of its own
+    sign = tag("p", *(tag("span", line) for line in ("chosen by", "date", "signature")), class_="sign")
+    made_by = tag("p", f"d2rpick {__version__}", class_="soft")
+    body = tag("body", tag("header", tag("h1", f"Switch times: {name}"), made_by, sign), tag("main", *sections))
     return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
 
 
