@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from d2rpick.candidates import Candidate, Found, find_candidates, judge
 from d2rpick.cautions import POOR_KINETIC_SHARE, Caution, cautions_of
@@ -61,6 +61,10 @@ class Verdict(NamedTuple):
     reasons: tuple[str, ...]
     cautions: tuple[Caution, ...]
     switched: Comparison | None = None
+    health: Health | None = None
+
+
+_Answer = TypeVar("_Answer", Suggestion, Verdict)
 
 
 def suggest(history: History, td: float, settings: Settings) -> Suggestion:
@@ -106,7 +110,7 @@ def verify(history: History, tr: float, td: float, settings: Settings) -> Verdic
     )
 
 
-def with_health(answer: Suggestion, balance: Balance) -> Suggestion:
+def with_health(answer: _Answer, balance: Balance) -> _Answer:
     """Add how far the reference run can be trusted, above all in the rigid window, else in the flight up to td.
 
     ``balance`` is that of the reference run up to td: what comes later does not matter for the choice.
@@ -114,7 +118,10 @@ def with_health(answer: Suggestion, balance: Balance) -> Suggestion:
     from d2rpick.health import assess, cautions_of_health
 
     history, td = answer.situation.history, answer.situation.td
-    start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
+    if isinstance(answer, Verdict):
+        start: float | None = answer.candidate.tr
+    else:
+        start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
     health = assess(balance, window, locked)

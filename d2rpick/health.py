@@ -100,14 +100,14 @@ def assess(balance: Balance, window: tuple[float, float] | None = None, locked: 
 
 def cautions_of_health(health: Health) -> Iterator[Caution]:
     """What of the health of a run should be known, with stable codes."""
-    rest = "its internal energy is not to be relied on"
+    rest = "the internal energy is not to be relied on"
     if _above(health.hourglass_share, MOST_HOURGLASS):
         share = f"{health.hourglass_share:.0%}"
-        yield Caution("hourglass", f"hourglass energy reaches {share} of the internal energy; {rest}")
+        yield Caution("hourglass", f"hourglass energy reaches {share} of the internal energy: {rest}")
     if health.part and _above(health.part_hourglass_share, MOST_HOURGLASS):
         who = health.part.title or f"part {health.part.id}"
         share = f"{health.part_hourglass_share:.0%}"
-        yield Caution("part-hourglass", f"hourglass energy of {who} reaches {share} of its internal energy; {rest}")
+        yield Caution("part-hourglass", f"hourglass energy of {who} reaches {share} of its internal energy: {rest}")
     low, high = health.energy_ratio_min, health.energy_ratio_max
     if low is not None and high is not None and (low < 1 - MOST_IMBALANCE or high > 1 + MOST_IMBALANCE):
         found = f"total energy over initial energy and external work ranges from {low:.3g} to {high:.3g}"

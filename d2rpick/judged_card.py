@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.cards import PrintedCard
-    from d2rpick.choice import Suggestion, Verdict
+    from d2rpick.choice import Verdict
     from d2rpick.history import History
     from d2rpick.situation import Settings
 
@@ -25,13 +25,12 @@ def judged(
     return write(tuple(_remarks(verdict))), verdict
 
 
-def of_suggestion(answer: Suggestion) -> tuple[PrintedCard, Verdict] | None:
-    """Write the LS-DYNA card of the recommended pair, judged; None without a pair or parts that are switched."""
-    pair, history = answer.recommended, answer.situation.history
-    if pair is None or not history.parts:
+def of_parts(history: History, times: tuple[float, float], settings: Settings) -> tuple[PrintedCard, Verdict] | None:
+    """Write the LS-DYNA card of the parts that were chosen for (tr, td), judged; None where none were."""
+    if not history.parts:
         return None
     ids = [part.id for part in history.parts]
-    return judged(lambda remarks: ls_dyna(pair.tr, pair.td, ids, remarks=remarks), history, answer.situation.settings)
+    return judged(lambda remarks: ls_dyna(*times, ids, remarks=remarks), history, settings)
 
 
 def _remarks(verdict: Verdict) -> Iterator[str]:

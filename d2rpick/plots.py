@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
+from contextlib import contextmanager
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,7 +18,7 @@ from d2rpick.mode import Mode
 from d2rpick.replay import Replay, Trajectory, from_mode
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from matplotlib.axes import Axes
 
@@ -38,6 +40,8 @@ _DOTS = 100
 # Beyond this ratio of the highest energy to the level, the level would vanish on a linear axis.
 _LOGARITHMIC = 20.0
 _DECADES_BELOW_LEVEL = 2.0
+# Of a name from a file, what fits into a legend; in full it stands in the result.
+_LONGEST_NAME = 28
 # Up to so many candidates their marks leave the curve visible.
 _FEW = 40
 # Width of a figure, and the height of one panel and of two [inch]; on a narrow page letters keep their size.
@@ -58,7 +62,7 @@ def render(figure: Figure, name: str) -> bytes:
     """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for, always the same."""
     content, form = io.BytesIO(), format_of(name)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
-    with mpl.rc_context({"svg.hashsalt": "d2rpick"}):
+    with mpl.rc_context({"svg.hashsalt": "d2rpick"}), _any_letters():
         figure.savefig(content, format=form, dpi=150, metadata=undated)
     return content.getvalue()
 
@@ -67,13 +71,28 @@ def svg_element(figure: Figure, prefix: str) -> str:
     """Turn a figure into an SVG element for a page, whose ids all begin with ``prefix``; letters stay letters."""
     content = io.StringIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": prefix}):
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": prefix}), _any_letters():
         figure.savefig(content, format="svg", metadata=nothing)
     element = content.getvalue()
     element = element[element.index("<svg") :]
     element = re.sub(r' (?:width|height)="[\d.]+pt"', "", element, count=2)  # the page says how wide
-    element = re.sub(r'(?<= id=")|(?<=href="#)|(?<=url\(#)', prefix, element)
-    return element.replace("<svg", '<svg role="img"', 1)
+    return re.sub(r'(?<= id=")|(?<=href="#)|(?<=url\(#)', prefix, element)
+
+
+def both_widths(draw: Callable[..., Figure], answer: Suggestion | Verdict, name: str) -> tuple[str, str]:
+    """Give what ``draw`` draws of an answer as SVG elements for a wide and a narrow page; ``name`` tells them apart."""
+    return (
+        svg_element(draw(answer), f"{name}-wide-"),
+        svg_element(draw(answer, narrow=True), f"{name}-narrow-"),
+    )
+
+
+@contextmanager
+def _any_letters() -> Iterator[None]:
+    """Let letters of a name that the font lacks be boxes, without a warning."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
+        yield
 
 
 def draw_suggestion(answer: Suggestion, *, narrow: bool = False) -> Figure:
@@ -88,9 +107,9 @@ def draw_better(answer: Suggestion, *, narrow: bool = False) -> Figure:
     return _draw(answer.situation.at(answer.better_td.td), (), answer.better_td.tr, narrow=narrow)
 
 
-def draw_verdict(answer: Verdict) -> Figure:
+def draw_verdict(answer: Verdict, *, narrow: bool = False) -> Figure:
     """Energy with level and the pair that was judged; below it the motion after that pair."""
-    return _draw(answer.situation, (answer.candidate,), answer.candidate.tr)
+    return _draw(answer.situation, (answer.candidate,), answer.candidate.tr, narrow=narrow)
 
 
 def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
@@ -238,5 +257,10 @@ def _finish(axes: Axes, *, legend: bool = True) -> None:
 
 
 def _plain(name: str) -> str:
-    """Keep a name from a file from being read as a formula, or, with an underscore in front, as one to be hidden."""
-    return name.replace("$", r"\$") if not name.startswith("_") else f" {name}".replace("$", r"\$")
+    """Keep a name from a file from being read as a formula, or, with an underscore in front, as one to be hidden.
+
+    It is cut where it is too long, and what cannot be printed becomes a question mark.
+    """
+    shown = "".join(letter if letter.isprintable() else "?" for letter in name)
+    shown = shown if len(shown) <= _LONGEST_NAME else f"{shown[: _LONGEST_NAME - 1]}…"
+    return f"{' ' if shown.startswith('_') else ''}{shown}".replace("$", r"\$")

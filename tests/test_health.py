@@ -182,6 +182,14 @@ def test_suggest_and_info_tell_the_health() -> None:
     assert "hourglass energy of box" in run("info", ROLLOVER_T01).stdout
 
 
+def test_verify_judges_the_window_between_its_times() -> None:
+    flying = ("verify", "--td", "0.37", "--part", "box", "--after", "0.05", ROLLOVER_T01)
+    found = answer(*flying, "--tr", "0.1")
+    assert found["health"]["window"] == [0.1, 0.37]
+    assert not codes(found) & {"contact-in-window", "work-in-window"}
+    assert {"contact-in-window", "work-in-window"} <= codes(answer(*flying, "--tr", "0.06"))
+
+
 def test_a_window_that_reaches_into_the_next_contact_is_warned_of() -> None:
     found = answer("suggest", "--td", "0.39", "--part", "box", "--after", "0.1", ROLLOVER_T01)
     assert "contact-in-window" in codes(found)

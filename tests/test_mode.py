@@ -94,7 +94,7 @@ def test_peaks_are_higher_than_their_neighbourhood(mode: Mode) -> None:
         assert np.all(mode.energy(peaks) > mode.energy(peaks + side))
 
 
-@given(MODES, st.floats(-1, 1))
+@given(MODES, st.floats(-0.999, 0.999))  # a level that is touched is met by rounding or not
 def test_crossings_are_all_sign_changes_on_a_fine_grid(mode: Mode, share: float) -> None:
     level = mode.preload + share * mode.cosine
     fine = np.linspace(-0.5, 2.0, 20001)

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import hashlib
 import html
+import os
 import re
+import shlex
 import shutil
 import subprocess
+import sys
 from html.parser import HTMLParser
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-from tests.command import ENERGY, GLSTAT, ROOT, run
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROOT, run
 from tests.shared import shared
 
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
 NASTY = '<script>alert("1")</script>&<b>'
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 QUIET = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking"]
+LEGS = ("rollover_referenceT01.gz", "rollover_r100_T01.gz", "rollover_r100_T02.gz", "rollover_r100_T03.gz")
 VOID = {"meta", "br", "hr", "link"}
 
 
@@ -28,6 +33,7 @@ class Page(HTMLParser):
     def __init__(self, source: str) -> None:
         super().__init__()
         self.source, self.names, self.ids, self.targets, self.text = source, set[str](), list[str](), list[str](), ""
+        self.headings, self.unnamed = list[int](), list[str]()
         self._open: list[str] = []
         self.feed(source)
         assert not self._open
@@ -39,6 +45,9 @@ class Page(HTMLParser):
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.names.add(tag)
         given = {key: value or "" for key, value in attrs}
+        self.headings += [int(tag[1])] if tag in {"h1", "h2", "h3"} else []
+        self.unnamed += [tag] if given.get("role") in {"img", "region"} and not given.get("aria-label") else []
+        self.unnamed += ["th"] if tag == "th" and given.get("scope") != "col" else []
         self.ids += [given["id"]] if "id" in given else []
         self.targets += [given[key] for key in ("href", "src", "xlink:href", "action", "data") if key in given]
         self.targets += [f"#{name}" for value in given.values() for name in re.findall(r"url\(#([^)]*)\)", value)]
@@ -49,10 +58,15 @@ class Page(HTMLParser):
     def handle_data(self, data: str) -> None:
         self.text += data
 
+    def last_command(self) -> list[str]:
+        """Words of the last command on the page, behind the name of the program."""
+        return shlex.split(html.unescape(re.findall(r"<pre[^>]*>d2rpick ([^<]*)</pre>", self.source)[-1]))
 
-def page_of(folder: Path, *args: str, code: int = 0) -> Page:
-    result = run("suggest", *args, "-q", "--report", str(folder / "report.html"))
+
+def page_of(folder: Path, *args: str, command: str = "suggest", code: int = 0, stdin: bytes | None = None) -> Page:
+    result = run(command, *args, "-q", "--report", str(folder / "report.html"), stdin=stdin)
     assert result.exit_code == code, result.stderr
+    assert not result.stderr
     return Page((folder / "report.html").read_text("utf-8"))
 
 
@@ -79,6 +93,17 @@ def test_it_needs_nothing_but_itself(paper: Page) -> None:
 def test_ids_are_unique_and_all_that_is_referred_to_is_there(paper: Page) -> None:
     assert len(paper.ids) == len({*paper.ids})
     assert {target[1:] for target in paper.targets} <= {*paper.ids}
+
+
+def test_who_does_not_see_it_can_follow_it(paper: Page) -> None:
+    assert paper.headings[0] == 1
+    assert all(after <= before + 1 for before, after in pairwise(paper.headings))
+    assert paper.source.count('role="img"') == 4
+    assert not paper.unnamed
+
+
+def test_it_is_signed_where_the_times_stand(paper: Page) -> None:
+    assert paper.text.index("signature") < paper.text.index("0.0128853")
 
 
 def test_it_is_the_same_every_time(tmp_path: Path) -> None:
@@ -112,7 +137,7 @@ def test_a_pair_that_cannot_be_bettered_is_shown_once(tmp_path: Path) -> None:
 def test_each_part_and_the_saving_are_told(tmp_path: Path) -> None:
     chain = str(shared("openradioss/chain_referenceT01.gz"))
     page = page_of(tmp_path, "--td", "0.13505", "--part", "spring1,spring2", "--cost-share", "0.9", chain)
-    for text in ("Parts at the recommended pair", "share of the mismatch", "run time", "2 modes"):
+    for text in ("Parts at this pair", "share of the mismatch", "run time", "2 modes"):
         assert text in page.text
 
 
@@ -134,9 +159,95 @@ def test_a_column_of_any_name_stays_text(tmp_path: Path, name: str) -> None:
     assert not page.names & {"script", "foreignobject"}
 
 
+@pytest.mark.parametrize("name", [f"IE{'x' * 300}", "énergie_内部_🙂", "IE\x01\x1b[31m"])
+def test_a_long_or_strange_name_spoils_no_figure_and_says_nothing(tmp_path: Path, name: str) -> None:
+    (tmp_path / "energy.csv").write_text(Path(ENERGY).read_text("utf-8").replace("internal_energy", name), "utf-8")
+    page = page_of(tmp_path, "--td", "0.064", "--energy", "6", str(tmp_path / "energy.csv"))
+    assert name[:20].partition("\x01")[0] in page.text
+    assert not re.search(r"[\x00-\x08\x0b-\x1f]", page.source)
+    assert 'd="M' in page.source
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names are text")
+def test_a_file_name_that_is_no_text_is_shown_as_far_as_it_is(tmp_path: Path) -> None:
+    name = os.fsdecode(os.fsencode(tmp_path) + b"/energy\xff.csv")
+    Path(name).write_bytes(Path(ENERGY).read_bytes())
+    assert "energy\ufffd.csv" in page_of(tmp_path, "--td", "0.064", name).text
+
+
+def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(tmp_path: Path) -> None:
+    source = str(shared("openradioss/chain_ref.csv"))
+    energies = ("--energy", "IE_spring1_J", "--energy", "IE_spring2_J")
+    options = ("--time", "time_s", "--after", "0.01", "--margin", "0.001", "--tolerance", "0.1")
+    words = page_of(tmp_path, "--td", "0.13505", *energies, *options, source).last_command()
+    assert words[5:] == ["--part", "IDS", "--history", source, *options[:2], *energies, *options[2:6], *options[6:]]
+    assert run(*("7" if word == "IDS" else word for word in words)).exit_code == 0
+
+
+def test_the_command_for_radioss_names_the_parts(tmp_path: Path) -> None:
+    words = page_of(tmp_path, "--td", "0.37", "--part", "box", "--flying", "box,step", ROLLOVER_T01).last_command()
+    assert words[-6:] == ["--history", ROLLOVER_T01, "--flying", "box,step", "--part", "box"]
+    assert run(*("1001" if word == "IDS" else word for word in words)).exit_code == 0
+
+
+def test_a_time_that_no_card_can_hold_costs_the_card_only(tmp_path: Path) -> None:
+    motion = str(tmp_path / "motion.matsum")
+    assert run("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "-o", motion).exit_code == 0
+    earlier = re.compile(r"(?<=time =)[^\n]*")
+    shift = earlier.sub(lambda time: f"{float(time[0]) - 0.02:13.4E}", Path(motion).read_text("ascii"))
+    Path(motion).write_text(shift)
+    page = page_of(tmp_path, "--td", "0.044", "--part", "3", motion)
+    assert "There is no card for these times: tr is -0.00" in page.text
+
+
+def test_options_set_by_the_environment_and_standard_input_are_needed_to_repeat_it(tmp_path: Path) -> None:
+    content, page = Path(ENERGY).read_bytes(), tmp_path / "report.html"
+    result = run("suggest", "-", "--report", str(page), stdin=content, env={"D2RPICK_SUGGEST_TD": "0.064"})
+    assert result.exit_code == 0
+    text = Page(page.read_text("utf-8")).text
+    assert f"env D2RPICK_SUGGEST_TD=0.064 d2rpick suggest - --report {page}" in text
+    assert "with the same history on standard input" in text
+    assert f"-: {hashlib.sha256(content).hexdigest()}" in text
+
+
+def test_a_pair_that_is_not_better_is_not_called_so(tmp_path: Path) -> None:
+    springs = ("--energy", "IE_spring1_J", "--energy", "IE_spring2_J")
+    page = page_of(tmp_path, "--td", "0.13505", *springs, str(shared("openradioss/chain_ref.csv")))
+    assert "residual 0.065" in page.text
+    assert "Better pair" not in page.text
+
+
+def test_a_verdict_has_a_page_too(tmp_path: Path) -> None:
+    page = page_of(tmp_path, "--tr", "0.0135867", "--td", "0.0687534", ENERGY, command="verify")
+    for text in ("Verified", "residual 0.000", "0.0687534", "1501 states", "Method and limits", "d2rpick verify --tr"):
+        assert text in page.text
+    assert page.last_command()[:6] == ["card", "--tr", "0.0135867", "--td", "0.0687534", "--part"]
+    assert len(page.ids) == len({*page.ids})
+    assert not page.unnamed
+
+
+def test_a_pair_that_does_not_verify_gets_its_reasons_and_no_card(tmp_path: Path) -> None:
+    page = page_of(tmp_path, "--tr", "0.0122659", "--td", "0.064", ENERGY, command="verify", code=1)
+    assert "Not verified" in page.text
+    assert "opposite sign of the deformation" in page.text
+    assert "d2rpick card" not in page.text
+
+
+def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> None:
+    reference, *legs = (str(shared(f"openradioss/{name}")) for name in LEGS)
+    page = page_of(
+        tmp_path, "--tr", "0.1", "--td", "0.37", "--part", "box", reference, "--switched", *legs, command="verify"
+    )
+    for name in (reference, *legs):
+        assert f"{name}: {hashlib.sha256(Path(name).read_bytes()).hexdigest()}" in page.text
+    for text in ("The switched run", "mean after td", "hourglass energy of box", "The window is 0.1 to 0.37"):
+        assert text in page.text
+
+
 def test_where_nothing_can_be_recommended_it_says_so(tmp_path: Path) -> None:
     page = page_of(tmp_path, "--td", "0.064", "--max-residual", "0.1", ENERGY, code=1)
     assert "No tr can be recommended" in page.text
+    assert "card chosen" not in page.source
     assert "no-candidate" in page.text
     assert "rigid at  " not in page.text
 
@@ -155,6 +266,7 @@ def test_it_is_a_file_like_any_other_output(tmp_path: Path) -> None:
     both = str(tmp_path / "a.svg")
     result = run("suggest", "--td", "0.064", "--report", both, "--plot", both, ENERGY)
     assert "--report and --plot name the same file" in result.stderr
+    assert "--report writes a file" in run("suggest", "--td", "0.064", "--report", "-", ENERGY).stderr
     assert taken.read_text() == "mine"
 
 

@@ -123,6 +123,21 @@ def test_its_files_are_the_same_every_time_and_replaced_only_when_told(tmp_path:
     assert {name.rpartition("/")[2] for name in first["files"]} == {*before}
 
 
+def test_a_folder_that_cannot_be_made_is_an_error_that_says_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    for place in (tmp_path / "file", tmp_path / "file" / "paper"):
+        result = run("reproduce", "--output-dir", str(place))
+        assert result.exit_code == 2
+        assert "no folder can be made there" in result.stderr
+
+
+def test_all_states_that_were_computed_with_40_digits_are_in_the_table() -> None:
+    known = {f"{name} of ({pair}) ms at {1e3 * row[0]:g} ms": value
+             for pair, rows in (("6, 80", paper.SWITCHED_6_80), ("13, 64", paper.SWITCHED_13_64))
+             for row in rows for name, value in (("z", row[1]), ("y", row[2]), ("E", row[5]))}  # fmt: skip
+    assert {row.what: row.published for row in table() if row.what in known} == known
+
+
 def test_a_solver_s_table_without_its_columns_is_refused(tmp_path: Path) -> None:
     result = run("reproduce", "--output-dir", str(tmp_path / "paper"), "--solver", ENERGY)
     assert result.exit_code == 2

@@ -11,7 +11,7 @@ import pytest
 from d2rpick.errors import RangeError
 from d2rpick.history import History, Track
 from d2rpick.switched import MOST_MOMENTUM_ERROR, Comparison, compare
-from tests.command import OSCILLATOR, answer, run
+from tests.command import ENERGY, OSCILLATOR, answer, run
 from tests.shared import shared
 from tests.test_output import check_by_schema
 
@@ -319,3 +319,17 @@ def test_a_run_that_ends_at_td_is_named(short: str) -> None:
     runs[short] = history(1 + TIME[:52], TIME[:52], short)
     with pytest.raises(RangeError, match=rf"^{short}: fewer than 3 states from td 0.5 to 0.51; "):
         compare(runs["reference"], runs["switched"], (0.1, 0.5), np.inf, 0.2, NONE, NONE)
+
+
+def test_no_output_replaces_a_file_of_the_switched_run(tmp_path: Path) -> None:
+    motion = tmp_path / "switched.csv"
+    times = ("--tr", str(TR), "--td", str(TD))
+    assert run("replay", *OSCILLATOR, *times, "--t-end", "0.15", "--dt", "1e-4", "-o", str(motion)).exit_code == 0
+    before = motion.read_bytes()
+    for option in ("-o", "--report"):
+        result = run(
+            "verify", *times, ENERGY, "--overwrite", option, str(motion), "--switched", str(tmp_path / "*.csv")
+        )
+        assert result.exit_code == 2
+        assert "this is an input" in result.stderr
+    assert motion.read_bytes() == before

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -106,6 +107,10 @@ _ENERGY = click.option(
 _FLYING = click.option("--flying", metavar="IDS", multiple=True, type=NAMES, help="Parts that fly together with them.")
 
 
+# What of them says how to read a history and how to judge by it.
+_JUDGING = ("input_format", "time", "energy", "flying", "after", "margin", "tolerance")
+
+
 def history_options(function: Decorated) -> Decorated:
     """HISTORY... and how to read it; collected by ``selection`` and ``open_run``."""
     return _stack(
@@ -196,6 +201,9 @@ def choosing_options(function: Decorated) -> Decorated:
         ),
         click.option("--no-verify", is_flag=True, help="Judge by the energy level alone, without an oscillator."),
         click.option("--plot", metavar="FILE", type=FILE, help="Draw energy and motion to FILE (png, svg, pdf)."),
+        click.option(
+            "--report", metavar="FILE", type=FILE, help="Write all of it to one HTML page to read, print and sign."
+        ),
     )(function)  # fmt: skip
 
 
@@ -220,8 +228,7 @@ def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
     """Open what the options of ``reference_options`` name; UsageError when they say how to judge but not by what."""
     if not options["history"]:
         source = click.get_current_context().get_parameter_source
-        names = ("input_format", "time", "energy", "flying", "after", "margin", "tolerance")
-        lost = [name for name in names if source(name) is not click.core.ParameterSource.DEFAULT]
+        lost = [name for name in _JUDGING if source(name) is not click.core.ParameterSource.DEFAULT]
         if lost:
             raise click.UsageError(f"--{_dashed(lost[0])} is about an energy history; name it with --history")
         return None
@@ -229,6 +236,28 @@ def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
 
     judging = Settings(after=options["after"], margin=options["margin"], tolerance=options["tolerance"])
     return open_run({**options, "part": ()}), judging
+
+
+def judging(options: dict[str, Any]) -> list[str]:
+    """Give the options of ``reference_options`` that judge by the history that ``history_options`` named."""
+    names = [*_JUDGING, *(["part"] if options["part"] else [])]
+    context = click.get_current_context()
+    given = [name for name in names if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT]
+    pairs = [(name, value) for name in ("history", *given) for value in _each(options[name])]
+    return [text for name, value in pairs for text in (f"--{_dashed(name)}", str(value))]
+
+
+def repeat() -> list[str]:
+    """Give the command line that was typed, and before it the environment variables that set options."""
+    context = click.get_current_context()
+    source = click.core.ParameterSource.ENVIRONMENT
+    names = [
+        f"{context.auto_envvar_prefix}_{name.upper()}"
+        for name in context.params
+        if context.get_parameter_source(name) is source
+    ]
+    variables = [f"{name}={os.environ[name]}" for name in names]
+    return [*(["env", *variables] if variables else []), "d2rpick", *context.meta["d2rpick.command"]]
 
 
 def oscillator(options: dict[str, Any]) -> Oscillator | None:
@@ -274,6 +303,10 @@ def settings(options: dict[str, Any]) -> Settings:
         cost_share=options["cost_share"],
         step_ratio=options["step_ratio"] or 1.0,
     )
+
+
+def _each(value: Any) -> tuple[Any, ...]:
+    return value if isinstance(value, tuple) else (value,)
 
 
 def _dashed(name: str) -> str:

@@ -36,6 +36,8 @@ class Output(NamedTuple):
             from d2rpick import plots
 
             plots.format_of(plot)
+        if options.get("report") == "-":
+            raise D2RPickError("-: --report writes a file; name one")
         names = {"--output-file": options["output_file"], "--plot": plot, "--report": options.get("report")}
         claimed: dict[str, str] = {}
         for option, name in names.items():
@@ -69,11 +71,11 @@ class Output(NamedTuple):
 
     def result(self, text: str) -> None:
         """Give out the result; on a terminal the line of the recommended candidate stands out."""
-        # bytes of file names that are no text come as lone surrogates, which no encoding can write
-        text = text and f"{text}\n".encode(errors="surrogateescape").decode(errors="replace")
+        content = text_bytes(text and f"{text}\n")
         if self.file is not None:
-            self.write(self.file, text.encode())
+            self.write(self.file, content)
             return
+        text = content.decode()
         colour = False if os.environ.get("NO_COLOR") else True if os.environ.get("FORCE_COLOR") else None
         lines = (click.style(line, bold=True) if line.startswith("*") else line for line in text.split("\n"))
         click.echo("\n".join(lines), nl=False, color=colour)
@@ -111,6 +113,11 @@ class Output(NamedTuple):
             raise
         except OSError as error:
             raise D2RPickError(f"{name}: cannot be written ({error.strerror}); name another file") from error
+
+
+def text_bytes(text: str) -> bytes:
+    """Encode a text; bytes of file names that are none come as lone surrogates, which no encoding can write."""
+    return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 
 def _replace(path: Path, content: bytes) -> None:

@@ -79,10 +79,14 @@ def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exh
     from pathlib import Path
 
     from d2rpick import plots, writers
+    from d2rpick.errors import D2RPickError
     from d2rpick.report import reproduction as report
 
     place = Path(folder)
-    place.mkdir(parents=True, exist_ok=True)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise D2RPickError(f"{folder}: no folder can be made there ({error.strerror}); name another one") from error
     index = report.as_markdown(rows, [(one.title, f"{one.name}.svg") for one in shown])
     contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{report.as_csv(rows)}\n".encode()}
     for one in shown:

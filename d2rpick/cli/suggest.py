@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output, finish
+from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
@@ -41,9 +41,6 @@ Examples:
 )
 @shared.history_options
 @shared.choosing_options
-@click.option(
-    "--report", metavar="FILE", type=shared.FILE, help="Write all of it to FILE, one HTML page to read, print and sign."
-)
 @shared.output_options("table", "json", "csv", "markdown", "value", "card")
 @click.pass_context
 def command(
@@ -83,7 +80,7 @@ def command(
 
         output.write(options["plot"], plots.render(plots.draw_suggestion(answer), options["plot"]))
     if options["report"]:
-        output.write(options["report"], _page(answer, run, ctx.meta["d2rpick.command"]).encode())
+        output.write(options["report"], text_bytes(_page(answer, run, options)))
     if output_format == "card":
         written = _card(answer, output)
         finish(ctx, objection=not written, exit_zero=exit_zero)
@@ -128,30 +125,26 @@ def _answer(history: History, td: float | None, window: tuple[float, float] | No
     return suggest_in_window(history, window, settings)
 
 
-def _page(answer: Suggestion, run: Run, command: tuple[str, ...]) -> str:
+def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
     """Draw the figures, wide and narrow, and write the page around them."""
     from d2rpick import plots
-    from d2rpick.report.page import as_page, better_pair
+    from d2rpick.report.page import Record
+    from d2rpick.report.suggestion_page import as_page, better_pair
 
-    drawings = {"Internal energy with its level at td, and the choice": plots.draw_suggestion}
+    caption = "Internal energy with its level at td, and the choice"
+    figures = {caption: plots.both_widths(plots.draw_suggestion, answer, "choice")}
     if better_pair(answer):
-        drawings["The better pair"] = plots.draw_better
-    figures = {
-        caption: (
-            plots.svg_element(draw(answer), f"wide{number}-"),
-            plots.svg_element(draw(answer, narrow=True), f"narrow{number}-"),
-        )
-        for number, (caption, draw) in enumerate(drawings.items())
-    }
-    return as_page(answer, run, command, figures)
+        figures["The better pair"] = plots.both_widths(plots.draw_better, answer, "better")
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), figures))
 
 
 def _card(answer: Suggestion, output: Output) -> bool:
     """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
     from d2rpick.cli.card import all_cautions
-    from d2rpick.judged_card import of_suggestion
+    from d2rpick.judged_card import of_parts
 
-    found = of_suggestion(answer)
+    pair, situation = answer.recommended, answer.situation
+    found = of_parts(situation.history, (pair.tr, pair.td), situation.settings) if pair else None
     if found is None:
         output.content(b"")
         return False

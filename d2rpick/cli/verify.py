@@ -7,21 +7,22 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output, finish
+from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.choice import Verdict
     from d2rpick.history import Part, Track
-    from d2rpick.readers import Run
-    from d2rpick.situation import Situation
+    from d2rpick.readers import Run, Selection
     from d2rpick.switched import Comparison
 
 EXAMPLES = """\b
 Examples:
   d2rpick verify --tr 0.0135867 --td 0.0687534 sample_data/energy.csv
   d2rpick verify --tr 0.1 --td 0.37 --energy boxIE_J -f json sample_data/rollover.csv
+  d2rpick verify --tr 0.0135867 --td 0.0687534 --report report.html sample_data/energy.csv
 """
 
 
@@ -56,22 +57,28 @@ class _Verify(click.Command):
 @click.pass_context
 def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exit_zero: bool, **options: Any) -> None:
     """Judge one pair of switch times against the HISTORY of a run without switching."""
-    from d2rpick.choice import verify, with_comparison
+    from d2rpick.choice import verify, with_comparison, with_health
+    from d2rpick.readers.balance import balance_of
     from d2rpick.report import verdict as report
 
     with reading(options["history"], quiet=options["quiet"]):
         run = shared.open_run(options)
-        output = Output.of(options, *run.sources)
+        switched = _switched(options)
+        output = Output.of(options, *run.sources, *(switched.sources if switched else ()))
         history = run.history(shared.selection(options), with_momenta=True)
     answer = verify(history, tr, td, shared.settings(options))
-    if options["switched"]:
+    if balance := balance_of(run, history.parts, td):
+        answer = with_health(answer, balance)
+    if switched:
         with reading(options["switched"], quiet=options["quiet"]):
-            answer = with_comparison(answer, _comparison(run, answer.situation, {**options, "tr": tr}))
+            answer = with_comparison(answer, _comparison(run, switched, answer, shared.selection(options)))
     output.notes(history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick import plots
 
         output.write(options["plot"], plots.render(plots.draw_verdict(answer), options["plot"]))
+    if options["report"]:
+        output.write(options["report"], text_bytes(_page(answer, run, options)))
     texts = {
         "table": lambda: report.as_table(answer),
         "markdown": lambda: report.as_markdown(answer),
@@ -82,19 +89,37 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
     finish(ctx, objection=not answer.verified, exit_zero=exit_zero)
 
 
-def _comparison(run: Run, situation: Situation, options: dict[str, Any]) -> Comparison:
-    """Read the switched run as the reference was read, and hold one against the other."""
+def _page(answer: Verdict, run: Run, options: dict[str, Any]) -> str:
+    """Draw the figure, wide and narrow, and write the page around it."""
+    from d2rpick import plots
+    from d2rpick.report.page import Record
+    from d2rpick.report.verdict_page import as_page
+
+    caption = "Internal energy with its level at td, and the pair"
+    figures = {caption: plots.both_widths(plots.draw_verdict, answer, "pair")}
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), figures))
+
+
+def _switched(options: dict[str, Any]) -> Run | None:
+    """Open the switched run, as the reference is read; None where none was given."""
     from d2rpick.readers import open_run
+
+    if not options["switched"]:
+        return None
+    return open_run(options["switched"], shared.selection(options), options["input_format"])
+
+
+def _comparison(run: Run, other: Run, answer: Verdict, selection: Selection) -> Comparison:
+    """Hold the switched run against the reference, read in the same way."""
     from d2rpick.switched import compare
 
-    selection = shared.selection(options)
-    other = open_run(options["switched"], selection, options["input_format"])
+    situation = answer.situation
     flight, parts = situation.flight, situation.history.parts
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
     return compare(
         situation.history,
         other.history(selection),
-        (options["tr"], situation.td),
+        (answer.candidate.tr, situation.td),
         situation.latest_td if situation.latest_td > situation.td else float("inf"),
         situation.settings.tolerance,
         momenta=(run.momentum(together), _momentum(other, together)),

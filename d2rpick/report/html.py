@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from d2rpick.report.tables import Cell
 
 _VOID = frozenset({"meta", "link", "br", "hr"})
+# Characters that no page may hold.
+_CONTROLS = dict.fromkeys({*range(32), *range(127, 160)} - {*map(ord, "\t\n")}, "\ufffd")
 
 
 class Markup(str):
@@ -31,38 +33,47 @@ def tag(name: str, /, *children: str, **attributes: str) -> Markup:
     >>> tag("meta", charset="utf-8")
     '<meta charset="utf-8">'
     """
-    given = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(text)}"' for key, text in attributes.items())
+    given = "".join(f' {key.rstrip("_").replace("_", "-")}="{_escape(text)}"' for key, text in attributes.items())
     return Markup(f"<{name}{given}>" if name in _VOID else f"<{name}{given}>{join(children)}</{name}>")
 
 
 def join(children: Iterable[str], between: str = "") -> Markup:
     """Put elements and texts one after the other."""
     return Markup(
-        between.join(child if isinstance(child, Markup) else escape(child, quote=False) for child in children)
+        between.join(child if isinstance(child, Markup) else _escape(child, quote=False) for child in children)
     )
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None) -> Markup:
+def table(title: str, head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None) -> Markup:
     """Give a table in a box that scrolls sideways where it is too wide; the row ``marked`` stands out.
 
-    Columns of numbers, and of what is not known, are set to the right.
+    Columns of numbers, and of what is not known, are set to the right.  ``title`` is what the box is called when it is
+    reached by keyboard.
     """
     body = [list(row) for row in rows]
     right = [all(row[i] is None or isinstance(row[i], (int, float)) for row in body) for i in range(len(head))]
     classes = [{"class_": "number"} if one else {} for one in right]
-
-    def line(cell: str, texts: Iterable[str], **attributes: str) -> Markup:
-        return tag("tr", *(tag(cell, text, **own) for text, own in zip(texts, classes, strict=True)), **attributes)
-
-    lines = [line("td", map(_text, row), **({"class_": "marked"} if i == marked else {})) for i, row in enumerate(body)]
-    content = tag("table", tag("thead", line("th", head)), tag("tbody", *lines))
-    return tag("div", content, class_="scroll", tabindex="0")
+    top = (tag("th", name, scope="col", **own) for name, own in zip(head, classes, strict=True))
+    lines = [
+        tag(
+            "tr",
+            *(tag("td", _text(cell), **own) for cell, own in zip(row, classes, strict=True)),
+            **({"class_": "marked"} if i == marked else {}),
+        )
+        for i, row in enumerate(body)
+    ]
+    content = tag("table", tag("thead", tag("tr", *top)), tag("tbody", *lines))
+    return tag("div", content, class_="scroll", role="region", aria_label=title, tabindex="0")
 
 
 def pairs(rows: Iterable[tuple[str, str]]) -> Markup:
     """Give a list of names, each with what it stands for; nothing where there are none."""
     listed = [tag("div", tag("dt", name), tag("dd", text)) for name, text in rows]
     return tag("dl", *listed) if listed else Markup()
+
+
+def _escape(text: str, *, quote: bool = True) -> str:
+    return escape(text, quote=quote).translate(_CONTROLS)
 
 
 def _text(cell: Cell) -> str:

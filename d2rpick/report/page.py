@@ -1,45 +1,50 @@
-"""The answer of ``suggest`` as one HTML page to be read, printed and signed; it needs nothing but itself."""
+"""What the HTML pages of ``suggest`` and ``verify`` have in common; a page needs nothing but itself."""
 
 from __future__ import annotations
 
 import shlex
+from dataclasses import dataclass
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from d2rpick import __version__
-from d2rpick.judged_card import of_suggestion
+from d2rpick.errors import D2RPickError
+from d2rpick.judged_card import of_parts
 from d2rpick.report.health import measures_of
 from d2rpick.report.html import Markup, join, pairs, table, tag
 from d2rpick.report.situation import heading
-from d2rpick.report.suggestion import HEAD, outlook, rows
 from d2rpick.report.tables import measure, short
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from d2rpick.choice import Pair, Suggestion
+    from d2rpick.candidates import Candidate
+    from d2rpick.cautions import Caution
+    from d2rpick.health import Health
     from d2rpick.history import History
     from d2rpick.readers import Run
+    from d2rpick.situation import Situation
 
-# More rows than one compares by eye; csv and json hold all.
-_MOST_ROWS = 20
 # Nothing is ever fetched, and nothing runs, whatever the files that were read may hold.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
-def as_page(answer: Suggestion, run: Run, command: Sequence[str], figures: Mapping[str, tuple[str, str]]) -> str:
-    """Write the page.
+@dataclass(frozen=True)
+class Record:
+    """What a page shows besides the answer.
 
-    Parameters
-    ----------
-    answer : Suggestion
-    run : Run
-        What was read.
-    command : sequence of str
-        Arguments that repeat the answer.
-    figures : mapping of str to (str, str)
-        SVG elements by caption, each for a wide and for a narrow page, with ids of their own.
+    ``run`` is what was read; ``command`` repeats the answer, ``judging`` are the options of ``card`` that judge by the
+    same history.  ``figures`` are SVG elements by caption, for a wide and for a narrow page, with ids of their own.
     """
+
+    run: Run
+    command: Sequence[str]
+    judging: Sequence[str]
+    figures: Mapping[str, tuple[str, str]]
+
+
+def document(run: Run, sections: Iterable[Markup]) -> str:
+    """Write a page about a run, with a line to sign on when it is printed."""
     name = next((database.title for database in run.databases if database.title), "") or run.name
     head = tag(
         "head",
@@ -49,137 +54,117 @@ def as_page(answer: Suggestion, run: Run, command: Sequence[str], figures: Mappi
         tag("title", f"Switch times: {name}"),
         tag("style", _resource("style.css")),
     )
-    body = tag(
-        "body",
-        tag("header", tag("h1", f"Switch times: {name}"), tag("p", f"d2rpick {__version__}", class_="soft")),
-        tag("main", *_sections(answer, run, command, figures)),
-        tag("p", *(tag("span", line) for line in ("chosen by", "date", "signature")), class_="sign"),
-    )
+    # on top, beside the times: behind a card of any length it may stand on a sheet of its own
+    sign = tag("p", *(tag("span", line) for line in ("chosen by", "date", "signature")), class_="sign")
+    made_by = tag("p", f"d2rpick {__version__}", class_="soft")
+    body = tag("body", tag("header", tag("h1", f"Switch times: {name}"), made_by, sign), tag("main", *sections))
     return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
 
 
-def _sections(
-    answer: Suggestion, run: Run, command: Sequence[str], figures: Mapping[str, tuple[str, str]]
-) -> Iterator[Markup]:
-    yield _choice(answer)
-    yield join(_figure(caption, *svg) for caption, svg in figures.items())
-    yield _section("Candidates", *_candidates(answer))
-    yield _parts(answer)
-    yield _section("What was read", _read(answer, run))
-    yield _section("Health of the reference run", *_health(answer))
-    yield _section("Method and limits", _resource("method.html"))
-    again = shlex.join(["d2rpick", *command])
-    yield _section("To repeat this", tag("pre", again, class_="wrap"))
-    yield from _card(answer)
-
-
-def _section(title: str, *content: str) -> Markup:
+def section(title: str, *content: str) -> Markup:
+    """Give a section under its title."""
     return tag("section", tag("h2", title), *content)
 
 
-def better_pair(answer: Suggestion) -> Pair | None:
-    """Give the better pair where it is another one than that recommended, to the digits that people read."""
-    better, chosen = answer.better_td, answer.recommended
-    same = (
-        better and chosen and [short(t) for t in (better.tr, better.td)] == [short(t) for t in (chosen.tr, chosen.td)]
-    )
-    return None if same else better
-
-
-def _choice(answer: Suggestion) -> Markup:
-    history, better = answer.situation.history, better_pair(answer)
-    cards = [_pair("Recommended", answer.recommended, history, class_="card chosen")]
-    if better:
-        cards.append(_pair("Better pair: td at the nearest peak", better, history, class_="card"))
-    warnings = [tag("li", tag("b", caution.code), f": {caution.message}") for caution in answer.cautions]
-    listed = tag("ul", *warnings, class_="warnings") if warnings else Markup()
-    return tag("section", tag("div", *cards, class_="choice"), listed, pairs(outlook(answer)))
-
-
-def _pair(title: str, pair: Pair | None, history: History, class_: str) -> Markup:
-    if pair is None:
-        return tag("div", tag("h3", title), tag("p", "No tr can be recommended for this td."), class_=class_)
+def pair(title: str, times: tuple[float, float], residual: float | None, history: History, class_: str) -> Markup:
+    """Show (tr, td) large, and in full below."""
     unit = f" {history.time_unit}" if history.time_unit else ""
-    times = (tag("span", tag("i", name), f"{short(time)}{unit}") for name, time in (("tr", pair.tr), ("td", pair.td)))
-    residual = "residual unknown" if pair.residual is None else f"residual {measure(pair.residual)}"
-    share = (pair.td - pair.tr) / float(history.time[-1] - history.time[0])
-    text = f"{residual}, rigid for {short(pair.td - pair.tr)}{unit}, {share:.0%} of the record"
-    exact = f"in full: tr = {pair.tr!r}, td = {pair.td!r}"
-    lines = (tag("p", text), tag("p", exact, class_="soft"))
-    return tag("div", tag("h3", title), tag("div", *times, class_="times"), *lines, class_=class_)
+    (tr, td), span = times, float(history.time[-1] - history.time[0])
+    shown = (tag("span", tag("i", name), f"{short(time)}{unit}") for name, time in (("tr", tr), ("td", td)))
+    known = "residual unknown" if residual is None else f"residual {measure(residual)}"
+    text = f"{known}, rigid for {short(td - tr)}{unit}, {(td - tr) / span:.0%} of the record"
+    exact = ("in full: ", tag("span", f"tr = {tr!r}"), ", ", tag("span", f"td = {td!r}"))
+    lines = (tag("p", text), tag("p", *exact, class_="soft exact"))
+    return tag("div", tag("h2", title), tag("div", *shown, class_="times"), *lines, class_=class_)
 
 
-def _parts(answer: Suggestion) -> Markup:
-    """Show what each part has of the mismatch at the recommended pair."""
-    best = next((candidate for candidate in answer.candidates if candidate.recommended), None)
-    if best is None or not best.parts:
+def remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
+    """List reasons and warnings; nothing where there are none."""
+    lines = [tag("li", reason) for reason in reasons]
+    lines += [tag("li", tag("b", caution.code), f": {caution.message}") for caution in cautions]
+    return tag("ul", *lines, class_="warnings") if lines else Markup()
+
+
+def digests(sources: Iterable[str]) -> list[tuple[str, str]]:
+    """Name each file with its SHA-256."""
+    from d2rpick.readers.source import sha256
+
+    return [("SHA-256", f"{name}: {sha256(name)}") for name in sources]
+
+
+def drawings(figures: Mapping[str, tuple[str, str]]) -> Markup:
+    """Show each figure with its caption, as wide as the page."""
+    return join(_figure(caption, *svg) for caption, svg in figures.items())
+
+
+def parts(candidate: Candidate | None) -> Markup:
+    """Show what each part has of the mismatch at a pair; nothing where the parts are not known."""
+    if candidate is None or not candidate.parts:
         return Markup()
     sign = {True: "same", False: "opposite", None: "unknown"}
     listed = [
         (one.name, sign[one.sign_match], "-" if one.share is None else f"{one.share:.0%}", one.reason or "")
-        for one in best.parts
+        for one in candidate.parts
     ]
-    return _section("Parts at the recommended pair", table(("part", "sign", "share of the mismatch", ""), listed))
+    title = "Parts at this pair"
+    return section(title, table(title, ("part", "sign", "share of the mismatch", "remark"), listed))
+
+
+def evidence(situation: Situation, health: Health | None, record: Record) -> Iterator[Markup]:
+    """Tell what was read, how healthy it is, by what method it was judged, and how to repeat that."""
+    yield section("What was read", _read(situation, record.run))
+    yield section("Health of the reference run", *_health(health))
+    yield section("Method and limits", _resource("method.html"))
+    stdin = [tag("p", "with the same history on standard input:")] if "-" in record.run.sources else []
+    yield section("To repeat this", *stdin, tag("pre", shlex.join(record.command), class_="wrap"))
+
+
+def solver_input(situation: Situation, times: tuple[float, float], record: Record) -> Markup:
+    """Give LS-DYNA's card where the parts are known, else the command that prints the solver's input."""
+    history, title = situation.history, "For the solver's input"
+    radioss = history.format.startswith("radioss")
+    command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
+    command += ["--solver", "radioss", "--node", "IDS"] if radioss else ["--part", "IDS"]
+    line = tag("pre", shlex.join([*command, *record.judging]), class_="wrap")
+    printed = (tag("p", "Printed, and judged once more as printed, by"), line)
+    if radioss:
+        return section(title, *printed)
+    try:
+        found = of_parts(history, times, situation.settings)
+    except D2RPickError as error:
+        return section(title, tag("p", f"There is no card for these times: {error}"))
+    return section(title, tag("pre", found[0].text)) if found else section(title, *printed)
 
 
 def _figure(caption: str, wide: str, narrow: str) -> Markup:
-    drawings = (tag("div", Markup(svg), class_=name) for svg, name in ((wide, "wide"), (narrow, "narrow")))
-    return tag("figure", *drawings, tag("figcaption", caption))
+    drawn = (
+        tag("div", Markup(svg), class_=name, role="img", aria_label=caption)
+        for svg, name in ((wide, "wide"), (narrow, "narrow"))
+    )
+    return tag("figure", *drawn, tag("figcaption", caption))
 
 
-def _candidates(answer: Suggestion) -> Iterator[Markup]:
-    if not answer.candidates:
-        yield tag("p", "There are none.")
-        return
-    shown = answer.candidates[:_MOST_ROWS]
-    marked = next((i for i, candidate in enumerate(shown) if candidate.recommended), None)
-    yield table([name.replace("+-", "±") for name in HEAD[1:]], [row[1:] for row in rows(answer, _MOST_ROWS)], marked)
-    left = len(answer.candidates) - len(shown)
-    if left:
-        yield tag("p", f"{left} more in the results as csv or json.", class_="soft")
-
-
-def _read(answer: Suggestion, run: Run) -> Markup:
-    from d2rpick.readers.source import sha256
-
-    listed = [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in heading(answer.situation)]
-    listed += [("SHA-256", f"{name}: {sha256(name)}") for name in run.sources]
+def _read(situation: Situation, run: Run) -> Markup:
+    listed = [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in heading(situation)]
+    listed += digests(run.sources)
     listed += [(f"{database.format} by", database.version) for database in run.databases if database.version]
-    whole = "the files end behind a whole state" if answer.situation.history.complete else "only whole states were used"
+    whole = "the files end behind a whole state" if situation.history.complete else "only whole states were used"
     listed += [("complete", whole)]
-    return pairs(listed + [("note", note) for note in answer.situation.history.notes])
+    return pairs(listed + [("note", note) for note in situation.history.notes])
 
 
-def _health(answer: Suggestion) -> Iterator[Markup]:
-    if answer.health is None or not any(one.value for one in measures_of(answer.health)):
+def _health(health: Health | None) -> Iterator[Markup]:
+    if health is None or not any(one.value for one in measures_of(health)):
         yield tag("p", "The files hold no energies that tell it.")
         return
     verdicts = {True: tag("span", "kept", class_="good"), False: tag("span", "exceeded", class_="bad"), None: "-"}
-    listed = [
-        (one.what, one.value or "not written", one.limit, verdicts[one.good]) for one in measures_of(answer.health)
-    ]
-    yield table(("measure", "this run", "practice", "verdict"), listed)
-    window = answer.health.window
+    listed = [(one.what, one.value or "not written", one.limit, verdicts[one.good]) for one in measures_of(health)]
+    yield table("Health of the reference run", ("measure", "this run", "practice", "verdict"), listed)
+    window = health.window
     where = " The window is {:.6g} to {:.6g}.".format(*window) if window else ""
     yield tag("p", f"Up to td; shares are of the peak of the internal energy.{where}", class_="soft")
-    if answer.health.reason:
-        yield tag("p", answer.health.reason)
-
-
-def _card(answer: Suggestion) -> Iterator[Markup]:
-    """Give the solver's input: LS-DYNA's card where the parts are known, else the command that prints one."""
-    pair, history = answer.recommended, answer.situation.history
-    if pair is None:
-        return
-    found = None if history.format.startswith("radioss") else of_suggestion(answer)
-    if found:
-        yield _section("For the solver's input", tag("pre", found[0].text))
-        return
-    solver = "--solver radioss --node IDS" if history.format.startswith("radioss") else "--part IDS"
-    command = f"d2rpick card --tr {pair.tr!r} --td {pair.td!r} {solver} --history {shlex.quote(history.source[0])}"
-    yield _section(
-        "For the solver's input", tag("p", "Printed, and judged once more as printed, by"), tag("pre", command)
-    )
+    if health.reason:
+        yield tag("p", health.reason)
 
 
 def _resource(name: str) -> Markup:

@@ -15,32 +15,32 @@ if TYPE_CHECKING:
     from d2rpick.switched import Comparison
 
 SCHEMA = "d2rpick/verify/1"
+COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: Verdict) -> str:
     """Heading, the measures of the pair, the verdict and its reasons."""
-    width = max(len(name) for name in _measures(answer))
-    lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in _measures(answer).items()]
-    verdict = "verified" if answer.verified else "unknown" if answer.tr_ok is None else "not verified"
+    width = max(len(name) for name in measures(answer))
+    lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in measures(answer).items()]
     reasons = [f"  {reason}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
-    return "\n".join([*heading(answer.situation), "", *lines, "", f"verdict  {verdict}", *reasons])
+    return "\n".join([*heading(answer.situation), "", *lines, "", f"verdict  {word(answer)}", *reasons])
 
 
 def as_markdown(answer: Verdict) -> str:
     """The measures as a Markdown table of two columns, and the reasons below it."""
-    table = tables.as_markdown(("measure", "value"), list({**_measures(answer), **_of_switched(answer)}.items()))
+    table = tables.as_markdown(("measure", "value"), list({**measures(answer), **_of_switched(answer)}.items()))
     return "\n".join([table, *(f"\n* {reason}" for reason in answer.reasons)])
 
 
 def as_csv(answer: Verdict) -> str:
     """One row, a column for each measure, those of a switched run with ``switched_`` before them, and the reasons."""
     situation = answer.situation
-    measures = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **_measures(answer)}
-    measures |= _of_switched(answer)
-    measures["reasons"] = "; ".join(answer.reasons)
-    return tables.as_csv(list(measures), [list(measures.values())]).rstrip("\n")
+    row = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **measures(answer)}
+    row |= _of_switched(answer)
+    row["reasons"] = "; ".join(answer.reasons)
+    return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
 
 
 def as_json(answer: Verdict, command: Sequence[str]) -> str:
@@ -50,29 +50,43 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
         {
             **frame(situation, SCHEMA, command, answer.cautions),
             **mechanics(situation),
-            **_measures(answer),
+            **measures(answer),
             "parts": [part._asdict() for part in answer.candidate.parts],
+            "health": asdict(answer.health) if answer.health else None,
             "reasons": list(answer.reasons),
             "switched": asdict(answer.switched) if answer.switched else None,
         }
     )
 
 
-def _comparison(switched: Comparison) -> list[str]:
-    """Lines that hold the switched run against the reference."""
-    rows = [
+def word(answer: Verdict) -> str:
+    """The verdict in a word or two."""
+    return "verified" if answer.verified else "unknown" if answer.tr_ok is None else "not verified"
+
+
+def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
+    """Rows of numbers that both runs have, below ``COMPARED``."""
+    return [
         ("energy locked in, at td", switched.energy_frozen, switched.energy_td),
         ("mean after td", switched.mean_after, switched.mean_after_reference),
         ("spread after td", switched.spread_after, switched.spread_after_reference),
     ]
+
+
+def deviations(switched: Comparison) -> list[tuple[str, str]]:
+    """How far the switched run moves off the reference after td."""
     error, displacement = switched.momentum_error, switched.displacement
     off = "not in both runs" if error is None else f"{error:.2g} of its largest"
     moved = "not in both runs" if displacement is None else f"{displacement:.3g}"
+    return [("largest error of the momentum after td", off), ("largest displacement after td", moved)]
+
+
+def _comparison(switched: Comparison) -> list[str]:
+    """Lines that hold the switched run against the reference."""
     return [
         f"switched run  {', '.join(switched.source)}; after td means to {switched.end:.6g}",
-        tables.as_text(("", "switched", "reference"), rows),
-        f"largest error of the momentum after td  {off}",
-        f"largest displacement after td           {moved}",
+        tables.as_text(COMPARED, comparison(switched)),
+        *(f"{name.ljust(38)}  {text}" for name, text in deviations(switched)),
         *(f"note: {note}" for note in switched.notes),
     ]
 
@@ -83,7 +97,8 @@ def _of_switched(answer: Verdict) -> dict[str, Any]:
     return {f"switched_{name}": value for name, value in found.items() if name not in ("source", "notes")}
 
 
-def _measures(answer: Verdict) -> dict[str, Any]:
+def measures(answer: Verdict) -> dict[str, Any]:
+    """All measures of the pair by their names in JSON."""
     c = answer.candidate
     return {
         "tr": c.tr,

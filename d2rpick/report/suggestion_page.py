@@ -1,0 +1,72 @@
+"""The answer of ``suggest`` as one HTML page to be read, printed and signed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from d2rpick.report import page
+from d2rpick.report.html import Markup, pairs, table, tag
+from d2rpick.report.suggestion import HEAD, outlook, rows
+from d2rpick.report.tables import measure, short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.choice import Pair, Suggestion
+
+# More rows than one compares by eye; csv and json hold all.
+_MOST_ROWS = 20
+
+
+def as_page(answer: Suggestion, record: page.Record) -> str:
+    """Write the page."""
+    return page.document(record.run, _sections(answer, record))
+
+
+def better_pair(answer: Suggestion) -> Pair | None:
+    """Give the better pair where it is another one and better than that recommended, to the digits people read."""
+    better, chosen = answer.better_td, answer.recommended
+    if better is None or chosen is None:
+        return better
+    if better.residual is not None and chosen.residual is not None:
+        return better if float(measure(better.residual)) < float(measure(chosen.residual)) else None
+    return better if short(better.td) != short(chosen.td) else None
+
+
+def _sections(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
+    yield _choice(answer)
+    yield page.drawings(record.figures)
+    yield page.section("Candidates", *_candidates(answer))
+    yield page.parts(next((candidate for candidate in answer.candidates if candidate.recommended), None))
+    yield from page.evidence(answer.situation, answer.health, record)
+    if answer.recommended:
+        yield page.solver_input(answer.situation, (answer.recommended.tr, answer.recommended.td), record)
+
+
+def _choice(answer: Suggestion) -> Markup:
+    better = better_pair(answer)
+    if answer.recommended:
+        cards = [_pair(answer, "Recommended", answer.recommended, class_="card chosen")]
+    else:
+        nothing = tag("p", "No tr can be recommended for this td.")
+        cards = [tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")]
+    if better:
+        cards.append(_pair(answer, "Better pair: td at the nearest peak", better, class_="card"))
+    return tag("section", tag("div", *cards, class_="choice"), page.remarks(answer.cautions), pairs(outlook(answer)))
+
+
+def _pair(answer: Suggestion, title: str, pair: Pair, class_: str) -> Markup:
+    return page.pair(title, (pair.tr, pair.td), pair.residual, answer.situation.history, class_)
+
+
+def _candidates(answer: Suggestion) -> Iterator[Markup]:
+    if not answer.candidates:
+        yield tag("p", "There are none.")
+        return
+    shown = answer.candidates[:_MOST_ROWS]
+    marked = next((i for i, candidate in enumerate(shown) if candidate.recommended), None)
+    head = [name.replace("+-", "±") for name in HEAD[1:]]
+    yield table("Candidates", head, [row[1:] for row in rows(answer, _MOST_ROWS)], marked)
+    left = len(answer.candidates) - len(shown)
+    if left:
+        yield tag("p", f"{left} more in the results as csv or json.", class_="soft")

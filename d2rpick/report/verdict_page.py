@@ -1,0 +1,48 @@
+"""The answer of ``verify`` as one HTML page to be read, printed and signed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from d2rpick.report import page
+from d2rpick.report.html import pairs, table, tag
+from d2rpick.report.tables import short
+from d2rpick.report.verdict import COMPARED, comparison, deviations, measures, word
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.choice import Verdict
+    from d2rpick.report.html import Markup
+    from d2rpick.switched import Comparison
+
+
+def as_page(answer: Verdict, record: page.Record) -> str:
+    """Write the page."""
+    return page.document(record.run, _sections(answer, record))
+
+
+def _sections(answer: Verdict, record: page.Record) -> Iterator[Markup]:
+    situation, candidate = answer.situation, answer.candidate
+    times = candidate.tr, situation.td
+    class_ = "card chosen" if answer.verified else "card refused"
+    shown = page.pair(word(answer).capitalize(), times, candidate.residual, situation.history, class_)
+    yield tag("section", tag("div", shown, class_="choice"), page.remarks(answer.cautions, answer.reasons))
+    yield page.drawings(record.figures)
+    yield page.section(
+        "Measures", pairs((name.replace("_", " "), short(one)) for name, one in measures(answer).items())
+    )
+    yield page.parts(candidate)
+    if answer.switched:
+        yield _switched(answer.switched)
+    yield from page.evidence(situation, answer.health, record)
+    if answer.verified:
+        yield page.solver_input(situation, times, record)
+
+
+def _switched(found: Comparison) -> Markup:
+    """Show what the finished switched run has of the reference."""
+    title = "The switched run"
+    listed = [("after td", f"means to {found.end:.6g}"), *deviations(found), *page.digests(found.source)]
+    listed += [("note", note) for note in found.notes]
+    return page.section(title, table(title, ("quantity", *COMPARED[1:]), comparison(found)), pairs(listed))
