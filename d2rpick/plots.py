@@ -13,10 +13,15 @@ from d2rpick.errors import FormatError
 from d2rpick.replay import Replay, Trajectory, from_mode
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
 
     from d2rpick.candidates import Candidate
     from d2rpick.choice import Suggestion, Verdict
+    from d2rpick.rollover.record import Record
+    from d2rpick.rollover.run import Window
+    from d2rpick.rollover.scan import Outcome
     from d2rpick.situation import Situation
 
 FORMATS = ("png", "svg", "pdf")
@@ -27,6 +32,8 @@ _LOGARITHMIC = 20.0
 _DECADES_BELOW_LEVEL = 2.0
 # Up to so many candidates their marks leave the curve visible.
 _FEW = 40
+# Outlines of the rolling box, as many as can be told apart.
+_OUTLINES = 8
 
 
 def format_of(name: str) -> str:
@@ -69,6 +76,55 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
         if switched:
             axes.axvspan(switched.tr, switched.td, color=_FLIGHT, alpha=0.2, label="rigid", linewidth=0)
         _finish(axes)
+    return figure
+
+
+def draw_rollover(reference: Record, switched: Record | None, window: Window | None) -> Figure:
+    """Outlines of the box at even times, with and without switching; beside them roll and height over time."""
+    figure = Figure(figsize=(11, 5.5), layout="constrained")
+    outlines, roll, height = figure.subplot_mosaic([["o", "r"], ["o", "h"]], width_ratios=(1.4, 1)).values()
+    runs = [(reference, _REFERENCE, "without switching"), (switched, _SWITCHED, "switched")]
+    for record, colour, name in [(record, colour, name) for record, colour, name in runs if record]:
+        shown = np.linspace(0, record.time.size - 1, _OUTLINES).round().astype(int)
+        closed = np.column_stack([record.outline[shown], record.outline[shown, 0]]).T
+        style = "-" if record is reference else "--"
+        outlines.plot(closed.real, closed.imag, color=colour, linewidth=0.9, linestyle=style)
+        roll.plot(record.time, np.degrees(record.roll), color=colour, linewidth=1, linestyle=style, label=name)
+        height.plot(record.time, record.centre.imag, color=colour, linewidth=1, linestyle=style, label=name)
+    outlines.set(aspect="equal", xlabel="x [m]", ylabel="z [m]")
+    outlines.set_title(f"box every {reference.time[-1] / (_OUTLINES - 1) * 1e3:.3g} ms", fontsize="medium")
+    outlines.grid(visible=True, linewidth=0.3)
+    roll.set(ylabel="roll [degrees]")
+    height.set(ylabel="height of the centre [m]", xlabel="time [s]")
+    for axes in (roll, height):
+        if window:
+            axes.axvspan(window.tr, window.td, color=_FLIGHT, alpha=0.2, linewidth=0, label="rigid")
+        _finish(axes)
+    return figure
+
+
+def draw_scan(reference: Record, outcomes: Sequence[Outcome], td: float, recommended: float | None) -> Figure:
+    """Energy of the box against its level at td; below it, against tr, the errors of roll and of mean energy."""
+    figure = Figure(figsize=(9, 8), layout="constrained")
+    energy, roll, mean = figure.subplots(3, 1, sharex=True)
+    before = reference.time <= td
+    internal = reference.internal_energy[before, 0]
+    energy.plot(reference.time[before], internal, color=_REFERENCE, linewidth=1, label="internal energy of the box")
+    energy.axhline(internal[-1], color=_SWITCHED, linewidth=0.8, label=f"level at td, {internal[-1]:.4g}")
+    times = [one.tr for one in outcomes]
+    roll.plot(times, [abs(one.roll_error) for one in outcomes], ".-", color=_REFERENCE, label="roll error at td")
+    mean.plot(times, [one.mean_ratio - 1 for one in outcomes], ".-", color=_REFERENCE, label="error of the mean energy")
+    mean.axhline(0, color=_REFERENCE, linewidth=0.5)
+    energy.set_ylabel("energy [J]")
+    roll.set(ylabel="|roll error| [degrees]", yscale="log")
+    mean.set(ylabel="mean energy after td,\nrelative error", xlabel="tr [s]")
+    for axes in (energy, roll, mean):
+        if reference.released is not None:
+            axes.axvspan(0, reference.released, color=_SWITCHED, alpha=0.1, linewidth=0, label="the sled pushes")
+        _finish(axes)
+        if recommended is not None:
+            axes.axvline(recommended, color=_GOOD, linestyle="--", linewidth=1, label="recommended tr")
+            axes.legend(fontsize="small", loc="upper right")
     return figure
 
 

@@ -93,9 +93,8 @@ class Motion:
         """Bring the velocities to half a step after the places; give their mean over the step, shape (n,) [m/s]."""
         s, before = self.structure, self.velocities
         push = self.contact.push(self.time, self.places, before)
-        outer: Plane = s.masses * (-1j * GRAVITY)
-        if push:
-            outer += push.forces
+        weight = np.asarray(s.masses * (-1j * GRAVITY), dtype=np.complex128)
+        outer = weight + push.forces if push else weight
         forces = outer + self.step.forces(self.places)
         if not self.body:
             forces += self.box.forces(self.places)
@@ -104,7 +103,7 @@ class Motion:
         if self.body:
             self.body.push(forces[: s.of_box], self.damping, self.dt)
             after[: s.of_box] = self.body.velocities
-        mean: Plane = (before + after) / 2
+        mean: Plane = np.multiply(0.5, before + after)
         self._account(mean, outer, push)
         self.velocities = after
         return mean
