@@ -10,6 +10,8 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from d2rpick.rollover.model import Parameters
     from d2rpick.rollover.record import Record
 
@@ -130,7 +132,7 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
         from d2rpick import plots
 
         output.write(plot, plots.render(plots.draw_scan(reference, outcomes, td, recommended), plot))
-    texts = {
+    texts: dict[str, Callable[[], str]] = {
         "table": lambda: report.as_table(reference, outcomes, td, recommended),
         "markdown": lambda: report.as_markdown(outcomes),
         "csv": lambda: report.as_csv(outcomes),

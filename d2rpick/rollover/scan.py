@@ -64,10 +64,15 @@ def scan(
     """Compute a switched run for each of ``times``; give outcomes in the order of tr as they are ready.
 
     All runs are the reference until their tr, so that is computed once; then ``jobs`` processes share them (None: one
-    for each core).
+    for each core; 1: this one).
     """
     end = comparison_end(reference, td)
     motion = Motion(parameters, _interval(reference))
+    if jobs == 1:
+        for tr in sorted(times):
+            run_to(motion, tr)
+            yield compare(reference, proceed(motion.copy(), end, Window(tr, td)), tr, td)
+        return
     # a fresh process is safe whatever threads this one runs
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         tasks = []
