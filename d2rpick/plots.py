@@ -99,7 +99,7 @@ def draw_rollover(reference: Record, switched: Record | None, window: Window | N
     for axes in (roll, height):
         if window:
             axes.axvspan(window.tr, window.td, color=_FLIGHT, alpha=0.2, linewidth=0, label="rigid")
-        _finish(axes, "lower right" if axes is roll else "lower left")
+        _finish(axes)
     return figure
 
 
@@ -123,7 +123,7 @@ def draw_scan(reference: Record, outcomes: Sequence[Outcome], td: float, recomme
             axes.axvspan(0, reference.released, color=_SWITCHED, alpha=0.1, linewidth=0, label="the sled pushes")
         if recommended is not None:
             axes.axvline(recommended, color=_GOOD, linestyle="--", linewidth=1, label="recommended tr")
-        _finish(axes, "lower right" if axes is mean else "upper right")
+        _finish(axes)
     return figure
 
 

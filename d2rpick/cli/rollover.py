@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -125,8 +126,7 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     recommended = pair.tr if pair else None
     times = sorted({*scan_times(reference.released or td / 3, td), *([pair.tr] if pair else [])})
     found = scan(parameters, reference, times, td, options["jobs"])
-    stderr = click.get_text_stream("stderr")
-    with click.progressbar(found, len(times), "switched runs", file=stderr, hidden=options["quiet"]) as runs:
+    with click.progressbar(found, len(times), "switched runs", file=sys.stderr, hidden=options["quiet"]) as runs:
         outcomes = list(runs)
     if plot:
         from d2rpick import plots

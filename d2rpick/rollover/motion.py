@@ -78,6 +78,7 @@ class Motion:
 
     def make_rigid(self) -> None:
         """Switch the box to a rigid body: its momenta stay, its vibration stops, its deformation is frozen."""
+        self.box.forces(self.places)  # for the last time: where it yields now, it does so before it is frozen
         of_box = slice(self.structure.of_box)
         masses, before = self.structure.masses[of_box], self.velocities[of_box]
         self.body = RigidBody(masses, self.places[of_box], before)
