@@ -1,0 +1,100 @@
+"""The command ``rollover``: what it writes is read back, scans in every form, figures, refusals."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+import jsonschema
+import numpy as np
+import pytest
+
+from tests.command import answer, run
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SMALL = ("--mesh", "4", "--dt", "2e-4")
+SHORT = (*SMALL, "--t-end", "0.12")
+COLUMNS = "time,x,z,roll,vx,vz,omega,internal_energy,kinetic_energy,momentum_x,momentum_z"
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.h5", "run.glstat", "run.matsum"])
+def test_every_format_is_read_back_with_the_energies_of_the_run(name: str, tmp_path: Path) -> None:
+    table = np.genfromtxt(io.StringIO(run("rollover", *SHORT).stdout), delimiter=",", names=True)
+    assert ",".join(table.dtype.names or ()) == COLUMNS
+    file = tmp_path / name
+    assert run("rollover", *SHORT, "-o", str(file)).exit_code == 0
+    part = ("--part", "box") if name.endswith("matsum") else ()
+    read = np.genfromtxt(io.StringIO(run("extract", *part, str(file)).stdout), delimiter=",", names=True)
+    np.testing.assert_allclose(read["time"], table["time"], rtol=1e-4)
+    step = 10.0 if name.endswith("glstat") else 1e-3  # the glstat has the energy of the step as well
+    np.testing.assert_allclose(read["internal_energy"], table["internal_energy"], rtol=1e-3, atol=step)
+
+
+def test_the_parts_of_a_matsum_tell_when_they_fly(tmp_path: Path) -> None:
+    file = tmp_path / "run.matsum"
+    run("rollover", *SMALL, "-o", str(file))
+    (flight,) = answer("info", str(file))["flights"]
+    assert [part["title"] for part in flight["parts"]] == ["box", "step"]
+    assert flight["start"] == pytest.approx(0.086, abs=0.003)
+
+
+def test_a_switched_run_is_rigid_in_between_and_differs_after_it(tmp_path: Path) -> None:
+    texts = [run("rollover", *SMALL, *window).stdout for window in ((), ("--tr", "0.1", "--td", "0.2"))]
+    whole, switched = (np.genfromtxt(io.StringIO(text), delimiter=",", names=True) for text in texts)
+    time = whole["time"]
+    np.testing.assert_array_equal(switched[time < 0.1], whole[time < 0.1])
+    rigid = (time > 0.101) & (time < 0.199)
+    assert np.ptp(switched["internal_energy"][rigid]) < 1e-9
+    assert np.ptp(switched["internal_energy"][time > 0.2]) > 0.1
+    plot = tmp_path / "motion.svg"
+    assert run("rollover", *SMALL, "--tr", "0.1", "--td", "0.2", "--plot", str(plot)).stdout == ""
+    assert "without switching" in plot.read_text("utf-8") or plot.stat().st_size > 10_000
+
+
+def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
+    scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.14", "--t-end", "0.15", "-q", *SMALL)
+    plot = tmp_path / "scan.png"
+    found = json.loads(run(*scan, "-f", "json", "--plot", str(plot)).stdout)
+    schema = json.loads((files("d2rpick") / "schemas" / "rollover-1.json").read_text("utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(found, schema, jsonschema.Draft202012Validator)
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    assert found["recommended"] in [one["tr"] for one in found["runs"]]
+    rows = list(csv.DictReader(io.StringIO(run(*scan, "-f", "csv").stdout)))
+    assert [{name: float(cell) for name, cell in row.items()} for row in rows] == found["runs"]
+    text = run(*scan).stdout
+    assert "\n* " in text
+    assert f"recommended  tr = {found['recommended']:.6g}" in text
+
+
+def test_the_progress_of_a_scan_is_told_on_stderr() -> None:
+    result = run("rollover", "--scan", "--jobs", "1", "--td", "0.06", "--t-end", "0.07", *SMALL, "-f", "markdown")
+    assert result.stdout.startswith("| tr |")
+    assert "switched runs" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("args", "complaint"),
+    [
+        (("--tr", "0.1"), "--tr and --td go together"),
+        (("--tr", "0.2", "--td", "0.1"), "is not before"),
+        (("--scan", "--tr", "0.1"), "exclude each other"),
+        (("--scan", "--write-as", "csv"), "exclude each other"),
+        (("--jobs", "2"), "belongs to --scan"),
+        (("-f", "json"), "belongs to --scan"),
+        (("--dt", "1e-9"), "more than"),
+        (("--mesh", "3"), "4"),
+        (("--scan", "--td", "0.5", "--mesh", "4"), "end of the flight"),
+        (("-o", "run.txt"), "--write-as"),
+    ],
+)
+def test_what_cannot_be_run_is_refused_in_one_line(args: tuple[str, ...], complaint: str) -> None:
+    result = run("rollover", *args)
+    assert result.exit_code == 2
+    assert complaint in result.stderr
+    assert result.stderr.count("\n") == 1
