@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.choice import suggest
-from d2rpick.history import EXACT, History, Part
-from d2rpick.momentum import Momenta
+from d2rpick.history import EXACT, History, Momenta, Part
 from d2rpick.rollover.record import BOX, PARTS
 from d2rpick.situation import Settings
 

@@ -31,10 +31,13 @@ ORDER = (
     "readers.companions", "readers.run", "readers",
     "momentum", "crossings", "oscillator", "mode", "fitting", "identify", "measures", "replay", "flight", "situation",
     "cautions", "uncertainty", "candidates", "switched", "choice", "overview",
+    "rollover", "rollover.model", "rollover.bars", "rollover.contact", "rollover.rigid", "rollover.motion",
+    "rollover.record", "rollover.run", "rollover.scan", "rehearsal",
     "report", "report.tables", "report.situation", "report.suggestion", "report.verdict", "report.overview",
+    "report.rollover",
     "writers", "plots",
     "cli", "cli.options", "cli.output", "cli.progress",
-    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract",
+    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract", "cli.rollover",
     "__main__",
 )  # fmt: skip
 # The only modules that may import these.

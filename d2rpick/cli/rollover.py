@@ -25,7 +25,7 @@ EXAMPLES = """\b
 Examples:
   d2rpick rollover --t-end 0.05 -o rollover.matsum
   d2rpick rollover --tr 0.09 --td 0.37 -o switched.csv --plot switched.png
-  d2rpick rollover --scan --plot scan.png
+  d2rpick rollover --scan --mesh 6 --plot scan.png
 """
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.rollover.record import Record
 
 # Between the times of a scan [s], while the load may last and then; and how long before td the last one is.
-_FINE, _COARSE, _LAST = 0.002, 0.02, 0.03
+_FINE, _COARSE, _LAST = 0.003, 0.02, 0.03
 
 
 @dataclass(frozen=True)

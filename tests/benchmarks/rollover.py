@@ -34,7 +34,7 @@ HEAD = (
 def rehearsed(number: int) -> Rehearsal:
     """One set, a tr every 6 ms in the trip."""
     with TemporaryDirectory() as folder:
-        return rehearse(SETS[number], Path(folder), every=3)
+        return rehearse(SETS[number], Path(folder), every=2)
 
 
 def line(number: int, one: Rehearsal) -> tuple[str, bool]:
