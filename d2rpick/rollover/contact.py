@@ -22,8 +22,9 @@ SLIP = 0.1
 DEEPEST = 0.1
 # Thickness of the curb [m]; the sled ends behind it.
 CURB_THICKNESS = 0.05
-# No point is faster against floor, curb or ground than this [m/s]: what tells how long none can touch.
-FASTEST = 30.0
+# No point comes nearer to floor, curb or ground faster than this many times the first speed of the sled and as much
+# again as a fall of a metre gives [m/s]: what tells how long none can touch.
+FASTEST, FALL = 4.0, 5.0
 
 
 class Push(NamedTuple):
@@ -73,7 +74,7 @@ class Contact:
         on_sled = (places - self.sled.place(time)) * self._into_sled
         gap = self._gap(places, on_sled)
         if gap > 0:
-            self._sleeps_until = time + gap / FASTEST
+            self._sleeps_until = time + gap / (FASTEST * self._p.speed + FALL)
             return None
         sliding = (velocities - self.sled.velocity(time)) * self._into_sled
         of_sled = np.zeros(self._points, dtype=np.complex128)
