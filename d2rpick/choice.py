@@ -65,7 +65,7 @@ def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     best = _best(situation, candidates)
     if best:
         candidates = tuple(replace(c, recommended=c is best) for c in candidates)
-    better = _better_td(situation)
+    better = better_pair(situation)
     cautions = list(cautions_of(situation))
     if not best:
         cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
@@ -145,7 +145,7 @@ def _best(situation: Situation, ranked: Iterable[Candidate]) -> Candidate | None
     return next((c for c in ranked if c.acceptable and not _over_limits(situation, c)), None)
 
 
-def _better_td(situation: Situation) -> Pair | None:
+def better_pair(situation: Situation) -> Pair | None:
     """Give the nearest peak of the energy in the flight that has an acceptable tr, and the best one there."""
     for td in sorted(_peaks(situation), key=lambda peak: abs(peak - situation.td)):
         there = situation.at(td)

@@ -15,3 +15,11 @@ class HistoryError(D2RPickError):
 
 class RangeError(D2RPickError):
     """A time or a parameter lies outside what the history or the mechanics allow."""
+
+
+class DeckError(D2RPickError):
+    """A deck cannot be read, or a card cannot be written."""
+
+
+class ConfigurationError(D2RPickError):
+    """The configuration of the deck check is wrong: an unknown rule, key or severity."""

@@ -25,6 +25,8 @@ _EARLIER_ENDS = (0.1, 0.2, 0.35)
 # A window that an oscillator describes shows so many periods at least, and holds most of the samples it was fitted to:
 # less may be an accident, or the moment in which a record passes from one thing to another.
 _LEAST_PERIODS, _MOST = 1.25, 0.8
+# An inner fit whose scatter is below this share of that of the whole shows that the ends are not of the flight.
+_MUCH_BETTER = 0.7
 # The record leaves the fitted oscillator where the mean error over a twenty-fifth of a period (three samples at
 # least) exceeds this share of the vibration energy, this many standard errors of such a mean, or this many times the
 # systematic rest that the fit leaves anyway, whichever is most.  Of a million means of white noise one does by chance.
@@ -111,8 +113,9 @@ def span_of(history: History, anchor: float, fit: Identification, bounds: Span) 
         gone = ~(np.abs(error) <= room)
     middle = int(np.searchsorted(time, anchor))
     before, after = np.flatnonzero(gone[:middle]), np.flatnonzero(gone[middle:])
-    left = int(before[-1]) + 1 if before.size else 0
-    right = middle + int(after[0]) - 1 if after.size else time.size - 1
+    # the mean over ``width`` samples reaches half as far beyond its middle
+    left = int(before[-1]) + 1 + width // 2 if before.size else 0
+    right = middle + int(after[0]) - 1 - width // 2 if after.size else time.size - 1
     return Span(float(time[left]), float(time[right])) if left < right else None
 
 
@@ -174,7 +177,29 @@ def _grow(
             reason = "the record soon leaves the oscillator that fits a part of it"
             return None, replace(fit, describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
-            return grown, fit
+            return _cleared(history, grown, fit, bounds, fitter)
         span = grown
         fit = fitter(*_samples(history, span))
     return (span, fit) if fit.describes_record else (None, fit)
+
+
+def _cleared(
+    history: History, span: Span, fit: Identification, bounds: Span, fitter: Fitter
+) -> tuple[Span, Identification]:
+    """Fit the window once more without half a period at the ends where the record leaves it.
+
+    There a fit may have given way to the beginning of a contact or the end of a load.  Where the inner fit follows its
+    samples much better, it tells the window.
+    """
+    assert fit.mode is not None
+    inset = np.pi / fit.mode.omega
+    inner = Span(
+        span.start + inset if span.start > bounds.start else span.start,
+        span.end - inset if span.end < bounds.end else span.end,
+    )
+    if inner == span or inner.end - inner.start < 2 * _LEAST_PERIODS * 2 * inset:
+        return span, fit
+    core = fitter(*_samples(history, inner))
+    if not core.describes_record or core.rms > _MUCH_BETTER * fit.rms:
+        return span, fit
+    return span_of(history, (inner.start + inner.end) / 2, core, bounds) or span, core

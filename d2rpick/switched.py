@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick import measures
 from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from d2rpick.history import History, Samples, Track
 
 # A deviation of the momentum after td beyond this share of it is worth an objection: the motion is another one.
@@ -22,13 +25,20 @@ _AT_REST = 0.01
 # Some solvers report a wrong energy for rigid solid elements; beyond this share, and beyond what the energy changes
 # from state to state anyway, that is worth a note.
 _REPORTED_OFF = 0.01
+# While rigid the energy keeps its digits; a vibrating one changes by more than this share from state to state.
+_STILL = 1e-4
+# A solver switches at the first step from tr on, and output may miss it by a state or two: this share of the energy
+# about tr is left to that.
+_ABOUT = 0.05
 
 
 @dataclass(frozen=True)
 class Comparison:
     """Measures of a switched run; fields are the keys of the JSON output, None where the files lack the quantity.
 
-    ``energy_frozen`` is the energy that came back at td, ``energy_td`` that of the reference there.  Means and spreads
+    ``energy_frozen`` is the energy that came back at td, ``energy_td`` that of the reference there.
+    ``rigid_from`` and ``rigid_to`` are the first and last state of the window around the middle of (tr, td) in which
+    its energy stands still [time], None where it does not.  Means and spreads
     (standard deviations) are over the time from td to ``end``.  ``momentum_error`` is the largest deviation of the
     momentum behind the first state from td on, relative to the largest that the reference has there;
     ``displacement`` the largest distance there of the parts' centre from where the reference has it [length].
@@ -46,32 +56,33 @@ class Comparison:
     spread_after_reference: float
     momentum_error: float | None
     displacement: float | None
+    rigid_from: float | None
+    rigid_to: float | None
+    objections: tuple[str, ...]
     notes: tuple[str, ...]
-
-    @property
-    def objections(self) -> tuple[str, ...]:
-        """What is wrong with the motion of the switched run."""
-        if self.momentum_error is None or self.momentum_error <= MOST_MOMENTUM_ERROR:
-            return ()
-        return (f"the switched run's momentum after td is off by {self.momentum_error:.1%}: its motion is another one",)
 
 
 def compare(
     reference: History,
     switched: History,
-    td: float,
+    pair: tuple[float, float],
     end: float,
+    tolerance: float,
     momenta: tuple[Track | None, Track | None],
     centres: tuple[Track | None, Track | None],
 ) -> Comparison:
-    """Hold a switched run against its reference from ``td`` to ``end``.
+    """Hold a switched run against its reference: was it rigid from tr to td, and what came after td.
 
     Parameters
     ----------
     reference, switched : History
         Energies of the same parts in both runs.
-    td, end : float
-        Switch back, and the next contact or the end of the records [time].
+    pair : (float, float)
+        tr and td [time].
+    end : float
+        The next contact, or the end of the records [time].
+    tolerance : float
+        On the error of the amplitude that was locked in [-].
     momenta, centres : pair of Track or None
         Of the reference and of the switched run, None where it has none.
 
@@ -80,6 +91,7 @@ def compare(
     RangeError
         If a run holds fewer than three states in that window.
     """
+    tr, td = pair
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
     after, reference_after = _between(switched, td, end), _between(reference, td, end)
     if min(after.size, reference_after.size) < 3:
@@ -91,6 +103,15 @@ def compare(
         after = after[1:]  # the switch comes at the first step from td on: this state was still rigid
     frozen, wanted = float(after[0]), reference.energy_at(td)
     notes = tuple(note for note in switched.notes if note not in reference.notes)
+    error, rigid = _relative(*momenta, td, end), _rigid_window(switched, tr, td)
+    objections = [*_not_rigid(switched, rigid, tr, td), *_not_of_tr(reference, tr, frozen)]
+    level_error = measures.level_error(frozen, wanted)
+    if level_error is not None and level_error > tolerance:
+        objections.append(
+            f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {wanted:.6g}"
+        )
+    if error is not None and error > MOST_MOMENTUM_ERROR:
+        objections.append(f"the switched run's momentum after td is off by {error:.1%}: its motion is another one")
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -101,10 +122,48 @@ def compare(
         mean_after_reference=float(reference_after.mean()),
         spread_after=float(after.std()),
         spread_after_reference=float(reference_after.std()),
-        momentum_error=_relative(*momenta, td, end),
+        momentum_error=error,
         displacement=_distance(*centres, td, end),
+        rigid_from=rigid[0] if rigid else None,
+        rigid_to=rigid[1] if rigid else None,
+        objections=tuple(objections),
         notes=(*notes, *(_reported(float(before[-1]), after) if before.size else ())),
     )
+
+
+def _rigid_window(switched: History, tr: float, td: float) -> tuple[float, float] | None:
+    """First and last state around the middle of (tr, td) between which the energy stands still; None without any."""
+    time, energy = switched.time, switched.energy
+    middle = int(np.argmin(np.abs(time - (tr + td) / 2)))
+    if not tr <= time[middle] <= td:
+        return None
+    still = np.abs(energy - energy[middle]) <= _STILL * abs(energy[middle])
+    moving = np.flatnonzero(~still)
+    first = int(moving[moving < middle].max(initial=-1)) + 1
+    last = int(moving[moving > middle].min(initial=time.size)) - 1
+    return float(time[first]), float(time[last])
+
+
+def _not_rigid(switched: History, rigid: tuple[float, float] | None, tr: float, td: float) -> Iterator[str]:
+    """Object when the energy does not stand still from about tr to about td, as far as the states tell."""
+    if rigid is None:
+        yield f"the switched run has no state between tr {tr:g} and td {td:g}: nothing shows that it was rigid"
+        return
+    room = 2 * switched.step
+    if rigid[0] > tr + room or rigid[1] < td - room or rigid[0] < tr - room or rigid[1] > td + room:
+        found = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
+        yield f"{found}, not from tr {tr:g} to td {td:g}"
+
+
+def _not_of_tr(reference: History, tr: float, frozen: float) -> Iterator[str]:
+    """Object when the energy that came back is not one that the reference has about tr."""
+    about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
+    room = _ABOUT * float(np.abs(about).max(initial=0.0))
+    if about.size and not about.min() - room <= frozen <= about.max() + room:
+        yield (
+            f"the energy that came back, {frozen:.6g}, is not that of the reference at tr {tr:g}, "
+            f"{reference.energy_at(tr):.6g}: was it switched at another time?"
+        )
 
 
 def _between(history: History, start: float, end: float) -> Samples:

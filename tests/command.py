@@ -20,6 +20,8 @@ ROOT = Path(__file__).resolve().parents[1]
 ENERGY = str(ROOT / "sample_data" / "energy.csv")
 GLSTAT = str(ROOT / "sample_data" / "energy.glstat")
 ROLLOVER = str(ROOT / "sample_data" / "rollover.csv")
+DECK = str(ROOT / "sample_data" / "switching.k")
+BOX = str(ROOT / "sample_data" / "rolloverT01.gz")
 OSCILLATOR = tuple(shlex.split("--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6"))
 # No colour variables and no options that the tester's own environment may set.
 _ENVIRONMENT = {"NO_COLOR": None, "FORCE_COLOR": None, "D2RPICK_SUGGEST_TD": None}

@@ -5,21 +5,25 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick import __version__
 from d2rpick.cli import COMMANDS
+from d2rpick.configuration import read_configuration
 from d2rpick.readers import READERS
-from tests.command import ROOT, run
+from d2rpick.rules import RULES
+from tests.command import DECK, GLSTAT, ROOT, run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 README = (ROOT / "README.md").read_text("utf-8")
 CHANGELOG = (ROOT / "CHANGELOG.md").read_text("utf-8")
-PROMPT = "$ "
+PROMPT = "$ d2rpick "  # lines of a card begin with "$ " too
 
 # The last digits of a number at full precision differ from machine to machine.
 _FULL_PRECISION = re.compile(r"\d+\.\d{13,}(?:e[+-]\d+)?")
@@ -36,7 +40,7 @@ def sessions() -> Iterator[tuple[str, str]]:
         assert block.startswith(PROMPT), block
         for entry in f"\n{block}".split(f"\n{PROMPT}")[1:]:
             command, _, shown = entry.replace("\\\n", "").partition("\n")
-            yield command, shown.rstrip("\n")
+            yield f"d2rpick {command}", shown.rstrip("\n")
 
 
 def rounded(text: str) -> str:
@@ -52,13 +56,12 @@ def test_the_sessions_in_the_readme_show_what_the_commands_print(
     monkeypatch.chdir(place)
     ran = set()
     for line, shown in sessions():  # in order and in one folder, as a reader would type them
-        program, *args = shlex.split(line)
-        assert program == "d2rpick", f"{line}: only d2rpick itself can be run here"
+        _, *args = shlex.split(line)
         result = run(*args)
         printed = f"{result.stderr}{result.stdout}".rstrip("\n")
         assert f"{line}\n{rounded(printed)}" == f"{line}\n{rounded(shown)}"
         ran.add(args[0])
-    assert {"suggest", "verify"} <= ran
+    assert {"suggest", "verify", "check", "card"} <= ran
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -94,6 +97,31 @@ def test_ci_runs_the_test_command_of_the_readme_and_nothing_else() -> None:
     assert len(own) == 1
     assert "pytest" in own[0]
     assert f"{own[0]}\n" in blocks("sh")
+
+
+def test_the_jobs_in_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(DECK, "main.k")
+    shutil.copy(GLSTAT, "glstat")
+    calls = re.findall(r"- (?:run: )?d2rpick (.*)", "".join(blocks("yaml")))
+    assert len(calls) == 2
+    assert [run(*shlex.split(call)).exit_code for call in calls] == [1, 1]
+    (report,) = re.findall(r"junit: (.*)", README)
+    assert "<failure" in Path(report).read_text("utf-8")
+
+
+def test_the_configuration_in_the_readme_is_one() -> None:
+    (block,) = blocks("toml")
+    read_configuration(tomllib.loads(block)).verify(RULES)
+
+
+def test_the_pre_commit_hook_is_the_one_of_the_readme() -> None:
+    hook = dict(re.findall(r"(\w+): (.*)", (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8")))
+    assert f"      - id: {hook['id']}\n" in README
+    assert hook["entry"].split() == ["d2rpick", "check"]
+    assert [bool(re.search(hook["files"], name)) for name in ("a/run.k", "RUN.KEY", "x.dyn", "k.py", "glstat")] == [
+        *(True, True, True, False, False)
+    ]
 
 
 def test_the_two_commands_of_the_readme_are_one_line_each() -> None:

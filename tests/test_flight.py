@@ -188,6 +188,14 @@ def test_td_in_the_next_contact_is_after_the_end_of_the_flight(td: float, after:
     assert "td-after-contact" in {caution.code for caution in answer.cautions}
 
 
+@pytest.mark.parametrize("td", [0.1, 0.149])
+def test_a_contact_does_not_creep_into_the_fit(td: float) -> None:
+    situation = examine(STRUCK, td, Settings())
+    assert situation.fitted is not None
+    assert situation.fitted.alpha == pytest.approx(10, abs=0.05)
+    assert situation.flight.end == pytest.approx(0.150, abs=PERIOD / 25)
+
+
 def test_a_rising_energy_shows_no_end_of_a_load() -> None:
     time = np.linspace(0, 1, 1001)
     energy = (

@@ -82,7 +82,7 @@ def test_a_given_format_is_not_second_guessed(file: Write) -> None:
         (b"Once upon a time\nthere was a beam\n", "no rows of at least two numbers"),
         (b"metric,value,unit\nmass,12.5,kg\nenergy,88.1,J\n", "no rows of at least two numbers"),
         (b"Curveplot\ntitle\nTime\nEnergy\nComponent\n", "no curve was found"),
-        (gzip.compress(CSV, mtime=0)[:30], "gzip"),
+        (gzip.compress(CSV, mtime=0)[:10] + b"\xff" * 20, "gzip"),
         (gzip.compress(b"", mtime=0), "empty"),
     ],
 )

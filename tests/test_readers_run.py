@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +11,19 @@ import pytest
 
 from d2rpick.errors import FormatError
 from d2rpick.overview import survey
-from d2rpick.readers import READERS, Run, Selection, binout, csv_table, glstat, matsum, open_run, radioss_th, reader
+from d2rpick.readers import (
+    READERS,
+    Run,
+    Selection,
+    binout,
+    csv_table,
+    glstat,
+    matsum,
+    open_run,
+    radioss_th,
+    read_history,
+    reader,
+)
 from d2rpick.readers.companions import check_companions
 from d2rpick.readers.database import Legs
 from d2rpick.readers.source import Source
@@ -22,8 +36,8 @@ from tests.text_files import HEAD, glstat_text, matsum_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
+SAMPLES = Path(__file__).parents[1] / "sample_data"
 TIMES = np.arange(1, 9) / 8
 GLSTAT = glstat_text(TIMES, 10 * TIMES)
 MATSUM = matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))
@@ -250,3 +264,21 @@ def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
     assert "2 curves are named like an internal energy; choose with --energy: 1 'a IE', 2 'b IE'" in curves.notes[0]
     doubtful = opened({"glstat": GLSTAT, "matsum": matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))})
     assert "are they of one run?" in survey(doubtful, Selection()).notes[0]
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7, 0.999])
+def test_packed_data_that_ends_early_is_read_as_far_as_it_goes(tmp_path: Path, share: float) -> None:
+    whole = (SAMPLES / "energy.glstat").read_bytes()
+    packed = gzip.compress(whole)
+    file = tmp_path / "glstat.gz"
+    file.write_bytes(packed[: int(share * len(packed))])
+    history, full = read_history([str(file)]), read_history([str(SAMPLES / "energy.glstat")])
+    assert not history.complete
+    assert "ends early" in history.notes[0]
+    assert 0 < history.time.size <= full.time.size
+    assert history.energy.tolist() == full.energy[: history.time.size].tolist()
+
+
+def test_a_long_gap_between_legs_is_told() -> None:
+    legs = [str(shared(f"openradioss/rollover_r100_{leg}.gz")) for leg in ("T01", "T03")]
+    assert any("no states between 0.0999564 and 0.370008" in note for note in open_run(legs).history(Selection()).notes)

@@ -13,7 +13,7 @@ import pytest
 from d2rpick.cli import options, replay
 from d2rpick.readers import READERS
 from d2rpick.writers import TRAJECTORY_WRITERS
-from tests.command import ENERGY, GLSTAT, ROOT
+from tests.command import DECK, ENERGY, GLSTAT, ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,20 +23,25 @@ PACKAGE = ROOT / "d2rpick"
 
 # Each module imports only from those above it.
 ORDER = (
-    "d2rpick", "errors", "history",
+    "d2rpick", "errors", "configuration", "cards",
+    "deck.source", "deck.expression", "deck.rows", "deck.parameters", "deck.card", "deck.includes", "deck.reader",
+    "deck.parts", "deck.elements", "deck.switching", "deck.windows", "deck",
+    "rules.base", "rules.example_decks", "rules.reading", "rules.pairs", "rules.times", "rules.switched_parts",
+    "rules.energy", "rules.scope", "rules",
+    "history",
     "readers.names", "readers.source", "readers.selection", "readers.printed", "readers.layout", "readers.columns",
     "readers.curves", "readers.csv_table", "readers.database", "readers.fortran", "readers.fixed_text",
     "readers.glstat", "readers.matsum", "readers.repeat", "readers.lsda", "readers.binout_states",
     "readers.binout_branch", "readers.binout", "readers.hdf5_columns", "readers.hdf5_file", "readers.radioss_th",
     "readers.companions", "readers.run", "readers",
     "momentum", "crossings", "oscillator", "mode", "fitting", "identify", "measures", "replay", "flight", "situation",
-    "cautions", "uncertainty", "candidates", "switched", "choice", "overview",
+    "cautions", "uncertainty", "candidates", "switched", "choice", "overview", "rules.judgement", "judged_card",
     "rollover", "rollover.model", "rollover.bars", "rollover.contact", "rollover.rigid", "rollover.motion",
     "rollover.record", "rollover.run", "rollover.scan", "rehearsal",
-    "report", "report.tables", "report.situation", "report.suggestion", "report.verdict", "report.overview",
-    "report.rollover",
+    "report", "report.findings", "report.rules", "report.tables", "report.situation", "report.suggestion",
+    "report.verdict", "report.overview", "report.rollover",
     "writers", "plots",
-    "cli", "cli.options", "cli.output", "cli.progress",
+    "cli", "cli.options", "cli.output", "cli.progress", "cli.check", "cli.rule", "cli.card",
     "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract", "cli.rollover",
     "__main__",
 )  # fmt: skip
@@ -106,6 +111,19 @@ def test_help_and_version_load_no_numbers(args: tuple[str, ...]) -> None:
     assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.history", "d2rpick.choice"})
 
 
+@pytest.mark.parametrize(
+    "args",
+    [
+        ("check", "-f", "json", DECK),
+        ("rule", "D2R201"),
+        ("card", "--tr", "0.02", "--td", "0.09", "--part", "1"),
+        ("card", "--solver", "radioss", "--tr", "0.02", "--td", "0.09", "--node", "1", "--end", "1"),
+    ],
+)
+def test_decks_and_cards_need_no_numbers_without_a_history(args: tuple[str, ...]) -> None:
+    assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.history", "d2rpick.choice"})
+
+
 @pytest.mark.parametrize("source", [ENERGY, GLSTAT])
 def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
     modules = loaded("suggest", "-q", "--td", "0.064", source)
@@ -118,6 +136,9 @@ def test_the_command_line_offers_the_formats_there_are() -> None:
     assert tuple(TRAJECTORY_WRITERS) == replay.FORMATS
 
 
-@pytest.mark.parametrize("name", ["py.typed", *(f"schemas/{name}-1.json" for name in ("suggest", "verify", "info"))])
+SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check", "rollover")]
+
+
+@pytest.mark.parametrize("name", ["py.typed", *SCHEMAS])
 def test_the_package_ships_what_is_not_code(name: str) -> None:
     assert files("d2rpick").joinpath(name).is_file()

@@ -18,13 +18,14 @@ from d2rpick.errors import D2RPickError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-COMMANDS: Final = ("suggest", "verify", "replay", "info", "extract", "rollover")
+COMMANDS: Final = ("suggest", "verify", "replay", "info", "extract", "card", "check", "rule", "rollover")
 COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended
 EXAMPLES: Final = """\b
 Examples:
   d2rpick suggest --td 0.064 sample_data/energy.csv
   d2rpick verify --tr 0.013 --td 0.064 sample_data/energy.csv
+  d2rpick check sample_data/switching.k --history sample_data/energy.glstat
   d2rpick replay --help
 """
 

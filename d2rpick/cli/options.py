@@ -67,24 +67,48 @@ def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated
     return apply
 
 
+_AFTER = click.option("--after", type=TIME, metavar="T", help="The load ends here.  [default: found from the record]")
+_MARGIN = click.option(
+    "--margin", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="T",
+    help="Time kept clear after the load and before the next contact.",
+)  # fmt: skip
+_TOLERANCE = click.option(
+    "--tolerance", type=NOT_NEGATIVE, default=0.2, show_default=True, metavar="L",
+    help="On the lock-in error, or on the level error where no oscillator is known.",
+)  # fmt: skip
+_FORMAT = click.option(
+    "-F", "--input-format", type=click.Choice(["auto", *FORMATS]), default="auto", show_default=True,
+    help="Format of the history; auto goes by its content.",
+)  # fmt: skip
+_TIME = click.option("--time", metavar="NAME|NUMBER", help="Time column, by its name, number or HDF5 path.")
+_ENERGY = click.option(
+    "--energy", metavar="NAME|NUMBER", multiple=True, type=NAMES,
+    help="Energy column, label or HDF5 path; given several times, their sum.",
+)  # fmt: skip
+_FLYING = click.option("--flying", metavar="IDS", multiple=True, type=NAMES, help="Parts that fly together with them.")
+
+
 def history_options(function: Decorated) -> Decorated:
     """HISTORY... and how to read it; collected by ``selection`` and ``open_run``."""
     return _stack(
         click.argument("history", metavar="HISTORY...", nargs=-1, required=True),
-        click.option(
-            "-F", "--input-format", type=click.Choice(["auto", *FORMATS]), default="auto", show_default=True,
-            help="Format of HISTORY; auto goes by its content.",
-        ),
-        click.option("--time", metavar="NAME|NUMBER", help="Time column, by its name, number or HDF5 path."),
-        click.option(
-            "--energy", metavar="NAME|NUMBER", multiple=True, type=NAMES,
-            help="Energy column, label or HDF5 path; given several times, their sum.",
-        ),
+        _FORMAT, _TIME, _ENERGY,
         click.option(
             "--part", metavar="IDS", multiple=True, type=NAMES,
             help="Parts to be switched, by number (3,7), range (10-19) or title; their energies are added.",
         ),
-        click.option("--flying", metavar="IDS", multiple=True, type=NAMES, help="Parts that fly together with them."),
+        _FLYING,
+    )(function)  # fmt: skip
+
+
+def reference_options(function: Decorated) -> Decorated:
+    """``--history``, how to read it, and how to judge by it; for commands that also do without one."""
+    return _stack(
+        click.option(
+            "--history", metavar="HISTORY", multiple=True, type=NAMES,
+            help="Energy history of the run without switching, to judge by: file, folder or glob; repeatable.",
+        ),
+        _FORMAT, _TIME, _ENERGY, _FLYING, _AFTER, _MARGIN, _TOLERANCE,
     )(function)  # fmt: skip
 
 
@@ -134,15 +158,9 @@ def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
 def choosing_options(function: Decorated) -> Decorated:
     """Options of ``suggest`` and ``verify``; collected by ``settings``."""
     return _stack(
-        click.option("--after", type=TIME, metavar="T", help="The load ends here.  [default: found from the record]"),
-        click.option(
-            "--margin", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="T",
-            help="Time kept clear after the load and before the next contact.",
-        ),
-        click.option(
-            "--tolerance", type=NOT_NEGATIVE, default=0.2, show_default=True, metavar="L",
-            help="On the lock-in error, or on the level error where no oscillator is known.",
-        ),
+        _AFTER,
+        _MARGIN,
+        _TOLERANCE,
         click.option(
             "--max-kinetic-share", type=NOT_NEGATIVE, metavar="K", help="Object to a td with a larger kinetic share.",
         ),
@@ -158,9 +176,10 @@ def selection(options: dict[str, Any]) -> Selection:
     """Collect what of a run is asked for; UsageError when energies are asked for in two ways."""
     from d2rpick.readers import Selection
 
-    if options["energy"] and options["part"]:
+    parts = options.get("part", ())
+    if options["energy"] and parts:
         raise click.UsageError("--energy and --part exclude each other: columns or parts")
-    return Selection(options["time"], options["energy"], options["part"], options["flying"])
+    return Selection(options["time"], options["energy"], parts, options["flying"])
 
 
 def open_run(options: dict[str, Any]) -> Run:
@@ -168,6 +187,21 @@ def open_run(options: dict[str, Any]) -> Run:
     from d2rpick.readers import open_run
 
     return open_run(options["history"], selection(options), options["input_format"])
+
+
+def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
+    """Open what the options of ``reference_options`` name; UsageError when they say how to judge but not by what."""
+    if not options["history"]:
+        source = click.get_current_context().get_parameter_source
+        names = ("input_format", "time", "energy", "flying", "after", "margin", "tolerance")
+        lost = [name for name in names if source(name) is not click.core.ParameterSource.DEFAULT]
+        if lost:
+            raise click.UsageError(f"--{_dashed(lost[0])} is about an energy history; name it with --history")
+        return None
+    from d2rpick.situation import Settings
+
+    judging = Settings(after=options["after"], margin=options["margin"], tolerance=options["tolerance"])
+    return open_run({**options, "part": ()}), judging
 
 
 def oscillator(options: dict[str, Any]) -> Oscillator | None:

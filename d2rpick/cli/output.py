@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -45,6 +45,11 @@ class Output:
             raise D2RPickError(f"{plot}: --plot and --output-file name the same file; name two")
         return output
 
+    def spare(self, inputs: Iterable[str]) -> None:
+        """Raise D2RPickError when the result would replace one of further inputs, known only since they were read."""
+        if self.file is not None:
+            replace(self, inputs=tuple(inputs)).claim(self.file)
+
     def claim(self, name: str) -> None:
         """Raise D2RPickError when ``name`` cannot be written, is an input, or exists and was not to be replaced."""
         from pathlib import Path  # not above: --help does without it
@@ -63,7 +68,8 @@ class Output:
 
     def result(self, text: str) -> None:
         """Give out the result; on a terminal the line of the recommended candidate stands out."""
-        text = text and f"{text}\n"
+        # bytes of file names that are no text come as lone surrogates, which no encoding can write
+        text = text and f"{text}\n".encode(errors="surrogateescape").decode(errors="replace")
         if self.file is not None:
             self.write(self.file, text.encode())
             return

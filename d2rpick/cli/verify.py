@@ -25,14 +25,29 @@ Examples:
 """
 
 
-@click.command("verify", epilog=EXAMPLES)
+class _Verify(click.Command):
+    """Lets ``--switched`` take all file names that follow it, as a shell's glob gives them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        spread: list[str] = []
+        taking = False
+        for arg in args:
+            option = arg.startswith("-") and arg != "-"
+            if taking and not option and spread[-1] != "--switched":
+                spread.append("--switched")
+            taking = arg == "--switched" if option else taking
+            spread.append(arg)
+        return super().parse_args(ctx, spread)
+
+
+@click.command("verify", cls=_Verify, epilog=EXAMPLES)
 @click.option("--tr", type=shared.TIME, required=True, metavar="T", help="Switch to rigid at this time.")
 @click.option("--td", type=shared.TIME, required=True, metavar="T", help="Switch back to deformable at this time.")
 @click.option(
     "--switched",
     metavar="FILE",
     multiple=True,
-    help="Compare a finished switched run with the reference; a file, folder or glob, given again for more.",
+    help="Compare a finished switched run with the reference: all files, folders and globs up to the next option.",
 )
 @shared.history_options
 @shared.choosing_options
@@ -50,7 +65,7 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
     answer = verify(history, tr, td, shared.settings(options))
     if options["switched"]:
         with reading(options["switched"], quiet=options["quiet"]):
-            answer = with_comparison(answer, _comparison(run, answer.situation, options))
+            answer = with_comparison(answer, _comparison(run, answer.situation, {**options, "tr": tr}))
     output.notes(history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick import plots
@@ -78,8 +93,9 @@ def _comparison(run: Run, situation: Situation, options: dict[str, Any]) -> Comp
     return compare(
         situation.history,
         other.history(selection),
-        situation.td,
+        (options["tr"], situation.td),
         situation.latest_td if situation.latest_td > situation.td else float("inf"),
+        situation.settings.tolerance,
         momenta=(run.momentum(together), _momentum(other, together)),
         centres=(run.centre(parts), other.centre(parts)) if parts else (None, None),
     )

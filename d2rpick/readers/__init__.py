@@ -86,7 +86,10 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
         kinds.setdefault(input_format if input_format != "auto" else _format(source), []).append(source)
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
-    databases = tuple(Legs(reader(kind).open_legs(kinds[kind], selection)) for kind in ordered)
+    databases = tuple(
+        Legs(reader(kind).open_legs(kinds[kind], selection), cut=[one.name for one in kinds[kind] if one.cut])
+        for kind in ordered
+    )
     check_companions(databases)
     return Run(files, databases)
 

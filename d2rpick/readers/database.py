@@ -91,6 +91,10 @@ class Database(Protocol):
         """How finely the times and these channels were written; of no channels: those of the parts."""
 
 
+# An interval so many times the median one is no output interval.
+_LONG = 30.0
+
+
 class Legs:
     """Legs of one run as one `Database`: in the order of their start, and where they overlap the newer counts.
 
@@ -98,7 +102,8 @@ class Legs:
     state count only where all are so.
     """
 
-    def __init__(self, legs: Sequence[Database]) -> None:
+    def __init__(self, legs: Sequence[Database], cut: Sequence[str] = ()) -> None:
+        self._cut = tuple(cut)  # files whose packed data ends early
         several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
         self._files = sorted(legs, key=_start) if several else [*legs]
         self._legs = [leg for leg in self._files if not several or _start(leg) > -np.inf] or self._files
@@ -136,7 +141,7 @@ class Legs:
     @property
     def complete(self) -> bool:
         """Whether all legs are."""
-        return all(leg.complete for leg in self._files)
+        return all(leg.complete for leg in self._files) and not self._cut
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
@@ -151,7 +156,8 @@ class Legs:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and what was left out between them."""
-        notes = [note for leg in self._files for note in leg.notes]
+        notes = [f"{name}: the packed data ends early; what it holds up to there was read" for name in self._cut]
+        notes += [note for leg in self._files for note in leg.notes]
         if self._passing:
             notes.append(f"{self.source}: only some legs have part {listing(self._passing)}, which was left out")
         if self.channels:
@@ -223,7 +229,7 @@ class Legs:
             for leg, here in zip(self._legs, np.split(keep, behind[:-1]), strict=True)
             if here.size and not here.any()
         ]
-        return keep, (*notes, *unused)
+        return keep, (*notes, *unused, *_holes(np.concatenate(times)[keep]))
 
     def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
         whole = columns[0] if len(columns) == 1 else np.concatenate(columns)
@@ -242,6 +248,13 @@ def _start(leg: Database) -> float:
 
 def _digits(precision: Precision) -> int:
     return precision.digits if precision.decimals is None else precision.decimals
+
+
+def _holes(time: Samples) -> tuple[str, ...]:
+    """Say where output stops for long, as it does where a leg is missing."""
+    steps = np.diff(time)
+    holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2]) if steps.size > 2 else ()
+    return tuple(f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a leg missing?" for i in holes[:3])
 
 
 # Significant digits by bytes per number: 24 bits hold 7 digits; 17 digits restore every double.

@@ -27,10 +27,14 @@ _stdin = b""
 
 @dataclass(frozen=True)
 class Source:
-    """The unpacked bytes of one file, mapped where it lies on a disk, under the name the user gave it."""
+    """The unpacked bytes of one file, mapped where it lies on a disk, under the name the user gave it.
+
+    ``cut`` is True when packed data ends early: ``data`` is what could be unpacked.
+    """
 
     name: str
     data: Content
+    cut: bool = False
 
 
 def expand(names: Sequence[str]) -> tuple[str, ...]:
@@ -55,11 +59,12 @@ def open_source(name: str) -> Source:
         If there is nothing to be read under this name.
     """
     data: Content = _read_stdin() if name == STDIN else _mapped(name)
+    cut = False
     if data[:2] == b"\x1f\x8b":
-        data = _unpacked(name, data)
+        data, cut = _unpacked(name, data)
     if not data:
         raise FormatError(f"{name}: the file is empty, an energy history was expected; was the run started?")
-    return Source(name, data)
+    return Source(name, data, cut)
 
 
 def sha256(name: str) -> str:
@@ -127,11 +132,18 @@ def _mapped(name: str) -> Content:
         raise FormatError(f"{name}: cannot be read ({reason}); check the name and the permissions") from None
 
 
-def _unpacked(name: str, data: Content) -> bytes:
-    import gzip
+def _unpacked(name: str, data: Content) -> tuple[bytes, bool]:
+    """Unpack what there is, of files that were packed one behind the other too; True when the last one ends early."""
     import zlib
 
-    try:
-        return gzip.decompress(data)
-    except (EOFError, OSError, zlib.error) as error:
-        raise FormatError(f"{name}: gzip data that cannot be unpacked ({error}); copy the file again") from None
+    found, rest = [], bytes(data)
+    while rest[:2] == b"\x1f\x8b":
+        unpacker = zlib.decompressobj(wbits=31)  # 31: the gzip format
+        try:
+            found.append(unpacker.decompress(rest))
+        except zlib.error as error:
+            raise FormatError(f"{name}: gzip data that cannot be unpacked ({error}); copy the file again") from None
+        if not unpacker.eof:
+            return b"".join(found), True
+        rest = unpacker.unused_data
+    return b"".join(found), False

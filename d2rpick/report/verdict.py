@@ -60,7 +60,7 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
 def _comparison(switched: Comparison) -> list[str]:
     """Lines that hold the switched run against the reference."""
     rows = [
-        ("energy at td", switched.energy_frozen, switched.energy_td),
+        ("energy locked in, at td", switched.energy_frozen, switched.energy_td),
         ("mean after td", switched.mean_after, switched.mean_after_reference),
         ("spread after td", switched.spread_after, switched.spread_after_reference),
     ]

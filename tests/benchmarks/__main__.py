@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 SUGGEST = ("suggest", "--td", "0.064", "sample_data/energy.csv")
+CHECK = ("check", "sample_data/switching.k")
 THREADS = "OPENBLAS_NUM_THREADS"
 # The command line sets one thread for itself; so do the measurements inside this process.
 ONE_THREAD = {THREADS: "1"}
@@ -106,6 +107,22 @@ def integration_ratio(repeats: int) -> float:
     return ratio(integrated, closed_form, _ROUNDS, repeats)
 
 
+def deck_ratio(*, numbered: bool) -> float:
+    """Finding the cards of a 50 MB deck, and the numbers of their lines, over a plain loop over all lines."""
+    from tests.benchmarks import deck
+
+    ours = deck.number_cards if numbered else deck.find_cards
+    with deck.large_deck() as path:
+        return ratio(lambda: ours(path), lambda: deck.line_loop(path), _ROUNDS)
+
+
+def deck_memory() -> float:
+    """Memory that it takes [MB]."""
+    from tests.benchmarks import deck
+
+    return deck.memory()
+
+
 def reading(name: str, *args: int | str | None) -> Callable[[], float | None]:
     """Measure of the module `reading`, which makes its big files when it is asked."""
 
@@ -134,6 +151,10 @@ ROWS = (
     Row("identification / least_squares from the right answer", identification_ratio, most=3.0),
     Row("DOP853 / closed form, 1e6 points", lambda: integration_ratio(repeats=3), least=20.0),
     Row("  alternating call by call, in memory just freed", lambda: integration_ratio(repeats=1)),
+    Row("cards of a 50 MB deck / loop over its lines", lambda: deck_ratio(numbered=False), most=1 / 3),
+    Row("  with the number of each card's line", lambda: deck_ratio(numbered=True)),
+    Row("  memory for the cards [MB]", deck_memory, most=32.0),
+    Row("check / import click: processes", lambda: process_ratio("click", *CHECK)),
     Row("loop over lines / glstat, 1e5 states", reading("glstat_to_loop"), least=8.0),
     Row("glstat, 1e5 states / bare read", reading("glstat_to_bare_read"), most=4.0),
     Row("loop over lines / matsum, 2000 states, 500 parts", reading("matsum_to_loop", None), least=5.0),

@@ -1,0 +1,157 @@
+"""The command ``check``."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from d2rpick.cli import options as shared
+from d2rpick.cli.output import Output, finish
+from d2rpick.errors import ConfigurationError, DeckError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.cautions import Caution
+    from d2rpick.configuration import Configuration
+    from d2rpick.rules import Checked, Unreadable
+    from d2rpick.rules.judgement import HistoryJudge
+
+EXAMPLES = """\b
+Examples:
+  d2rpick check sample_data/switching.k
+  d2rpick check sample_data/switching.k --history sample_data/energy.glstat
+  d2rpick check -f json --select D2R0,D2R1 --fail-on warning sample_data/switching.k
+"""
+
+
+@click.command("check", epilog=EXAMPLES)
+@click.argument("deck", metavar="DECK...", nargs=-1, required=True)
+@shared.reference_options
+@click.option(
+    "--select",
+    metavar="IDS",
+    multiple=True,
+    help="Only these rules, by id or its beginning: D2R101,D2R2.  [default: by d2rpick.toml or pyproject.toml]",
+)
+@click.option("--ignore", metavar="IDS", multiple=True, help="Not these rules; stronger than --select.")
+@click.option(
+    "--fail-on",
+    type=click.Choice(["error", "warning"]),
+    default="error",
+    show_default=True,
+    help="Lightest finding that is an objection.",
+)
+@shared.output_options("table", "json", "github", "junit", "sarif")
+@click.pass_context
+def command(
+    ctx: click.Context, /, deck: tuple[str, ...], fail_on: str, output_format: str, exit_zero: bool, **options: Any
+) -> None:
+    """Find the switching cards of LS-DYNA decks and check them against deck and history.
+
+    Each DECK is read with its includes.  `d2rpick rule` lists the rules; a comment line `$ d2rpick: ignore D2R104`
+    before a card silences one for it.
+    """
+    from d2rpick.rules import Severity
+
+    judge = _judge(options)
+    output = Output.of(options, *deck, *(judge.run.sources if judge else ()))
+    results, failed, inputs = _checked(deck, judge, options)
+    output.spare(inputs)
+    output.notes(judge.notes if judge else (), _cautions(results, judge))
+    for one in failed:
+        click.echo(f"d2rpick: {one.reason}", err=True)
+    limit = Severity(fail_on)
+    if results or output_format != "table":
+        output.result(_text(ctx, output_format, results, failed, judge, limit))
+    if not results:
+        ctx.exit(2)
+    heavy = any(finding.severity.rank <= limit.rank for result in results for finding in result.findings)
+    finish(ctx, objection=heavy or bool(failed), exit_zero=exit_zero)
+
+
+def _judge(options: dict[str, Any]) -> HistoryJudge | None:
+    reference = shared.reference(options)
+    if reference is None:
+        return None
+    from d2rpick.rules.judgement import HistoryJudge
+
+    run, settings = reference
+    return HistoryJudge(run, shared.selection(options), settings)
+
+
+def _checked(
+    decks: Sequence[str], judge: HistoryJudge | None, options: dict[str, Any]
+) -> tuple[list[Checked], list[Unreadable], list[str]]:
+    """Check each deck by the configuration nearest to it, and give all files that were read.
+
+    A deck that cannot be read, or whose configuration cannot, does not hide the others.
+    """
+    from d2rpick.configuration import Configuration
+    from d2rpick.rules import RULES, Unreadable, check_deck
+
+    asked = Configuration(_ids(options["select"]), _ids(options["ignore"]))
+    asked.verify(RULES)
+    results, failed, inputs = [], [], []
+    first = {os.path.realpath(name): name for name in reversed(decks)}  # of several spellings
+    for name in (name for name in dict.fromkeys(decks) if name in first.values()):
+        try:
+            configuration = _configuration(name, asked)
+            inputs.append(configuration.source)
+            results.append(check_deck(name, configuration, judge))
+            inputs += results[-1].files
+        except (ConfigurationError, DeckError) as error:
+            failed.append(Unreadable(name, str(error)))
+    return results, failed, inputs
+
+
+def _configuration(deck: str, asked: Configuration) -> Configuration:
+    """Take the configuration nearest to a deck; what was asked for by options overrules its keys."""
+    from dataclasses import replace
+    from pathlib import Path
+
+    from d2rpick.configuration import find_configuration
+    from d2rpick.rules import RULES
+
+    found = find_configuration(Path(deck).parent)
+    found.verify(RULES)
+    return replace(found, select=asked.select or found.select, ignore=asked.ignore or found.ignore)
+
+
+def _cautions(results: Sequence[Checked], judge: HistoryJudge | None) -> list[Caution]:
+    from d2rpick.cautions import Caution
+
+    remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
+    return [*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)]
+
+
+def _ids(texts: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name.strip().upper() for text in texts for name in text.split(",") if name.strip())
+
+
+def _text(
+    ctx: click.Context,
+    form: str,
+    results: Sequence[Checked],
+    failed: Sequence[Unreadable],
+    judge: HistoryJudge | None,
+    limit: Any,
+) -> str:
+    from pathlib import Path
+
+    from d2rpick.report import findings as report
+
+    root = Path.cwd()
+    warnings = [{"code": c.code, "message": c.message} for c in _cautions(results, judge)]
+    warnings += [{"code": "unreadable-deck", "message": one.reason} for one in failed]
+    sources = judge.run.sources if judge else None
+    texts = {
+        "table": lambda: report.as_table(results, root, failed),
+        "json": lambda: report.as_json(results, root, ctx.meta["d2rpick.command"], warnings, sources),
+        "github": lambda: report.as_github(results, root, failed),
+        "junit": lambda: report.as_junit(results, root, limit, failed),
+        "sarif": lambda: report.as_sarif(results, root, failed),
+    }
+    return texts[form]()

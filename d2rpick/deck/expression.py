@@ -1,0 +1,243 @@
+"""Numbers and expressions as they stand in decks; an own small evaluator, nothing is handed to Python.
+
+Source: LS-DYNA Vol I R17, pages 36-7 to 36-9, as quoted by a converter (secondary): integers stay integers
+(``2/5`` is 0), the unary minus binds tighter than ``**`` (``-3**2`` is 9), functions are Fortran's.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+Number = int | float
+
+_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d+))?", re.ASCII)
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))",
+    re.ASCII | re.IGNORECASE,
+)
+_NAME = re.compile(r"&\s*([a-z_]\w*)", re.ASCII | re.IGNORECASE)
+_DEEPEST = 50  # nested parentheses; no deck needs more, and Python's stack is not to be tried
+_LONGEST = 40  # characters of a number: more are no number of a deck
+_LONGEST_EXPRESSION = 2000
+_INTEGER_LIMIT = 2**63
+
+
+class ExpressionError(Exception):
+    """What is wrong with a text that should be a number; only used inside the deck reader."""
+
+
+def number(text: str) -> Number:
+    """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, and ``1.5-3`` with the letter left out.
+
+    Examples
+    --------
+    >>> number("12"), number(" 12.e-3 "), number("1.5D-3"), number("1.5-3")
+    (12, 0.012, 0.0015, 0.0015)
+    """
+    text = text.strip()
+    found = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
+    if found is None:
+        raise ExpressionError(f"{text[:_LONGEST]!r} is not a number")
+    mantissa, exponent = found[1], found[2] or found[3]
+    if exponent is None and "." not in mantissa:
+        return _bounded(int(mantissa))
+    return _finite(float(f"{mantissa}e{exponent or 0}"))
+
+
+def names_in(text: str) -> tuple[str, ...]:
+    """Return the parameters a text refers to, in lower case.
+
+    Examples
+    --------
+    >>> names_in("-&tEnd/6.0+&dt")
+    ('tend', 'dt')
+    """
+    return tuple(name.lower() for name in _NAME.findall(text))
+
+
+def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
+    """Value of an expression; ``lookup`` gives the values of parameters by lower-case name.
+
+    Examples
+    --------
+    >>> evaluate("2/5", {}.__getitem__), evaluate("2.0/5", {}.__getitem__), evaluate("-3**2", {}.__getitem__)
+    (0, 0.4, 9)
+    >>> evaluate("max(&a, 2)*nint(2.5)", {"a": 4}.__getitem__)
+    12
+    """
+    if len(text) > _LONGEST_EXPRESSION:
+        raise ExpressionError(f"an expression is longer than {_LONGEST_EXPRESSION} characters")
+    try:
+        return _Parser(text, lookup).whole()
+    except (ValueError, OverflowError, ZeroDivisionError, TypeError):
+        raise ExpressionError(f"{text!r} has no finite value") from None
+
+
+def _nint(x: Number) -> int:
+    return int(math.copysign(math.floor(abs(x) + 0.5), x))
+
+
+def _sign(x: Number, y: Number) -> Number:
+    return abs(x) if y >= 0 else -abs(x)
+
+
+_FUNCTIONS: Final[dict[str, tuple[int, Callable[..., Number]]]] = {
+    **{
+        name: (1, getattr(math, name))
+        for name in (
+            *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
+            *("sqrt", "exp", "log", "log10"),
+        )
+    },
+    "csc": (1, lambda x: 1 / math.sin(x)),
+    "sec": (1, lambda x: 1 / math.cos(x)),
+    "ctn": (1, lambda x: 1 / math.tan(x)),
+    "abs": (1, abs),
+    "float": (1, float),
+    "int": (1, int),
+    "aint": (1, lambda x: float(int(x))),
+    "nint": (1, _nint),
+    "anint": (1, lambda x: float(_nint(x))),
+    "atan2": (2, math.atan2),
+    "min": (2, min),
+    "max": (2, max),
+    "sign": (2, _sign),
+    "mod": (2, lambda x, y: int(math.fmod(_nint(x), _nint(y)))),
+}
+_CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi}
+
+
+class _Parser:
+    """Recursive descent: sum = product {± product}; product = power {*/ power}; power = signed [** power]."""
+
+    def __init__(self, text: str, lookup: Callable[[str], Number]) -> None:
+        self.text = text
+        self.lookup = lookup
+        self.tokens = [*_tokens(text), ""]
+        self.depth = 0
+
+    def whole(self) -> Number:
+        value = self.sum()
+        if self.tokens[0]:
+            raise self.unexpected()
+        return value
+
+    def sum(self) -> Number:
+        self.depth += 1
+        if self.depth > _DEEPEST:
+            raise ExpressionError(f"an expression is nested deeper than {_DEEPEST} levels")
+        value = self.product()
+        while self.tokens[0] in ("+", "-"):
+            sign = self.tokens.pop(0)
+            other = self.product()
+            value = _checked(value + other if sign == "+" else value - other)
+        self.depth -= 1
+        return value
+
+    def product(self) -> Number:
+        value = self.power()
+        while self.tokens[0] in ("*", "/"):
+            sign = self.tokens.pop(0)
+            other = self.power()
+            value = _checked(value * other if sign == "*" else _quotient(value, other))
+        return value
+
+    def power(self) -> Number:
+        base = self.signed()
+        if self.tokens[0] != "**":
+            return base
+        self.tokens.pop(0)
+        self.depth += 1
+        exponent = self.power() if self.depth <= _DEEPEST else self.signed()
+        self.depth -= 1
+        result = math.pow(base, exponent)
+        if isinstance(base, int) and isinstance(exponent, int):
+            return _bounded(int(result))
+        return _finite(result)
+
+    def signed(self) -> Number:
+        negative = False
+        while self.tokens[0] in ("+", "-"):
+            negative ^= self.tokens.pop(0) == "-"
+        value = self.atom()
+        return -value if negative else value
+
+    def atom(self) -> Number:
+        token = self.tokens.pop(0)
+        if token == "(":
+            value = self.sum()
+            self.expect(")")
+            return value
+        if token[:1].isdigit() or token[:1] == ".":
+            return number(token)
+        if token[:1] == "&":
+            return self.lookup(token[1:].strip().lower())
+        name = token.lower()
+        if self.tokens[:1] == ["("]:
+            return self.call(name)
+        if not name.isidentifier():
+            self.tokens.insert(0, token)
+            raise self.unexpected()
+        return _CONSTANTS[name] if name in _CONSTANTS else self.lookup(name)
+
+    def call(self, name: str) -> Number:
+        if name not in _FUNCTIONS:
+            raise ExpressionError(f"{name!r} is not a function of *PARAMETER_EXPRESSION")
+        arity, function = _FUNCTIONS[name]
+        self.expect("(")
+        arguments = [self.sum()]
+        while self.tokens[0] == ",":
+            self.tokens.pop(0)
+            arguments.append(self.sum())
+        self.expect(")")
+        if len(arguments) != arity:
+            raise ExpressionError(f"{name}() takes {arity} values, found {len(arguments)}")
+        return _checked(function(*arguments))
+
+    def expect(self, sign: str) -> None:
+        if self.tokens[0] != sign:
+            raise self.unexpected()
+        self.tokens.pop(0)
+
+    def unexpected(self) -> ExpressionError:
+        found = repr(self.tokens[0]) if self.tokens[0] else "the end"
+        return ExpressionError(f"{self.text!r} is not an expression, found {found} where it should go on")
+
+
+def _tokens(text: str) -> Iterator[str]:
+    position = 0
+    text = text.rstrip()
+    while position < len(text):
+        found = _TOKEN.match(text, position)
+        if found is None:
+            raise ExpressionError(f"{text!r} is not a number or an expression")
+        yield found[0].strip()
+        position = found.end()
+
+
+def _quotient(x: Number, y: Number) -> Number:
+    if isinstance(x, int) and isinstance(y, int):
+        whole = abs(x) // abs(y)
+        return whole if (x < 0) == (y < 0) else -whole
+    return x / y
+
+
+def _checked(value: Number) -> Number:
+    return _bounded(value) if isinstance(value, int) else _finite(value)
+
+
+def _bounded(value: int) -> int:
+    if abs(value) >= _INTEGER_LIMIT:
+        raise ExpressionError("an integer leaves the 64-bit range")
+    return value
+
+
+def _finite(value: float) -> float:
+    if not math.isfinite(value):
+        raise ExpressionError("a number leaves the range of doubles")
+    return value

@@ -1,0 +1,237 @@
+"""Switching cards: *DEFORMABLE_TO_RIGID and its variants, and their restart relatives, field by field.
+
+Columns and defaults: the vendor's keyword data as published in its Python library, and two independent
+sources; which of the D2R and R2D lines hold PTYPE in which column is a trap several writers fell into.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cached_property
+from typing import TYPE_CHECKING, Final, Literal
+
+from d2rpick.deck.reader import SWITCHING
+from d2rpick.deck.rows import Value
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.deck.card import Card
+    from d2rpick.deck.reader import Deck
+    from d2rpick.deck.rows import Field, Row
+
+Kind = Literal["automatic", "plain", "inertia", "restart"]
+
+BY_TIME, BY_SENSOR = 0, 5  # CODE
+_KINDS: Final[dict[str, Kind]] = {
+    "DEFORMABLE_TO_RIGID": "plain",
+    "DEFORMABLE_TO_RIGID_AUTOMATIC": "automatic",
+    "DEFORMABLE_TO_RIGID_INERTIA": "inertia",
+    "RIGID_DEFORMABLE_CONTROL": "restart",
+    "RIGID_DEFORMABLE_D2R": "restart",
+    "RIGID_DEFORMABLE_R2D": "restart",
+}
+_HEADER_ROWS = 2
+_REALS: Final = {"automatic": (4, 0), "inertia": (4, 6), "restart": (0, 0), "plain": (0, 0)}
+
+
+@dataclass(frozen=True)
+class Switched:
+    """One line: a part (or a part set, ``by_set``) that is made rigid or deformable."""
+
+    part: Value[int]
+    by_set: bool
+    to_rigid: bool
+    lead: Value[int] | None = None  # LRB; a D2R line only
+
+
+@dataclass(frozen=True)
+class Header:
+    """The two first lines of *DEFORMABLE_TO_RIGID_AUTOMATIC."""
+
+    swset: Value[int]
+    code: Value[int]
+    time1: Value[float]
+    entno: Value[int]
+    relsw: Value[int]
+    paired: Value[int]
+    to_rigid: Value[int]
+    to_deformable: Value[int]
+    others: tuple[Value[float], ...]
+
+    @property
+    def values(self) -> tuple[Value[int] | Value[float], ...]:
+        """All fields, in the order of the card."""
+        return (
+            *(self.swset, self.code, self.time1, self.entno, self.relsw, self.paired),
+            *(self.to_rigid, self.to_deformable),
+            *self.others,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SwitchSet:
+    """One switching card as read: its header where it has one, and its parts.
+
+    ``count_problem`` says how lines and counts differ (empty: they agree); ``problems`` are the fields
+    that could not be read, each with the reason.
+    """
+
+    card: Card
+    kind: Kind
+    header: Header | None
+    switched: tuple[Switched, ...]
+    values: tuple[Value[int] | Value[float] | Value[str], ...]
+    count_problem: str = ""
+
+    @cached_property
+    def time(self) -> float | None:
+        """When it switches [time of the whole deck]; None when that is not for a clock to say."""
+        if self.kind == "plain":
+            return 0.0
+        header = self.header
+        if header is None or header.code.problem or header.time1.problem or header.code.value != BY_TIME:
+            return None
+        return header.time1.value * self.card.transform.time
+
+    @property
+    def time_field(self) -> Field:
+        """TIME1, or the keyword of a card without it."""
+        return self.header.time1.field if self.header else self.card.here
+
+    @property
+    def problems(self) -> Iterator[tuple[Field, str]]:
+        """Fields that say nothing usable."""
+        return ((value.field, value.problem) for value in self.values if value.problem)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Parameters the card uses."""
+        return tuple(dict.fromkeys(name for value in self.values for name in value.parameters))
+
+
+def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
+    """Return all switching cards of a deck, in reading order."""
+    return tuple(
+        _automatic(card) if kind == "automatic" else _simple(card, kind)
+        for card in deck.cards
+        if (kind := _KINDS.get(card.name)) is not None
+    )
+
+
+def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
+    """Cards that look like switching cards but are none, and the keyword that was probably meant."""
+    for card in deck.cards:
+        if card.name not in _KINDS and SWITCHING.match(card.block.head):
+            name = re.sub(r"\W+", "_", card.block.head.upper()).strip("_")
+            yield card, f"*{get_close_matches(name, _KINDS, n=1, cutoff=0)[0]}"
+
+
+def _simple(card: Card, kind: Kind) -> SwitchSet:
+    rows = [row for row in card.rows if not row.blank]
+    if kind == "inertia":
+        part = [card.integer(rows[0], 0)] if rows else []
+        reals = [card.real(row, at) for row, count in zip(rows[1:], _REALS[kind], strict=False) for at in range(count)]
+        return SwitchSet(card, kind, None, (), (*part, *reals))
+    if card.name.endswith("_CONTROL"):
+        values = [card.real(row, at) for row in rows[:1] for at in range(4)]
+        return SwitchSet(card, kind, None, (), tuple(values))
+    to_rigid = not card.name.endswith("_R2D")
+    return _with(card, kind, None, [_line(card, row, to_rigid=to_rigid, ptype=kind == "plain") for row in rows])
+
+
+def _automatic(card: Card) -> SwitchSet:
+    rows = list(card.rows)
+    while rows and rows[-1].blank:
+        rows.pop()
+    if len(rows) < _HEADER_ROWS:
+        problem = f"{_lines(len(rows))} below the keyword, at least {_HEADER_ROWS} were expected"
+        return SwitchSet(card, "automatic", None, (), (), problem)
+    header = _header(card, rows[0], rows[1])
+    lines = rows[_HEADER_ROWS:]
+    if header.to_rigid.problem or header.to_deformable.problem:
+        return _with(card, "automatic", header, [])
+    rigid, deformable = header.to_rigid.value, header.to_deformable.value
+    problem = ""
+    if rigid < 0 or deformable < 0:
+        problem = f"D2R is {rigid} and R2D is {deformable}, counts from 0 on were expected"
+    elif len(lines) != rigid + deformable:
+        problem = f"D2R is {rigid} and R2D is {deformable}, but {_lines(len(lines))} of parts follow"
+    elif not lines:
+        problem = "D2R and R2D are 0, so the card switches nothing"
+    elif any(row.blank for row in lines):
+        problem = "an empty line stands where a part was expected"
+    rigid, deformable = max(rigid, 0), max(deformable, 0)
+    switched = [_line(card, row, to_rigid=True, ptype=True) for row in lines[:rigid] if not row.blank]
+    back = lines[rigid : rigid + deformable]
+    switched += [_line(card, row, to_rigid=False, ptype=True) for row in back if not row.blank]
+    return _with(card, "automatic", header, switched, problem)
+
+
+def _lines(count: int) -> str:
+    return "1 line" if count == 1 else f"{count or 'no'} lines"
+
+
+def _header(card: Card, first: Row, second: Row) -> Header:
+    code = card.integer(first, 1)
+    if not code.problem and not BY_TIME <= code.value <= BY_SENSOR:
+        code = Value(code.value, code.field, f"CODE is {code.value}, {BY_TIME} to {BY_SENSOR} was expected")
+    swset = card.integer(first, 0)
+    if not swset.problem and swset.value <= 0:
+        swset = Value(swset.value, swset.field, f"SWSET is {swset.value}, a positive number was expected")
+    time1 = card.real(first, 2)
+    if code.value == BY_TIME and not time1.problem and _runs_over(first):
+        problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.field(3).text})"
+        time1 = Value(time1.value, time1.field, problem)
+    others = [card.real(first, 3), card.real(first, 4), *(card.real(second, at) for at in (0, 1, 2, 3, 6))]
+    return Header(
+        swset=_moved(swset, card.transform.rest),
+        code=code,
+        time1=time1,
+        entno=card.integer(first, 5),
+        relsw=_moved(card.integer(first, 6), card.transform.rest),
+        paired=card.integer(first, 7),
+        to_rigid=card.integer(second, 4),
+        to_deformable=card.integer(second, 5),
+        others=tuple(others),
+    )
+
+
+def _runs_over(row: Row) -> bool:
+    """Whether digits of TIME1 seem to go on as TIME2: a number of its own that fills its field has a point."""
+    border = 3 * row.width
+    rest = row.text[border : border + row.width].strip()
+    touching = row.text[border - 1 : border].isdigit() and row.text[border : border + 1].isdigit()
+    return touching and "," not in row.text and "." not in rest and rest.strip("0") != ""
+
+
+_Line = tuple[Switched, Value[str]]
+
+
+def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
+    """Part, LRB where the line has it, and PTYPE: column 21 of a D2R line, column 11 of an R2D line."""
+    kind = card.word(row, 2 if to_rigid else 1, "PART") if ptype else Value("PART", card.here)
+    if kind.value not in {"PART", "PSET"}:
+        kind = Value("PART", kind.field, f"PTYPE is {kind.field.text!r}, PART or PSET was expected")
+    by_set = kind.value == "PSET"
+    part = _moved(card.integer(row, 0), card.transform.set_ if by_set else card.transform.part)
+    if not part.problem and part.value <= 0:
+        part = Value(0, part.field, f"{part.field.text!r} is no part id, a positive number was expected")
+    lead = _moved(card.integer(row, 1), card.transform.part) if to_rigid else None
+    return Switched(part, by_set, to_rigid, lead), kind
+
+
+def _moved(value: Value[int], offset: int) -> Value[int]:
+    """Add the offset of the include to an id; 0 stays none."""
+    if value.problem or not value.value:
+        return value
+    return Value(value.value + offset, value.field, "", value.parameters)
+
+
+def _with(card: Card, kind: Kind, header: Header | None, lines: Sequence[_Line], count_problem: str = "") -> SwitchSet:
+    values: list[Value[int] | Value[float] | Value[str]] = list(header.values) if header else []
+    for switched, ptype in lines:
+        values += [switched.part, ptype] if switched.lead is None else [switched.part, switched.lead, ptype]
+    return SwitchSet(card, kind, header, tuple(line for line, _ in lines), tuple(values), count_problem)

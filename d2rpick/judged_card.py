@@ -1,0 +1,43 @@
+"""Cards whose times were judged by an energy history, as they are printed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from d2rpick.choice import verify
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from d2rpick.cards import PrintedCard
+    from d2rpick.choice import Verdict
+    from d2rpick.history import History
+    from d2rpick.situation import Settings
+
+
+def judged(
+    write: Callable[[Sequence[str]], PrintedCard], history: History, settings: Settings
+) -> tuple[PrintedCard, Verdict]:
+    """Write a card, judge its times as printed, and write it again with what was found as comments."""
+    plain = write(())
+    verdict = verify(history, plain.tr, plain.td, settings)
+    return write(tuple(_remarks(verdict))), verdict
+
+
+def _remarks(verdict: Verdict) -> Iterator[str]:
+    candidate, history = verdict.candidate, verdict.situation.history
+    result = "verified" if verdict.verified else f"NOT verified ({'; '.join(verdict.reasons)})"
+    yield f"Judged by {', '.join(history.source)}, {history.channel}: {result}."
+    measures = [
+        f"{name} {value:.3f}"
+        for name, value in (
+            ("lock-in error", candidate.lock_in_error),
+            ("level error", candidate.level_error),
+            ("kinetic share", verdict.situation.kinetic_share),
+            ("residual", candidate.residual),
+        )
+        if value is not None
+    ]
+    if measures:
+        yield f"{', '.join(measures).capitalize()}."
+    yield from (f"{caution.code}: {caution.message}." for caution in verdict.cautions)

@@ -1,0 +1,242 @@
+"""Findings of ``check`` as table, JSON, GitHub annotations, JUnit XML and SARIF."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import quote
+from xml.etree import ElementTree as ET
+
+from d2rpick import __version__
+from d2rpick.rules import RULES, Severity
+from d2rpick.rules.base import name_units
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from d2rpick.deck import Window
+    from d2rpick.rules import Checked, Finding, Unreadable
+
+SCHEMA: Final = "d2rpick/check/1"
+SARIF_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
+_GITHUB: Final = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
+_SARIF: Final = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}
+_NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def as_table(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable] = ()) -> str:
+    """Findings and windows of each deck, one per line, and how many there are; decks that ``failed`` are counted."""
+    lines: list[str] = []
+    for result in results:
+        lines.append(_shown(result.deck, root))
+        if not result.cards:
+            lines.append("  no switching cards")
+        lines += [f"  {line}" for line in _window_lines(result.windows, root)]
+        lines += [
+            f"  {_shown(f.file, root)}:{f.line}:{f.column}: {f.severity} {f.rule} {f.message}" for f in result.findings
+        ]
+    left_out = f", {len(failed)} not checked" if failed else ""
+    return "\n".join([*lines, "", _summary_line(results) + left_out])
+
+
+def as_json(
+    results: Sequence[Checked],
+    root: Path,
+    command: Sequence[str],
+    warnings: Sequence[Mapping[str, str]] = (),
+    history: Sequence[str] | None = None,
+) -> str:
+    """Give everything by schema d2rpick/check/1; paths are relative to ``root`` where they lie below it.
+
+    ``history`` are the files the windows were judged by, None without any.
+    """
+    content = {
+        "schema": SCHEMA,
+        "tool_version": __version__,
+        "command": list(command),
+        "warnings": [dict(warning) for warning in warnings],
+        "decks": [_shown(result.deck, root) for result in results],
+        "history": None if history is None else [_shown(name, root) for name in history],
+        "windows": [_window(result, window, root) for result in results for window in result.windows],
+        "findings": [_finding(finding, root) for result in results for finding in result.findings],
+        "summary": {**_counts(results), "decks": len(results)},
+    }
+    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
+
+
+def as_github(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable] = ()) -> str:
+    """Workflow commands that GitHub Actions shows beside the lines of a deck."""
+    found = [
+        f"::{_GITHUB[f.severity]} file={_escaped(_shown(f.file, root), ',:')},line={f.line},col={f.column},"
+        f"title={f.rule}::{_escaped(f.message)}"
+        for result in results
+        for f in result.findings
+    ]
+    found += [f"::error file={_escaped(_shown(one.deck, root), ',:')}::{_escaped(one.reason)}" for one in failed]
+    return "\n".join(found)
+
+
+def as_junit(
+    results: Sequence[Checked],
+    root: Path,
+    fail_on: Severity = Severity.ERROR,
+    failed: Sequence[Unreadable] = (),
+) -> str:
+    """One suite per deck, one case per finding; those lighter than ``fail_on`` pass and only say their message."""
+    suites = ET.Element("testsuites", name="d2rpick check")
+    for one in failed:
+        name = _xml(_shown(one.deck, root))
+        suite = ET.SubElement(suites, "testsuite", name=name, tests="1", failures="0", errors="1")
+        case = ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
+        ET.SubElement(case, "error", type="unreadable-deck", message=_xml(one.reason))
+    for result in results:
+        failures = sum(finding.severity.rank <= fail_on.rank for finding in result.findings)
+        suite = ET.SubElement(
+            suites,
+            "testsuite",
+            name=_xml(_shown(result.deck, root)),
+            tests=str(max(1, len(result.findings))),
+            failures=str(failures),
+            errors="0",
+        )
+        if not result.findings:
+            ET.SubElement(suite, "testcase", name="d2rpick check", classname=suite.attrib["name"])
+        for f in result.findings:
+            place = f"{_shown(f.file, root)}:{f.line}:{f.column}"
+            case = ET.SubElement(suite, "testcase", name=_xml(f"{f.rule} {place}"), classname=suite.attrib["name"])
+            text = _xml(f"{place}: {f.severity} {f.rule} {f.message}")
+            if f.severity.rank <= fail_on.rank:
+                ET.SubElement(case, "failure", type=f.rule, message=_xml(f.message)).text = text
+            else:
+                ET.SubElement(case, "system-out").text = text
+    ET.indent(suites)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(suites, encoding="unicode")
+
+
+def as_sarif(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable] = ()) -> str:
+    """SARIF 2.1.0 with all rules; ids are stable."""
+    ids = list(RULES)
+    driver = {
+        "name": "d2rpick",
+        "version": __version__,
+        "rules": [
+            {
+                "id": rule.id,
+                "shortDescription": {"text": rule.summary},
+                "fullDescription": {"text": rule.explanation},
+                "defaultConfiguration": {"level": _SARIF[rule.severity]},
+            }
+            for rule in RULES.values()
+        ],
+    }
+    found = [
+        {
+            "ruleId": f.rule,
+            "ruleIndex": ids.index(f.rule),
+            "level": _SARIF[f.severity],
+            "message": {"text": f.message},
+            "locations": [
+                {
+                    "physicalLocation": {
+                        "artifactLocation": {"uri": _uri(f.file, root)},
+                        "region": {"startLine": f.line, "startColumn": f.column},
+                    }
+                }
+            ],
+        }
+        for result in results
+        for f in result.findings
+    ]
+    messages = [
+        {
+            "level": "error",
+            "message": {"text": one.reason},
+            "locations": [{"physicalLocation": {"artifactLocation": {"uri": _uri(one.deck, root)}}}],
+        }
+        for one in failed
+    ]
+    run = {
+        "tool": {"driver": driver},
+        "columnKind": "unicodeCodePoints",
+        "invocations": [{"executionSuccessful": not failed, "toolExecutionNotifications": messages}],
+        "results": found,
+    }
+    return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2, ensure_ascii=False)
+
+
+def _window_lines(windows: Sequence[Window], root: Path) -> Iterator[str]:
+    """Windows that the same cards make are one line."""
+    groups: dict[tuple[int, int | None, bool], list[Window]] = {}
+    for window in windows:
+        closed = None if window.closed is None else id(window.closed.by)
+        groups.setdefault((id(window.opened.by), closed, window.unit.is_set), []).append(window)
+    for group in groups.values():
+        first = group[0]
+        kind = "part set" if first.unit.is_set else "part"
+        card = first.opened.by.card
+        until = "the end" if first.td is None else f"{first.td:g}"
+        names = name_units((window.unit.id for window in group), kind)
+        yield f"{names}: rigid from {first.tr:g} to {until} ({_shown(card.file, root)}:{card.line})"
+
+
+def _window(result: Checked, window: Window, root: Path) -> dict[str, Any]:
+    card = window.opened.by.card
+    return {
+        "part": window.part,
+        "part_set": window.unit.id if window.unit.is_set else None,
+        "tr": window.tr,
+        "td": window.td,
+        "file": _shown(card.file, root),
+        "line": card.line,
+        "deck": _shown(result.deck, root),
+    }
+
+
+def _finding(finding: Finding, root: Path) -> dict[str, Any]:
+    return {
+        "rule": finding.rule,
+        "severity": str(finding.severity),
+        "message": finding.message,
+        "file": _shown(finding.file, root),
+        "line": finding.line,
+        "column": finding.column,
+        "deck": _shown(finding.deck, root),
+    }
+
+
+def _counts(results: Sequence[Checked]) -> dict[str, int]:
+    counted = Counter(finding.severity for result in results for finding in result.findings)
+    return {f"{severity}s": counted[severity] for severity in Severity}
+
+
+def _summary_line(results: Sequence[Checked]) -> str:
+    found = [f"{count} {name if count != 1 else name[:-1]}" for name, count in _counts(results).items()]
+    decks = "1 deck" if len(results) == 1 else f"{len(results)} decks"
+    return f"{', '.join(found)} in {decks}"
+
+
+def _shown(path: str, root: Path) -> str:
+    """Path relative to the working folder where it lies below it, with ``/``; bytes that are no text replaced."""
+    absolute = os.path.abspath(root / path)  # noqa: PTH100 - resolve() would follow links to elsewhere
+    shown = os.path.relpath(absolute, root) if Path(absolute).is_relative_to(root) else absolute
+    return os.fsencode(shown).decode("utf-8", "replace").replace(os.sep, "/")
+
+
+def _uri(path: str, root: Path) -> str:
+    shown = _shown(path, root)
+    return quote(shown) if not shown.startswith("/") else f"file://{quote(shown)}"
+
+
+def _escaped(text: str, more: str = "") -> str:
+    for letter in "%\r\n" + more:
+        text = text.replace(letter, f"%{ord(letter):02X}")
+    return text
+
+
+def _xml(text: str) -> str:
+    """Return the text without the characters that XML 1.0 has no way to write."""
+    return _NOT_XML.sub("?", text)

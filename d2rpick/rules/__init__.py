@@ -1,0 +1,126 @@
+"""Rules of ``check``: one table of all, and the function that runs them over a deck."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.configuration import Configuration, expected_instead
+from d2rpick.deck import read_deck
+from d2rpick.errors import ConfigurationError
+from d2rpick.rules import energy, pairs, reading, scope, switched_parts, times
+from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, Severity, Unreadable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from d2rpick.deck import Deck, Window
+
+__all__ = [
+    "RULES",
+    "Case",
+    "Checked",
+    "Example",
+    "Finding",
+    "Judge",
+    "Rule",
+    "Severity",
+    "Unreadable",
+    "check_deck",
+    "find_rules",
+]
+
+_MODULES = (reading, pairs, times, switched_parts, energy, scope)
+
+RULES: Final[Mapping[str, Rule]] = {
+    rule.id: rule for rule in sorted((rule for module in _MODULES for rule in module.RULES), key=lambda rule: rule.id)
+}
+
+
+def find_rules(name: str) -> tuple[Rule, ...]:
+    """Rules by id or its beginning; ConfigurationError with the nearest one when there is none.
+
+    Examples
+    --------
+    >>> [rule.id for rule in find_rules("d2r30")]
+    ['D2R301', 'D2R302', 'D2R303', 'D2R304']
+    """
+    found = tuple(rule for rule in RULES.values() if name and rule.id.startswith(name.upper()))
+    if not found:
+        raise ConfigurationError(f"no rule {name!r}, {expected_instead(name, RULES)}")
+    return found
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found in one deck; ``cards`` is the number of its switching cards, ``files`` all that were read.
+
+    ``remarks`` tell of comments in the deck that silence nothing.
+    """
+
+    deck: str
+    windows: tuple[Window, ...]
+    findings: tuple[Finding, ...]
+    cards: int = 0
+    files: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+def check_deck(path: str, configuration: Configuration | None = None, judge: Judge | None = None) -> Checked:
+    """Read a deck with its includes and apply the rules.
+
+    Parameters
+    ----------
+    path : str
+        The main deck.
+    configuration : Configuration, optional
+        Which rules count, and how much; default: all, as they are.
+    judge : Judge, optional
+        Judges the windows by an energy history; without one the energy rules find nothing.
+
+    Returns
+    -------
+    Checked
+        Windows by part and time, findings by file and line; findings silenced by a comment are left out.
+
+    Raises
+    ------
+    DeckError
+        If the deck itself cannot be read.
+    ConfigurationError
+        If the configuration names a rule that does not exist.
+    """
+    configuration = configuration or Configuration()
+    configuration.verify(RULES)
+    case = Case(read_deck(path), judge)
+    findings = [
+        Finding(
+            rule.id,
+            Severity(configuration.severity.get(rule.id, rule.severity)),
+            message,
+            path,
+            place.file,
+            place.line,
+            place.column,
+        )
+        for rule in RULES.values()
+        if configuration.selects(rule.id)
+        for place, message in rule.check(case)
+        if not case.deck.silences(rule.id, place.file, place.line)
+    ]
+    order = {path: 0}  # the deck itself first, its includes as they come
+    for finding in findings:
+        order.setdefault(finding.file, len(order))
+    findings.sort(key=lambda finding: (order[finding.file], finding.line, finding.column, finding.rule))
+    return Checked(
+        path, case.windows.windows, tuple(findings), len(case.sets), tuple(case.deck.files), tuple(_remarks(case.deck))
+    )
+
+
+def _remarks(deck: Deck) -> Iterator[str]:
+    """Tell of comments that ignore rules that do not exist."""
+    for card in deck.silencing:
+        for name in card.block.silenced:
+            if not (name.startswith("D2R") and any(rule.startswith(name) for rule in RULES)):
+                where = f"{card.file}: the comment before line {card.line}"
+                yield f"{where} ignores no rule: {name!r} was found, {expected_instead(name, RULES)}"

@@ -1,0 +1,196 @@
+"""Judges the windows of a deck by the history of a run without switching, with the code of ``verify``.
+
+Not imported by the rules themselves: without a history the check does not need numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.cautions import POOR_KINETIC_SHARE, Caution
+from d2rpick.choice import Verdict, better_pair, suggest, verify
+from d2rpick.rules.base import Fault, name_units
+from d2rpick.situation import examine
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.deck import Window
+    from d2rpick.history import History, Momenta
+    from d2rpick.readers import Run, Selection
+    from d2rpick.situation import Settings
+
+# What verify warns of and no rule reports.
+_KEPT: Final = ("truncated-input", "energy-only", "no-free-flight", "flight-from-energy", "plastic-or-preload")
+_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time with --after"
+
+
+@dataclass
+class HistoryJudge:
+    """Judges by one run: each part by its own energy where the run has parts, else by that of the whole model.
+
+    ``selection`` says what else was asked for; with a named energy all windows are judged by that one.
+    """
+
+    run: Run
+    selection: Selection
+    settings: Settings
+    _histories: dict[int | None, History] = field(default_factory=dict)
+    _faults: dict[tuple[int | None, float, float | None], tuple[Fault, ...]] = field(default_factory=dict)
+    _cautions: dict[Caution, list[int]] = field(default_factory=dict)
+
+    @property
+    def end(self) -> float:
+        """Last time of the history."""
+        return float(self.history(next(iter(self._known), None)).time[-1])
+
+    @property
+    def cautions(self) -> list[Caution]:
+        """What to be aware of, by what was judged so far."""
+        return [
+            replace(caution, message=f"{name_units(parts)}: {caution.message}" if parts else caution.message)
+            for caution, parts in self._cautions.items()
+        ]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the readers left out or assumed, by what was judged so far."""
+        return tuple(dict.fromkeys(note for history in self._histories.values() for note in history.notes))
+
+    def history(self, part: int | None) -> History:
+        """Give the energy of a part, or of the whole model."""
+        if part not in self._histories:
+            selection = self.selection if part is None else replace(self.selection, parts=(str(part),))
+            known = next(iter(self._histories.values()), None)  # all parts share the momenta, which take long to read
+            history = self.run.history(selection, with_momenta=known is None)
+            momenta = history.momenta if known is None else known.momenta
+            self._histories[part] = replace(history, momenta=tuple(_seen_from(part, one) for one in momenta))
+        return self._histories[part]
+
+    def faults(self, window: Window) -> tuple[Fault, ...]:
+        """Everything that speaks against a window; of one that is not closed, or inverted, tr alone is judged."""
+        td = window.td if window.td is not None and window.td > window.tr else None
+        part = window.part if self._known else None
+        if part is not None and part not in self._known:
+            there = name_units(self._known)
+            return (Fault("D2R205", False, f"not in the history, which has {there}; renumbered, or not written?"),)
+        key = part, window.tr, td
+        if key not in self._faults:
+            if self._known and part is None:
+                what = f"the members of part set {window.unit.id} are not known, it is judged by the whole model"
+                self._cautions[Caution("judged-by-whole", what)] = []
+            self._faults[key] = tuple(self._judged(part, window.tr, td))
+        return self._faults[key]
+
+    @property
+    def _known(self) -> list[int]:
+        return [] if self.selection.energy else [part.id for part in self.run.parts]
+
+    def _judged(self, part: int | None, tr: float, td: float | None) -> Iterator[Fault]:
+        history = self.history(part)
+        first, last = float(history.time[0]), float(history.time[-1])
+        times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
+        outside = [(name == "td", name, time) for name, time in times if not first <= time <= last]
+        for at_td, name, time in outside:
+            message = (
+                f"{name} = {time:.6g} lies outside the history, {first:.6g} to {last:.6g}; correct it or run longer"
+            )
+            yield Fault("D2R205", at_td, message)
+        if outside:
+            return
+        if td is None:
+            yield from _of_load(history, tr, self.settings)
+            return
+        verdict = verify(history, tr, td, self.settings)
+        if part is not None and not history.energy.any():
+            # nothing to lock in, as the reader's note says; when it may be switched is known by momentum alone
+            yield from _of_flight(verdict) if verdict.situation.flight.start is not None else ()
+            return
+        for caution in verdict.cautions:
+            if caution.code in _KEPT:
+                parts = self._cautions.setdefault(caution, [])
+                parts += [] if part is None else [part]
+        yield from faults_of(verdict)
+
+
+def _seen_from(part: int | None, momenta: Momenta) -> Momenta:
+    """The same momenta, of which a part, or None for all, is to be switched."""
+    if momenta.parts is None:
+        return momenta
+    chosen = tuple(at for at, one in enumerate(momenta.parts) if part in (None, one.id))
+    return replace(momenta, chosen=chosen)
+
+
+def faults_of(verdict: Verdict) -> Iterator[Fault]:
+    """Translate a verdict into rules: any pair that does not verify has at least one fault of severity error."""
+    found = [*_of_flight(verdict), *_of_error(verdict)]
+    if not verdict.verified and not found:
+        found = [Fault("D2R201", False, "; ".join(verdict.reasons))]
+    yield from found
+    situation = verdict.situation
+    if situation.kinetic_share is not None and situation.kinetic_share > POOR_KINETIC_SHARE:
+        better = better_pair(situation)
+        way_out = f"better: td = {better.td:.6g} with tr = {better.tr:.6g}" if better else "no better td was found"
+        what = f"{situation.kinetic_share:.0%} of the vibration energy is kinetic at td = {situation.td:.6g}"
+        yield Fault("D2R203", True, f"{what} and cannot be kept by any tr; {way_out}")
+
+
+def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]:
+    """Judge a tr of which no td is known: it should lie in the last flight of the history, or in one around it."""
+    last = examine(history, float(history.time[-1]), settings)
+    earliest = last.earliest_tr
+    if earliest is not None and tr >= earliest:
+        return
+    around = examine(history, tr, settings)
+    start = around.earliest_tr
+    if around.flight.source != "energy" and start is not None and start <= tr <= around.latest_td:
+        return
+    if earliest is None:
+        yield Fault("D2R204", False, _UNKNOWN)
+    else:
+        end = f"before the end of the load at {earliest:.6g} ({last.flight.source})"
+        yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; switch after it")
+
+
+def _of_flight(verdict: Verdict) -> Iterator[Fault]:
+    situation, tr = verdict.situation, verdict.candidate.tr
+    earliest, flight = situation.earliest_tr, situation.flight
+    if earliest is None:
+        yield Fault("D2R204", False, _UNKNOWN)
+    elif tr < earliest:
+        end = f"before the end of the load at {earliest:.6g} ({flight.source})"
+        yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; {_way_out(verdict)}")
+    if situation.td > situation.latest_td:
+        end = f"after the end of the flight at {situation.latest_td:.6g}"
+        yield Fault("D2R204", True, f"td = {situation.td:.6g} lies {end}; switch back before it")
+
+
+def _of_error(verdict: Verdict) -> Iterator[Fault]:
+    candidate, situation = verdict.candidate, verdict.situation
+    tolerance = situation.settings.tolerance
+    if candidate.sign_match is False:
+        what = "the deformation at tr has the opposite sign of that at td"
+        yield Fault("D2R202", False, f"{what}; {_way_out(verdict)}")
+        return
+    if candidate.lock_in_error is not None:
+        error, what = candidate.lock_in_error, "lock-in error"
+    elif candidate.level_error is not None:
+        error, what = candidate.level_error, "level error"
+    else:
+        return
+    if error > tolerance:
+        levels = f"the energy is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
+        expected = f"{what} {error:.3g}, at most {tolerance:g} was expected"
+        yield Fault("D2R201", False, f"{levels}: {expected}; {_way_out(verdict)}")
+
+
+def _way_out(verdict: Verdict) -> str:
+    """Name a tr that suits the td, or where to look for a pair."""
+    situation = verdict.situation
+    other = suggest(situation.history, situation.td, situation.settings)
+    if other.recommended:
+        return f"tr = {other.recommended.tr:.6g} suits this td"
+    if other.better_td:
+        return f"no tr suits this td; td = {other.better_td.td:.6g} with tr = {other.better_td.tr:.6g} does"
+    return "no tr suits this td; see d2rpick suggest"

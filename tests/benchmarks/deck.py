@@ -1,0 +1,65 @@
+"""Finding the cards in a 50 MB deck against a plain line loop, and the memory it takes."""
+
+from __future__ import annotations
+
+import tracemalloc
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from d2rpick.deck import find_windows, read_deck, read_parts, read_switching
+from d2rpick.rules.example_decks import BACK, HEAD, PARTS, THERE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+NODES = ELEMENTS = 408_321
+MEGABYTE = 1e6
+
+
+@contextmanager
+def large_deck() -> Iterator[Path]:
+    """50 MB of mesh with the switching cards behind it."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "large.k"
+        with path.open("w", encoding="ascii") as deck:
+            deck.write(HEAD + PARTS + "*NODE\n")
+            deck.writelines(
+                f"{n:8d}{n * 0.5:16.7f}{-n * 0.25:16.7f}{n % 641:16.7f}       0       0\n" for n in range(1, NODES + 1)
+            )
+            deck.write("*ELEMENT_SHELL\n")
+            deck.writelines(
+                f"{n:8d}{n % 2 + 1:8d}{n:8d}{n + 1:8d}{n + 641:8d}{n + 640:8d}\n" for n in range(1, ELEMENTS + 1)
+            )
+            deck.write(THERE + BACK)
+        assert path.stat().st_size > 49 * MEGABYTE
+        yield path
+
+
+def line_loop(path: Path) -> None:
+    """Count keywords as a plain loop does."""
+    with path.open("rb") as deck:
+        assert sum(line.startswith(b"*") for line in deck) == 10
+
+
+def find_cards(path: Path) -> None:
+    """Find the cards and derive the windows."""
+    deck = read_deck(str(path))
+    found = find_windows(read_switching(deck), read_parts(deck)).windows
+    assert [(window.part, window.tr, window.td) for window in found] == [(1, 0.02, 0.09)]
+
+
+def number_cards(path: Path) -> None:
+    """Find the cards and count the lines to each."""
+    assert [card.line for card in read_deck(str(path)).cards][-1] == 2 * NODES + 22
+
+
+def memory() -> float:
+    """Most memory that finding the cards takes [MB]."""
+    with large_deck() as path:
+        tracemalloc.start()
+        find_cards(path)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    return most / MEGABYTE

@@ -1,0 +1,43 @@
+"""Decks on disk for a test: write texts into a folder, read them back, check them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from d2rpick.deck import Deck, Windows, find_windows, read_deck, read_parts, read_switching
+from d2rpick.rules import check_deck
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+MAIN = "main.k"
+
+
+def write(folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None) -> str:
+    """Path of the main deck, written with the files it includes."""
+    for name, text in (files or {}).items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(text.encode("latin-1"))
+    path = folder / MAIN
+    path.write_bytes(deck if isinstance(deck, bytes) else deck.encode("latin-1"))
+    return str(path)
+
+
+def read(folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None) -> Deck:
+    return read_deck(write(folder, deck, files))
+
+
+def windows(deck: Deck) -> Windows:
+    return find_windows(read_switching(deck), read_parts(deck))
+
+
+def spans(deck: Deck) -> list[tuple[int | None, float, float | None]]:
+    """Part, tr and td of every window."""
+    return [(window.part, window.tr, window.td) for window in windows(deck).windows]
+
+
+def found(folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None) -> Counter[str]:
+    """How often each rule objects."""
+    return Counter(finding.rule for finding in check_deck(write(folder, deck, files)).findings)

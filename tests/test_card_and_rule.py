@@ -1,0 +1,240 @@
+"""The commands ``card`` and ``rule``, and ``suggest -f card``."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.rules import RULES
+from tests import paper
+from tests.command import BOX, ENERGY, answer, run
+
+if TYPE_CHECKING:
+    from click.testing import Result
+
+GOOD = ("--tr", "0.0135867", "--td", "0.0687534")
+OPPOSITE = ("--tr", "0.0122659", "--td", "0.064")
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def pasted(result: Result) -> list[tuple[int, float, float]]:
+    """Windows that the check sees in a printed card; it must find nothing else."""
+    Path("card.k").write_text(result.stdout)
+    found = answer("check", "card.k")
+    assert found["findings"] == []
+    return [(window["part"], window["tr"], window["td"]) for window in found["windows"]]
+
+
+def comments(text: str) -> str:
+    """All comments of a card in one line."""
+    return " ".join(line.lstrip("$# ") for line in text.split("\n") if line.startswith(("$ ", "# ")))
+
+
+# card, LS-DYNA.
+
+
+def test_the_card_is_what_the_check_reads() -> None:
+    result = run("card", *GOOD, "--part", "12,14-16", "--part", "11", "--merge", "11")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert pasted(result) == [(part, 0.0135867, 0.0687534) for part in (11, 12, 14, 15, 16)]
+    assert "        12        11      PART\n" in result.stdout
+    assert all(len(line) <= 80 for line in result.stdout.split("\n"))
+
+
+def test_options_of_the_card() -> None:
+    text = run("card", *GOOD, "--part", "1", "--step-cap", "1e-5", "--swset", "7", "8").stdout
+    assert re.findall(r"^ +([78]) ", text, flags=re.MULTILINE) == ["7", "8"]
+    assert "    1.0e-5         1         0" in text
+    assert "DTMAX is 0" not in text
+
+
+def test_the_times_are_judged_as_they_are_printed() -> None:
+    good = run("card", *GOOD, "--part", "1", "--history", ENERGY)
+    assert good.exit_code == 0
+    assert f"Judged by {ENERGY}, internal_energy: verified." in comments(good.stdout)
+    bad = run("card", *OPPOSITE, "--part", "1", "--history", ENERGY)
+    assert bad.exit_code == 1
+    assert "NOT verified (opposite sign of the deformation)" in comments(bad.stdout)
+    assert "poor-td: 92%" in comments(bad.stdout)
+    assert "warning: not-verified: the times as printed: opposite sign" in bad.stderr
+    assert pasted(bad) == [(1, 0.0122659, 0.064)]
+    assert run("card", *OPPOSITE, "--part", "1", "--history", ENERGY, "--exit-zero").exit_code == 0
+    assert run("card", *GOOD, "--part", "1", "--history", ENERGY, "--after", "0.03").exit_code == 1
+
+
+def test_a_rounded_time_is_told_and_judged() -> None:
+    tr = paper.CROSSINGS[2][0] / 1e3
+    result = run("card", "--tr", repr(tr), "--td", "0.064", "--part", "1", "--history", ENERGY)
+    assert "note: tr is printed as .012885279, " in result.stderr
+    assert pasted(result) == [(1, 0.012885279, 0.064)]
+    assert result.exit_code == 0
+
+
+def test_parts_are_those_of_the_history() -> None:
+    result = run("card", "--tr", "0.0886", "--td", "0.37", "--part", "box", "--history", BOX)
+    box = next(part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box")
+    assert pasted(result) == [(box, 0.0886, 0.37)]
+    assert "internal energy of box" in comments(result.stdout)
+    missing = run("card", "--tr", "0.0886", "--td", "0.37", "--part", "77", "--history", BOX)
+    assert missing.exit_code == 2
+    assert "no part 77" in missing.stderr
+
+
+def test_a_named_energy_judges_whatever_the_part() -> None:
+    args = ("--part", "1", "--history", ENERGY, "--energy", "internal_energy")
+    assert run("card", *GOOD, *args).exit_code == 0
+
+
+def test_the_card_has_no_colour_codes() -> None:
+    result = run("card", *GOOD, "--part", "1", color=True, env={"FORCE_COLOR": "1"})
+    assert "\x1b" not in result.stdout
+
+
+def test_the_card_goes_to_a_file() -> None:
+    result = run("card", *GOOD, "--part", "1", "-o", "card.k")
+    assert (result.exit_code, result.stdout) == (0, "")
+    assert answer("check", "card.k")["findings"] == []
+    assert run("card", *GOOD, "--part", "1", "-o", "card.k").exit_code == 2
+
+
+def test_a_negative_zero_is_printed_as_zero() -> None:
+    assert "-0" not in run("card", "--tr", "-0.0", "--td", "0.02", "--part", "1").stdout.split("*", 1)[1]
+    engine = run("card", "--solver", "radioss", "--tr", "-0.0", "--td", "0.02", "--node", "1", "--end", "1").stdout
+    assert "-0.0" not in engine
+
+
+# card, Radioss.
+
+
+def test_engine_files_of_radioss() -> None:
+    args = ("--solver", "radioss", *GOOD, "--node", "1001,1003-1004", "--name", "box", "--step-cap", "1e-6")
+    text = run("card", *args, "--end", "0.2").stdout
+    assert re.findall(r"^/RUN/box/(\d)\n +(\S+)\n/RBODY/(\S+)\n(.*)$", text, flags=re.MULTILINE) == [
+        ("1", "0.0135867", "OFF", "1001 1003 1004"),
+        ("2", "0.0687534", "ON", "1001 1003 1004"),
+        ("3", "0.2", "OFF", "1001 1003 1004"),
+    ]
+    assert "/DTIX\n1e-06 1e-06\n" in text
+    judged = run("card", *args, "--history", ENERGY)
+    assert judged.exit_code == 0
+    assert "                0.15\n" in judged.stdout
+    assert "verified" in comments(judged.stdout)
+
+
+@pytest.mark.parametrize("solver", ["ls-dyna --part 1", "radioss --node 1 --end 0.2"])
+def test_what_a_real_solver_does_at_the_switches_is_told(solver: str) -> None:
+    told = comments(run("card", "--solver", *shlex.split(solver), *GOOD).stdout)
+    for what in ("first step at or after", "co-rotating", "vibration is lost", "no reference"):
+        assert what in told
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("--part 1 --tr 0.09 --td 0.02", "0 <= tr < td was expected"),
+        ("--tr 0.01 --td 0.02", "needs --part"),
+        ("--part door --tr 0.01 --td 0.02", "titles need a --history"),
+        ("--part 1-99999999 --tr 0.01 --td 0.02", "no range"),
+        ("--part 9-3 --tr 0.01 --td 0.02", "no range"),
+        ("--part 0 --tr 0.01 --td 0.02", "does not fit"),
+        ("--part 1 --node 3 --tr 0.01 --td 0.02", "--node is an option of --solver radioss"),
+        ("--solver radioss --part 1 --tr 0.01 --td 0.02", "needs --node"),
+        ("--solver radioss --node 1 --tr 0.01 --td 0.02", "needs --end"),
+        ("--solver radioss --node 1 --end 0.015 --tr 0.01 --td 0.02", "the run ends at 0.015"),
+        ("--solver radioss --node 1 --merge 1 --end 1 --tr 0.01 --td 0.02", "--merge is an option of --solver ls-dyna"),
+        ("--solver radioss --part 7 --node 1 --end 1 --tr 0.01 --td 0.02", "give a --history with parts"),
+        (f"--solver radioss --part 7 --node 1 --tr 0.01 --td 0.02 --history {ENERGY}", "give a --history with parts"),
+        ("--solver radioss --node 1 --end 1 --name a/b --tr 0.01 --td 0.02", "the name of the run is 'a/b'"),
+        ("--solver radioss --node 1 --end 1 --name '' --tr 0.01 --td 0.02", "the name of the run is ''"),
+        ("--part 1 --swset 5 5 --tr 0.01 --td 0.02", "both switch sets are 5"),
+        ("--part 1 --margin 0 --tr 0.01 --td 0.02", "--margin is about an energy history"),
+        ("--part 1 --tolerance 0.3 --tr 0.01 --td 0.02", "--tolerance is about an energy history"),
+        ("--part 1 -F csv --tr 0.01 --td 0.02", "--input-format is about an energy history"),
+        ("--part 1 --after 0.01 --tr 0.01 --td 0.02", "name it with --history"),
+        (f"--part 1 --tr 0.01 --td 7 --history {ENERGY}", "lies outside the record"),
+    ],
+)
+def test_what_is_no_card_says_why(line: str, message: str) -> None:
+    result = run("card", *shlex.split(line))
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+# suggest -f card.
+
+
+def test_suggest_prints_the_card_of_its_pair() -> None:
+    args = ("suggest", "--td", "0.37", "--part", "box", BOX)
+    pair = answer(*args)["recommended"]
+    result = run(*args, "-f", "card")
+    assert result.exit_code == 0
+    ((part, tr, td),) = pasted(result)
+    assert tr == pytest.approx(pair["tr"], abs=1e-9)
+    assert td == 0.37
+    assert f"--part {part} " not in result.stdout
+    assert "verified" in comments(result.stdout)
+    assert result.stderr.count("energy-only") == 1
+
+
+def test_suggest_without_a_pair_prints_no_card() -> None:
+    result = run("suggest", "--td", "0.37", "--part", "box", BOX, "-f", "card", "--margin", "0.3")
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert "no-candidate" in result.stderr
+
+
+def test_suggest_needs_the_parts_for_a_card() -> None:
+    result = run("suggest", "--td", "0.064", "-f", "card", ENERGY)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "-f card needs --part" in result.stderr
+
+
+# rule.
+
+
+def test_rules_are_listed() -> None:
+    lines = run("rule").stdout.splitlines()
+    assert [line.split()[0] for line in lines] == list(RULES)
+    assert "D2R105  error    both times of a window are 0 (decimals lost in writing)" in lines
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_a_rule_is_explained_with_its_examples(name: str) -> None:
+    text = run("rule", name.lower()).stdout
+    rule = RULES[name]
+    assert text.startswith(f"{name} ({rule.severity}): {rule.summary}\n")
+    assert rule.explanation in " ".join(text.split())
+    for example in (*rule.passing, *rule.failing):
+        indented = "".join(f"    {line}".rstrip() + "\n" for line in example.deck.splitlines())
+        assert indented.rstrip() in text
+        assert all(f"with {file}:" in text for file in example.files)
+    assert text.count("Passes") == len(rule.passing)
+    assert text.count("Fails") == len(rule.failing)
+
+
+def test_an_example_that_is_judged_by_a_history_says_how_to_run_it() -> None:
+    lines = run("rule", "D2R204").stdout.splitlines()
+    made = next(line for line in lines if "d2rpick replay" in line)
+    assert "checked by d2rpick check main.k --history energy.csv --after 0.03:" in lines
+    assert run(*shlex.split(made)[1:]).exit_code == 0
+    assert Path("energy.csv").is_file()
+
+
+def test_the_beginning_of_an_id_gives_all_of_them_and_near_misses_are_named() -> None:
+    assert re.findall(r"^(D2R\d+) \(", run("rule", "D2R3").stdout, flags=re.MULTILINE) == [
+        "D2R301",
+        "D2R302",
+        "D2R303",
+        "D2R304",
+    ]
+    result = run("rule", "D2R1O5")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert re.fullmatch(r"d2rpick: no rule 'D2R1O5', .* did you mean D2R1\d5\?\n", result.stderr)

@@ -1,0 +1,397 @@
+"""The command ``check`` as a CI job sees it: exit codes, formats, configuration, several decks, histories."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import jsonschema
+import numpy as np
+import pytest
+
+from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
+from tests.command import BOX, DECK, ENERGY, GLSTAT, ROOT, answer, run
+from tests.test_findings_report import junit_is_valid, sarif_is_valid
+
+FORMATS = ("table", "json", "github", "junit", "sarif")
+SCHEMA = json.loads((ROOT / "d2rpick/schemas/check-1.json").read_text())
+LATE = HEAD + PARTS + THERE + automatic(2, "0.5", deformable=["1"]) + END
+COARSE = GOOD.replace("    0.0001", "      0.01")
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def place(name: str, deck: str) -> str:
+    """Write a deck below the working folder."""
+    Path(name).parent.mkdir(parents=True, exist_ok=True)
+    Path(name).write_text(deck)
+    return name
+
+
+def deck_of(tr: float, td: float, part: int = 1) -> str:
+    """A deck with one window; the times are printed with all their digits."""
+    there = "*KEYWORD LONG=Y\n*DEFORMABLE_TO_RIGID_AUTOMATIC\n" + f"{1:20d}{0:20d}{tr!r:>20}\n"
+    back = "*DEFORMABLE_TO_RIGID_AUTOMATIC\n" + f"{2:20d}{0:20d}{td!r:>20}\n"
+    counts = [f"{'':80}{d2r:20d}{r2d:20d}\n{part:20d}\n" for d2r, r2d in ((1, 0), (0, 1))]
+    return there + counts[0] + back + counts[1]
+
+
+def rules(found: dict[str, Any]) -> list[str]:
+    return [finding["rule"] for finding in found["findings"]]
+
+
+def valid(form: str, text: str) -> None:
+    """Hold an output against the schema of its format."""
+    if form == "json":
+        jsonschema.validate(json.loads(text), SCHEMA)
+    elif form == "sarif":
+        sarif_is_valid(text)
+    elif form == "junit":
+        junit_is_valid(text)
+
+
+# The job it is for.
+
+
+def test_a_deck_that_looks_right_is_caught_by_the_history() -> None:
+    assert run("check", DECK).exit_code == 0
+    result = run("check", DECK, "--history", GLSTAT)
+    assert result.exit_code == 1
+    (line,) = (line for line in result.stdout.splitlines() if "error" in line and "D2R" in line)
+    assert line.strip().startswith(f"{DECK}:43:21: error D2R202 part 12: ")
+    assert "tr = 0.0128853 suits this td" in line
+    assert "td = 0.0687534 with tr = 0.0135867" in result.stdout
+
+
+def test_json_says_where_and_by_what() -> None:
+    found = answer("check", DECK, "--history", ENERGY)
+    jsonschema.validate(found, SCHEMA)
+    assert rules(found) == ["D2R202", "D2R203"]
+    assert found["history"] == [ENERGY]
+    assert found["summary"] == {"errors": 1, "warnings": 1, "infos": 0, "decks": 1}
+    assert [(w["part"], w["tr"], w["td"], w["line"]) for w in found["windows"]] == [
+        (11, 0.0135867, 0.0687534, 25),
+        (12, 0.012265914, 0.064, 41),
+    ]
+    assert answer("check", DECK)["history"] is None
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize(
+    ("deck", "options", "code"),
+    [
+        *((GOOD, (), 0), (LATE, (), 1), (LATE, ("--exit-zero",), 0)),
+        *((COARSE, (), 0), (COARSE, ("--fail-on", "warning"), 1), (COARSE, ("--ignore", "D2R111"), 0)),
+        (HEAD + PARTS + THERE + END, ("--fail-on", "warning"), 0),  # an info is never an objection
+    ],
+)
+def test_the_exit_code_is_the_same_in_every_format(deck: str, options: tuple[str, ...], code: int, form: str) -> None:
+    result = run("check", place("main.k", deck), "-f", form, *options)
+    assert (result.exit_code, result.stderr) == (code, "")
+    valid(form, result.stdout)
+
+
+def test_paths_are_relative_to_the_working_folder(tmp_path: Path) -> None:
+    place("runs/a/main.k", LATE)
+    for name in ("runs/a/main.k", str(tmp_path / "runs/a/main.k")):
+        found = answer("check", name)
+        assert found["decks"] == ["runs/a/main.k"]
+        assert {finding["file"] for finding in found["findings"]} == {"runs/a/main.k"}
+        assert "::error file=runs/a/main.k,line=" in run("check", "-f", "github", name).stdout
+
+
+def test_a_deck_without_switching_cards_says_so() -> None:
+    assert "no switching cards" in run("check", place("main.k", HEAD + PARTS)).stdout
+    assert "no switching cards" not in run("check", place("main.k", GOOD)).stdout
+
+
+# Several decks.
+
+
+def test_findings_of_one_deck_do_not_hide_those_of_another() -> None:
+    decks = [place("a.k", LATE), place("b.k", GOOD), place("c.k", LATE)]
+    found = answer("check", *decks)
+    assert [(finding["deck"], finding["rule"]) for finding in found["findings"]] == [
+        ("a.k", "D2R101"),
+        ("c.k", "D2R101"),
+    ]
+    assert found["summary"]["decks"] == 3
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_deck_that_cannot_be_read_does_not_hide_the_others(form: str) -> None:
+    place("a.k", COARSE)
+    result = run("check", "absent.k", "a.k", "-f", form)
+    assert result.exit_code == 1
+    assert result.stderr == "d2rpick: absent.k: No such file or directory, a readable deck was expected\n"
+    assert "D2R111" in result.stdout
+    assert "absent.k" in result.stdout or form == "table"
+    valid(form, result.stdout)
+    assert run("check", "absent.k", "a.k", "-f", form, "--exit-zero").exit_code == 0
+
+
+def test_an_unreadable_deck_is_an_error_of_its_own_in_reports() -> None:
+    place("a.k", GOOD)
+    (error,) = ET.fromstring(run("check", "absent.k", "a.k", "-f", "junit").stdout).iter("error")
+    assert "absent.k" in error.attrib["message"]
+    (sarif,) = json.loads(run("check", "absent.k", "a.k", "-f", "sarif").stdout)["runs"]
+    assert [one["executionSuccessful"] for one in sarif["invocations"]] == [False]
+    assert run("check", "absent.k", "a.k").stdout.endswith("in 1 deck, 1 not checked\n")
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_no_readable_deck_is_no_answer(form: str) -> None:
+    place("run.rad", "/RUN/Root/1\n 0.1\n")
+    result = run("check", "absent.k", "run.rad", "-f", form, "--exit-zero")
+    assert result.exit_code == 2
+    assert ("absent.k" in result.stdout) == (form != "table")
+    valid(form, result.stdout)
+    assert [line.split(": ")[1] for line in result.stderr.splitlines()] == ["absent.k", "run.rad"]
+
+
+# Which rules count.
+
+
+def test_options_and_configuration_select_rules() -> None:
+    deck = place("runs/main.k", HEAD + PARTS + THERE + automatic(1, "0.5", rigid=["1"]) + END)
+    every = {"D2R004", "D2R101", "D2R104"}
+    assert set(rules(answer("check", deck))) == every
+    assert set(rules(answer("check", deck, "--select", "D2R0,D2R101"))) == {"D2R004", "D2R101"}
+    assert set(rules(answer("check", deck, "--select", "D2R1", "--ignore", "d2r104"))) == {"D2R101"}
+    Path("pyproject.toml").write_text('[tool.d2rpick]\nignore = ["D2R004"]\n')
+    assert set(rules(answer("check", deck))) == every - {"D2R004"}
+    assert set(rules(answer("check", deck, "--ignore", "D2R104"))) == every - {"D2R104"}
+    Path("runs/d2rpick.toml").write_text('severity = {D2R104 = "error"}\nselect = ["D2R104"]\n')
+    found = answer("check", deck)
+    assert [(finding["rule"], finding["severity"]) for finding in found["findings"]] == [("D2R104", "error")]
+    assert run("check", deck).exit_code == 1
+
+
+def test_each_deck_goes_by_the_configuration_nearest_to_it() -> None:
+    decks = [place("a/main.k", LATE), place("b/main.k", LATE)]
+    Path("a/d2rpick.toml").write_text('ignore = ["D2R101"]\n')
+    assert [finding["deck"] for finding in answer("check", *decks)["findings"]] == ["b/main.k"]
+
+
+def test_a_comment_silences_a_rule_of_the_history_too() -> None:
+    text = Path(DECK).read_text()
+    for rule, number in (("D2R202", 903), ("D2R203", 904)):
+        head, card, tail = text.partition(f"*DEFORMABLE_TO_RIGID_AUTOMATIC\n{text.split(chr(10))[25]}\n       {number}")
+        assert card
+        text = f"{head}$ d2rpick: ignore {rule}\n{card}{tail}"
+    assert rules(answer("check", place("main.k", text), "--history", ENERGY)) == []
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (("--select", "D2R10l"), "did you mean D2R1"),
+        (("--ignore", "D2R999"), "no rule 'D2R999'"),
+        (("--after", "0.03"), "name it with --history"),
+        (("--energy", "boxIE_J"), "name it with --history"),
+        (("--history", "absent.csv"), "absent.csv"),
+        (("--history", ENERGY, "--after", "7"), "--after 7 lies outside the record"),
+        (("--fail-on", "info"), "info"),
+        (("-f", "csv"), "csv"),
+    ],
+)
+def test_what_cannot_run_says_why(args: tuple[str, ...], message: str) -> None:
+    result = run("check", DECK, *args)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_wrong_configuration_names_its_file() -> None:
+    place("main.k", GOOD)
+    Path("d2rpick.toml").write_text('select = ["D2R10l"]\n')
+    result = run("check", "main.k", "--select", "D2R1")
+    assert result.exit_code == 2
+    assert f"{Path('d2rpick.toml').absolute()}: no rule 'D2R10l'" in result.stderr
+
+
+def test_a_broken_configuration_does_not_hide_other_decks() -> None:
+    decks = [place("a/main.k", GOOD), place("b/main.k", LATE)]
+    Path("a/d2rpick.toml").write_text("select = [\n")
+    result = run("check", *decks, "-f", "json")
+    assert result.exit_code == 1
+    assert rules(json.loads(result.stdout)) == ["D2R101"]
+    assert "a/d2rpick.toml" in result.stderr
+
+
+def test_two_spellings_of_a_deck_are_one(tmp_path: Path) -> None:
+    place("main.k", LATE)
+    Path("link.k").symlink_to("main.k")
+    assert answer("check", "main.k", "./main.k", str(tmp_path / "main.k"), "link.k")["decks"] == ["main.k"]
+
+
+def test_a_comment_that_names_no_rule_is_told() -> None:
+    deck = place("main.k", HEAD + PARTS + "$ d2rpick: ignore D2R1O4\n" + THERE + END)
+    assert [w["code"] for w in answer("check", deck)["warnings"]] == ["unknown-rule"]
+    assert (
+        "warning: unknown-rule: main.k: the comment before line 15 ignores no rule: 'D2R1O4'"
+        in run("check", deck).stderr
+    )
+
+
+@pytest.mark.parametrize("name", ["inner.k", "d2rpick.toml"])
+def test_the_result_never_replaces_what_a_deck_leads_to(name: str) -> None:
+    place("main.k", HEAD + PARTS + "*INCLUDE\ninner.k\n" + END)
+    place("inner.k", THERE)
+    place("d2rpick.toml", 'ignore = ["D2R104"]\n')
+    before = Path(name).read_bytes()
+    result = run("check", "main.k", "-o", name, "--overwrite", "--select", "D2R1")
+    assert result.exit_code == 2
+    assert "is an input" in result.stderr
+    assert Path(name).read_bytes() == before
+
+
+def test_the_result_never_replaces_an_input() -> None:
+    place("main.k", GOOD)
+    Path("energy.csv").write_bytes(Path(ENERGY).read_bytes())
+    for name in ("main.k", "energy.csv"):
+        result = run("check", "main.k", "--history", "energy.csv", "-o", name, "--overwrite")
+        assert result.exit_code == 2
+        assert "is an input" in result.stderr
+    assert run("check", "main.k", "-o", "report.xml", "-f", "junit").stdout == ""
+    junit_is_valid(Path("report.xml").read_text())
+
+
+# Judged by a history.
+
+
+TIMES = np.linspace(0.001, 0.149, 12).tolist()
+
+
+@pytest.mark.parametrize("td", [0.064, 0.0687534, 0.1])
+@pytest.mark.parametrize("options", [(), ("--after", "0.02"), ("--margin", "0.005", "--tolerance", "0.5")])
+def test_the_check_objects_where_verify_does(td: float, options: tuple[str, ...]) -> None:
+    for tr in [time for time in [*TIMES, 0.0135867, 0.0128853, 0.0247264] if time < td]:
+        found = answer("check", place("main.k", deck_of(tr, td)), "--history", ENERGY, *options)
+        judged = answer("verify", "--tr", repr(tr), "--td", repr(td), *options, ENERGY)
+        errors = [finding for finding in found["findings"] if finding["severity"] == "error"]
+        assert bool(errors) != judged["verified"], (tr, td, judged["reasons"], errors)
+        assert ("D2R203" in rules(found)) == (judged["kinetic_share"] > 0.5)
+        assert ("D2R202" in rules(found)) == any("opposite sign" in reason for reason in judged["reasons"])
+        assert ("D2R204" in rules(found)) == any("end of the load" in reason for reason in judged["reasons"])
+
+
+@pytest.mark.parametrize("tr", [0.05, 0.0886, 0.15])
+def test_each_part_is_judged_by_its_own_energy_and_flight(tr: float) -> None:
+    parts = {str(part["id"]): part["energy_max"] for part in answer("info", BOX)["parts"]}
+    both = automatic(1, str(tr), rigid=[*parts]) + automatic(2, "0.37", deformable=[*parts])
+    found = answer("check", place("main.k", both), "--history", BOX)["findings"]
+    blamed = {
+        part
+        for finding in found
+        if finding["severity"] == "error"
+        for part in finding["message"].partition(":")[0].removeprefix("part").lstrip("s ").split(", ")
+    }
+    expected = set()
+    for part, energy in parts.items():
+        judged = answer("verify", "--tr", str(tr), "--td", "0.37", "--part", part, BOX)
+        in_load = any("before the end of the load" in reason for reason in judged["reasons"])
+        if in_load if energy == 0 else not judged["verified"]:  # without energy there is nothing to lock in
+            expected.add(part)
+    assert blamed == expected
+    assert 0.0 in parts.values()
+
+
+def test_what_verify_warns_of_is_told_for_each_part() -> None:
+    box = next(part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box")
+    found = answer("check", place("main.k", deck_of(0.15, 0.37, box)), "--history", BOX)
+    (told,) = (w["message"] for w in found["warnings"] if w["code"] == "energy-only")
+    assert told.startswith(f"part {box}: no single oscillator")
+
+
+def test_a_part_that_the_history_does_not_have_is_not_passed() -> None:
+    found = answer("check", place("main.k", deck_of(0.1, 0.37, 77)), "--history", BOX)
+    assert rules(found) == ["D2R205"]
+    assert "part 77: not in the history, which has part" in found["findings"][0]["message"]
+
+
+def test_parts_of_one_card_with_the_same_fault_are_one_finding() -> None:
+    both = automatic(1, ".0122659", rigid=["1", "2"]) + automatic(2, "0.064", deformable=["1", "2"])
+    found = answer("check", place("main.k", HEAD + PARTS + both + END), "--history", ENERGY)
+    assert [(f["rule"], f["message"].split(":")[0]) for f in found["findings"]] == [
+        ("D2R202", "parts 1, 2"),
+        ("D2R203", "parts 1, 2"),
+    ]
+
+
+def test_a_history_that_tells_no_flight_is_an_objection() -> None:
+    time = np.linspace(0, 1, 400)
+    rising = "\n".join(f"{t:.6f},{1 + t**2:.6f}" for t in time)
+    Path("rising.csv").write_text(f"time,internal_energy\n{rising}\n")
+    place("main.k", deck_of(0.5, 0.55))
+    found = answer("check", "main.k", "--history", "rising.csv")
+    (message,) = (f["message"] for f in found["findings"] if f["rule"] == "D2R204")
+    assert "nothing in the history shows when the load is over; give that time with --after" in message
+    assert "D2R204" not in rules(answer("check", "main.k", "--history", "rising.csv", "--after", "0.2"))
+
+
+def test_a_history_without_energy_is_an_objection() -> None:
+    rows = "\n".join(f"{t:.3f},0" for t in np.linspace(0, 1, 400))
+    Path("flat.csv").write_text(f"time,internal_energy\n{rows}\n")
+    found = answer("check", place("main.k", deck_of(0.5, 0.55)), "--history", "flat.csv", "--after", "0.1")
+    assert [f["message"] for f in found["findings"] if f["rule"] == "D2R201"]
+
+
+def test_td_after_the_next_contact_is_named_at_td() -> None:
+    box = next(part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box")
+    deck = place("main.k", deck_of(0.2, 0.37, box))
+    for margin, expected in (("0.005", []), ("0.03", [("D2R204", 7)])):
+        found = answer("check", deck, "--history", BOX, "--margin", margin)["findings"]
+        assert [(f["rule"], f["line"]) for f in found if "after the end of the flight" in f["message"]] == expected
+
+
+def test_a_part_set_that_cannot_be_resolved_is_judged_by_the_whole_model() -> None:
+    there = automatic(1, "0.2", rigid=["         5         0      PSET"])
+    back = automatic(2, "0.37", deformable=["         5      PSET"])
+    found = answer("check", place("main.k", there + back), "--history", BOX)
+    assert "judged-by-whole" in {warning["code"] for warning in found["warnings"]}
+
+
+def test_windows_that_are_none_are_left_to_other_rules() -> None:
+    swapped = automatic(1, "0.09", rigid=["1"]) + automatic(2, "0.02", deformable=["1"])
+    assert rules(answer("check", place("main.k", HEAD + PARTS + swapped), "--history", ENERGY)) == ["D2R102"]
+    assert rules(answer("check", place("main.k", HEAD + PARTS + THERE), "--history", ENERGY)) == ["D2R104"]
+
+
+@pytest.mark.parametrize(
+    ("tr", "options", "objections"),
+    [("0.19", (), {"D2R205"}), ("0.02", ("--after", "0.03"), {"D2R204"}), ("0.04", ("--after", "0.03"), set())],
+)
+def test_tr_is_judged_whatever_becomes_of_td(tr: str, options: tuple[str, ...], objections: set[str]) -> None:
+    there, back = automatic(1, tr, rigid=["1"]), automatic(2, "0.01", deformable=["1"])
+    for deck, other in ((there, "D2R104"), (there + back, "D2R102")):
+        found = answer("check", place("main.k", PARTS + deck), "--history", ENERGY, "--select", "D2R1,D2R2", *options)
+        assert set(rules(found)) - {other} == objections
+
+
+def test_what_the_readers_left_out_is_noted() -> None:
+    data = Path(GLSTAT).read_bytes()
+    Path("glstat").write_bytes(data[: len(data) - 200])
+    assert "warning: truncated-input: " in run("check", DECK, "--history", "glstat").stderr
+    assert run("check", DECK, "--history", "glstat", "--quiet").stderr == ""
+
+
+def test_a_name_that_is_no_text_does_not_break_a_report() -> None:
+    name = os.fsdecode(b"de\xe9ck.k")
+    Path(name).write_text(LATE)
+    for form in FORMATS:
+        result = run("check", name, "-f", form)
+        assert result.exit_code == 1
+        valid(form, result.stdout)
+
+
+def test_the_history_is_named_relative_to_the_working_folder(tmp_path: Path) -> None:
+    Path("energy.csv").write_bytes(Path(ENERGY).read_bytes())
+    found = answer("check", DECK, "--history", str(tmp_path / "energy.csv"))
+    assert found["history"] == ["energy.csv"]

@@ -1,0 +1,150 @@
+"""Parts, part sets and the windows they are rigid in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.deck import read_parts
+from d2rpick.deck.elements import first_shared_nodes
+from d2rpick.rules.example_decks import PARTS, automatic
+from tests.decks import read, spans, windows
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    Spans = list[tuple[int | None, float, float | None]]
+
+
+def there(time: str, *parts: str, swset: int = 1) -> str:
+    return automatic(swset, time, rigid=parts)
+
+
+def back(time: str, *parts: str, swset: int = 2) -> str:
+    return automatic(swset, time, deformable=parts)
+
+
+PLAIN = "*DEFORMABLE_TO_RIGID\n         1\n"
+CASES: dict[str, tuple[str, Spans]] = {
+    "one": (there("0.02", "1") + back("0.09", "1"), [(1, 0.02, 0.09)]),
+    "cards in any order": (back("0.09", "1") + there("0.02", "1"), [(1, 0.02, 0.09)]),
+    "from the start": (PLAIN + back("0.09", "1"), [(1, 0.0, 0.09)]),
+    "to the end": (there("0.02", "1"), [(1, 0.02, None)]),
+    "two parts": (there("0.02", "1", "2") + back("0.09", "2", "1"), [(1, 0.02, 0.09), (2, 0.02, 0.09)]),
+    "parts apart": (there("1", "1", "2") + back("2", "1") + back("3", "2"), [(1, 1, 2), (2, 1, 3)]),
+    "two windows": (PLAIN + back("1", "1") + there("2", "1") + back("3", "1"), [(1, 0, 1), (1, 2, 3)]),
+    "merged again while rigid": (there("1", "1") + there("2", "1") + back("3", "1"), [(1, 1, 3)]),
+    "inverted": (there("2", "1") + back("1", "1"), [(1, 2, 1)]),
+    "at once": (there("1", "1") + back("1", "1"), [(1, 1, 1)]),
+    "by force": (automatic(1, "0", rigid=["1"], code=2) + automatic(2, "0", deformable=["1"], code=4), []),
+    "restart": ("*RIGID_DEFORMABLE_R2D\n         1\n", []),
+    "bare keyword": ("*DEFORMABLE_TO_RIGID\n", []),
+    "inertia": ("*DEFORMABLE_TO_RIGID_INERTIA\n         1\n       0.0\n       1.0\n", []),
+}
+
+
+@pytest.mark.parametrize(("deck", "expected"), CASES.values(), ids=CASES.keys())
+def test_windows(tmp_path: Path, deck: str, expected: Spans) -> None:
+    assert spans(read(tmp_path, deck)) == expected
+
+
+def test_what_nothing_made_rigid_is_an_orphan(tmp_path: Path) -> None:
+    (orphan,) = windows(read(tmp_path, back("1", "1") + there("2", "1") + back("3", "1"))).orphans
+    assert orphan.unit.id == 1
+    assert orphan.by.time == 1
+
+
+def of_set(set_id: int) -> str:
+    return f"*DEFORMABLE_TO_RIGID\n{set_id:10d}         0      PSET\n"
+
+
+SETS: dict[str, tuple[str, list[int]]] = {
+    "list": ("*SET_PART_LIST\n         9\n         1         2\n", [1, 2]),
+    "list with title": ("*SET_PART_LIST_TITLE\nall\n         9\n         1         2\n", [1, 2]),
+    "two lines": ("*SET_PART\n         9\n         1\n         2\n", [1, 2]),
+    "generate": ("*SET_PART_LIST_GENERATE\n         9\n         1       100\n", [1, 2]),
+    "column": ("*SET_PART_COLUMN\n         9\n         2       0.5\n", [2]),
+    "add": ("*SET_PART\n         8\n         2\n*SET_PART_ADD\n         9\n         8\n", [2]),
+    "added to itself": ("*SET_PART_ADD\n         9\n         9\n", []),
+    "collect": ("*SET_PART_COLLECT\n         9\n         1\n*SET_PART_COLLECT\n         9\n         2\n", [1, 2]),
+}
+
+
+@pytest.mark.parametrize(("cards", "expected"), SETS.values(), ids=SETS.keys())
+def test_part_sets_are_resolved(tmp_path: Path, cards: str, expected: list[int]) -> None:
+    assert [part for part, _, _ in spans(read(tmp_path, PARTS + cards + of_set(9)))] == expected
+
+
+@pytest.mark.parametrize("cards", ["", "*SET_PART_GENERAL\n         9\nALL\n"])
+def test_a_set_of_unknown_members_stays_a_set(tmp_path: Path, cards: str) -> None:
+    (window,) = windows(read(tmp_path, PARTS + cards + of_set(9))).windows
+    assert window.part is None
+    assert window.unit == (9, True)
+
+
+def line(*values: float | str) -> str:
+    return "".join(f"{value:>10}" for value in values) + "\n"
+
+
+PART_CARDS: dict[str, tuple[str, dict[int, str]]] = {
+    "pairs": ("*PART\na\n" + line(1, 1, 7) + "\n" + line(2, 1, "STEEL"), {1: "7", 2: "STEEL"}),
+    "contact": ("*PART_CONTACT\na\n" + line(1, 1, 7) + line(0.1) + "b\n" + line(2, 1, 8), {1: "7", 2: "8"}),
+    "inertia": (
+        "*PART_INERTIA\na\n" + line(1, 1, 7) + line(0, 0, 0, 1, 0) + line(1) + line(0) + "b\n" + line(2, 1, 8),
+        {1: "7", 2: "8"},
+    ),
+    "inertia in local axes": (
+        "*PART_INERTIA\na\n" + line(1, 1, 7) + line(0, 0, 0, 1, 1) + line(1) + line(0) + line(9)
+        + "b\n" + line(2, 1, 8),
+        {1: "7", 2: "8"},
+    ),
+    "move is no part": ("*PART_MOVE\n10,0,0,0.0045\n", {}),
+    "composite": ("*PART_COMPOSITE\na\n" + line(5, 2) + line(7, 0.1), {5: ""}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("deck", "expected"), PART_CARDS.values(), ids=PART_CARDS.keys())
+def test_parts(tmp_path: Path, deck: str, expected: dict[int, str]) -> None:
+    assert read_parts(read(tmp_path, deck)).materials == expected
+
+
+@pytest.mark.parametrize("name", ["*MAT_RIGID", "*MAT_020", "*mat_rigid_title"])
+def test_rigid_materials_move_with_their_include(tmp_path: Path, name: str) -> None:
+    title = "steel\n" if "title" in name else ""
+    inner = f"{name}\n{title}{line(7)}*PART\na\n{line(1, 1, 7)}"
+    deck = "*INCLUDE_TRANSFORM\na.k\n" + line(0, 0, 100, 50) + line(0) + line(0)
+    parts = read_parts(read(tmp_path, deck, {"a.k": inner}))
+    assert parts.is_rigid(101)
+    assert not parts.is_rigid(1)
+
+
+def shell(*ids: int, width: int = 8) -> str:
+    return "".join(f"{number:{width}d}" for number in ids) + "\n"
+
+
+ELEMENTS: dict[str, str] = {
+    "shells": "*ELEMENT_SHELL\n" + shell(1, 1, 1, 2, 3, 4) + shell(2, 2, 3, 4, 5, 6),
+    "thickness": "*ELEMENT_SHELL_THICKNESS\n"
+    + shell(1, 1, 1, 2, 3, 4) + f"{'0.1':>16s}\n" + shell(2, 2, 3, 4, 5, 6) + f"{'0.1':>16s}\n",
+    "solids": "*ELEMENT_SOLID\n" + shell(1, 1, 1, 2, 3, 8) + shell(2, 2, 3, 4, 5, 6),
+    "ten nodes": "*ELEMENT_SOLID (ten nodes format)\n"
+    + shell(1, 1) + shell(1, 2, 3, 8, 9, 10, 11, 12, 13, 14)
+    + shell(2, 2) + shell(21, 22, 23, 24, 25, 26, 27, 28, 29, 3),
+    "ten columns": "*ELEMENT_SHELL%\n" + shell(1, 1, 1, 2, 3, 4, width=10) + shell(2, 2, 3, 4, 5, 6, width=10),
+    "long": "*ELEMENT_SHELL+\n" + shell(1, 1, 1, 2, 3, 4, width=20) + shell(2, 2, 3, 4, 5, 6, width=20),
+    "comma": "*ELEMENT_SHELL\n1,1,1,2,3,4\n2,2,3,4,5,6\n",
+    "beam and shell": "*ELEMENT_BEAM\n" + shell(1, 1, 3, 9, 5) + "*ELEMENT_SHELL\n" + shell(2, 2, 3, 4, 6, 7),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("deck", ELEMENTS.values(), ids=ELEMENTS.keys())
+def test_shared_nodes(tmp_path: Path, deck: str) -> None:
+    assert first_shared_nodes(read(tmp_path, deck), {1: 1, 2: 2})[(1, 2)] == 3
+    assert first_shared_nodes(read(tmp_path, deck), {1: 1, 2: 1}) == {}
+    assert first_shared_nodes(read(tmp_path, deck), {1: 1, 3: 3}) == {}
+
+
+def test_the_third_node_of_a_beam_is_not_shared(tmp_path: Path) -> None:
+    deck = "*ELEMENT_BEAM\n" + shell(1, 1, 8, 9, 3) + "*ELEMENT_SHELL\n" + shell(2, 2, 3, 4, 6, 7)
+    assert first_shared_nodes(read(tmp_path, deck), {1: 1, 2: 2}) == {}

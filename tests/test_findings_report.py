@@ -1,0 +1,114 @@
+"""Reports of findings, each against its published schema."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import jsonschema
+import pytest
+import xmlschema
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.report import findings as report
+from d2rpick.rules import RULES, Checked, Finding, Severity, check_deck
+from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, automatic
+from tests.decks import write
+
+SCHEMAS = Path(__file__).parent / "schemas"
+BAD = HEAD + PARTS + automatic(1, "0.02", rigid=["1", "2"]) + automatic(2, "0.5", deformable=["1"]) + END
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> list[Checked]:
+    (tmp_path / "good").mkdir()
+    return [check_deck(write(tmp_path, BAD)), check_deck(write(tmp_path / "good", GOOD))]
+
+
+def test_table(results: list[Checked], tmp_path: Path) -> None:
+    lines = report.as_table(results, tmp_path).split("\n")
+    assert lines[0] == "main.k"
+    assert "  part 1: rigid from 0.02 to 0.5 (main.k:14)" in lines
+    assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
+    assert any(line.startswith("  main.k:23:28: error D2R101 TIME1 is 0.5") for line in lines)
+    assert lines[-1] == "1 error, 0 warnings, 1 info in 2 decks"
+
+
+def test_json(results: list[Checked], tmp_path: Path) -> None:
+    content = json.loads(report.as_json(results, tmp_path, ["check", "main.k"]))
+    jsonschema.validate(content, json.loads(files("d2rpick").joinpath("schemas/check-1.json").read_text()))
+    assert content["decks"] == ["main.k", "good/main.k"]
+    assert [window["td"] for window in content["windows"]] == [0.5, None, 0.09]
+    assert {finding["rule"] for finding in content["findings"]} == {"D2R101", "D2R104"}
+    assert content["summary"] == {"errors": 1, "warnings": 0, "infos": 1, "decks": 2}
+
+
+def test_github(results: list[Checked], tmp_path: Path) -> None:
+    lines = report.as_github(results, tmp_path).split("\n")
+    assert lines[1].startswith("::error file=main.k,line=23,col=28,title=D2R101::TIME1 is 0.5")
+    assert lines[0].startswith("::notice file=main.k")
+
+
+JUNIT = xmlschema.XMLSchema(str(SCHEMAS / "junit-10.xsd"))
+
+
+def junit_is_valid(text: str) -> None:
+    JUNIT.validate(text)
+
+
+def test_junit(results: list[Checked], tmp_path: Path) -> None:
+    text = report.as_junit(results, tmp_path)
+    junit_is_valid(text)
+    suites = ET.fromstring(text)
+    assert [(suite.get("name"), suite.get("tests"), suite.get("failures")) for suite in suites] == [
+        ("main.k", "2", "1"),
+        ("good/main.k", "1", "0"),
+    ]
+    assert [failure.get("type") for failure in suites.iter("failure")] == ["D2R101"]
+    strict = ET.fromstring(report.as_junit(results, tmp_path, Severity.INFO))
+    assert len(list(strict.iter("failure"))) == 2
+
+
+SARIF = jsonschema.Draft4Validator(json.loads((SCHEMAS / "sarif-2.1.0.json").read_text("utf-8")))
+
+
+def sarif_is_valid(text: str) -> None:
+    SARIF.validate(json.loads(text))
+
+
+def test_sarif(results: list[Checked], tmp_path: Path) -> None:
+    text = report.as_sarif(results, tmp_path)
+    sarif_is_valid(text)
+    (run,) = json.loads(text)["runs"]
+    assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == list(RULES)
+    for result in run["results"]:
+        assert run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"] == result["ruleId"]
+    place = run["results"][1]["locations"][0]["physicalLocation"]
+    assert place == {"artifactLocation": {"uri": "main.k"}, "region": {"startLine": 23, "startColumn": 28}}
+
+
+def test_paths_outside_are_absolute(results: list[Checked], tmp_path: Path) -> None:
+    elsewhere = tmp_path / "else where"
+    assert f"::error file={tmp_path}/main.k" in report.as_github(results, elsewhere)
+    assert f"file://{tmp_path}/main.k" in report.as_sarif(results, elsewhere)
+
+
+@given(st.text(), st.text(st.characters(exclude_characters="\0"), min_size=1))
+def test_any_text_makes_a_valid_report(message: str, name: str) -> None:
+    name = name.encode("utf-8", "replace").decode()
+    finding = Finding("D2R001", Severity.ERROR, message, name, name, 1, 1)
+    result = [Checked(name, (), (finding,))]
+    root = Path("/some folder")
+    ET.fromstring(report.as_junit(result, root).encode("utf-8", "replace"))
+    sarif_is_valid(report.as_sarif(result, root))
+    assert report.as_github(result, root).count("\n") == 0
+    json.loads(report.as_json(result, root, []))
+
+
+def test_nothing_found_is_a_report_too(tmp_path: Path) -> None:
+    sarif_is_valid(report.as_sarif([], tmp_path))
+    junit_is_valid(report.as_junit([], tmp_path))
+    assert report.as_github([], tmp_path) == ""

@@ -1,0 +1,85 @@
+"""What is found in public decks that hold, or pretend to hold, switching cards.
+
+No public deck with an active *DEFORMABLE_TO_RIGID_AUTOMATIC by time was found: the real ones here have plain
+or restart cards, a pair by contact force, a disabled card, templates and a documentation snippet.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from d2rpick.errors import DeckError
+from d2rpick.rules import Checked, check_deck
+from tests.shared import shared
+
+FOUND: dict[str, dict[str, int]] = {
+    "batmac_nail_main.k": {"D2R003": 5, "D2R301": 1},
+    "jr_pendulum.k": {"D2R104": 2, "D2R302": 2},
+    "k2rad_plain_lrb.k": {"D2R104": 2, "D2R302": 2},
+    "koo_pair_code24.k": {"D2R302": 2},
+    "koo_pair_code42_wrong.k": {"D2R005": 1, "D2R302": 2},
+    "koo_plan_doc_snippet.txt": {"D2R001": 2, "D2R002": 12},
+    "lstc_pendulum_restart.k": {"D2R302": 2},
+    "nodes.k": {},
+    "tmpl_automatic_d2r.k": {"D2R002": 2},
+    "tmpl_plain.k": {"D2R002": 1, "D2R302": 1},
+    "misc/car5.k": {},
+    "misc/control_cards.k": {"D2R003": 1},
+    "misc/elementary_main.k": {"D2R003": 1},
+    "misc/encoding_sample.k": {},
+    "params/collision_main.k": {"D2R003": 2},
+    "params/collision_module_a.k": {},
+    "params/collision_module_b.k": {},
+    "params/eccentric.k": {"D2R003": 1},
+    "yaris/000_main.k": {"D2R003": 2},
+    "yaris/fixed_ground.k": {},
+    "yaris/implicit_control_cards_R9.k": {},
+}
+OF_RADIOSS = [
+    *("radioss/HYPE_sensor_excerpt.rad", "radioss/IDEL8_0000_rbody_excerpt.rad"),
+    *("radioss/IDEL8_0001.rad", "radioss/IDEL8_0002.rad"),
+]
+
+
+def check(name: str) -> Checked:
+    return check_deck(str(shared(f"real/decks/{name}")))
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_findings(name: str) -> None:
+    assert Counter(finding.rule for finding in check(name).findings) == FOUND[name]
+
+
+def test_all_decks_are_covered() -> None:
+    folder = shared("real/decks")
+    files = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    assert files == FOUND.keys() | set(OF_RADIOSS)
+
+
+@pytest.mark.parametrize("name", OF_RADIOSS)
+def test_decks_of_another_solver_are_not_passed_silently(name: str) -> None:
+    with pytest.raises(DeckError, match="an LS-DYNA deck was expected"):
+        check(name)
+
+
+def test_the_disabled_card_is_shown_where_it_stands() -> None:
+    (finding,) = (finding for finding in check("batmac_nail_main.k").findings if finding.rule == "D2R301")
+    assert finding.line == 587
+    assert "*COMMENT c:*DEFORMABLE_TO_RIGID_AUTOMATIC" in finding.message
+
+
+def test_the_snippet_is_not_in_legal_columns() -> None:
+    first = next(finding for finding in check("koo_plan_doc_snippet.txt").findings if finding.rule == "D2R002")
+    assert "'2    0.'" in first.message
+
+
+def test_swapped_codes_are_named() -> None:
+    (finding,) = (finding for finding in check("koo_pair_code42_wrong.k").findings if finding.rule == "D2R005")
+    assert "seem to be swapped" in finding.message
+
+
+@pytest.mark.parametrize("name", ["jr_pendulum.k", "k2rad_plain_lrb.k"])
+def test_plain_cards_are_rigid_from_the_start(name: str) -> None:
+    assert [(window.part, window.tr, window.td) for window in check(name).windows] == [(1, 0.0, None), (2, 0.0, None)]

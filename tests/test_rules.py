@@ -1,0 +1,164 @@
+"""Every rule: its examples, how it is selected and silenced, and that decks are judged apart."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from d2rpick.configuration import Configuration
+from d2rpick.errors import ConfigurationError, DeckError
+from d2rpick.rules import RULES, Example, Rule, Severity, check_deck
+from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
+from tests.command import answer, run
+from tests.decks import found, write
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+PASSING = [(rule, example) for rule in RULES.values() for example in rule.passing]
+FAILING = [(rule, example) for rule in RULES.values() for example in rule.failing]
+
+
+def names(examples: list[tuple[Rule, Example]]) -> list[str]:
+    return [rule.id for rule, _ in examples]
+
+
+@cache
+def history(arguments: str) -> bytes:
+    """The energy history that ``d2rpick replay`` writes."""
+    return run("replay", *shlex.split(arguments)).stdout_bytes
+
+
+def findings(folder: Path, rule: Rule, example: Example) -> list[dict[str, Any]]:
+    """What the rule finds in an example, checked as `d2rpick rule` says."""
+    options = shlex.split(example.options)
+    if example.history:
+        (folder / "energy.csv").write_bytes(history(example.history))
+        options += ["--history", str(folder / "energy.csv")]
+    found = answer("check", write(folder, example.deck, example.files), *options)["findings"]
+    return [finding for finding in found if finding["rule"] == rule.id]
+
+
+@pytest.mark.parametrize(("rule", "example"), PASSING, ids=names(PASSING))
+def test_passing_examples(tmp_path: Path, rule: Rule, example: Example) -> None:
+    assert not findings(tmp_path, rule, example)
+
+
+@pytest.mark.parametrize(("rule", "example"), FAILING, ids=names(FAILING))
+def test_failing_examples(tmp_path: Path, rule: Rule, example: Example) -> None:
+    mine = findings(tmp_path, rule, example)
+    assert mine
+    for finding in mine:
+        assert finding["severity"] == rule.severity
+        assert "\n" not in finding["message"]
+        assert finding["line"] >= 1
+        assert finding["column"] >= 1
+
+
+def test_every_rule_has_examples_and_an_explanation() -> None:
+    for name, rule in RULES.items():
+        assert re.fullmatch(r"D2R\d{3}", name)
+        assert rule.passing
+        assert rule.failing
+        assert rule.explanation.endswith(".")
+
+
+def test_a_good_deck_has_no_findings(tmp_path: Path) -> None:
+    checked = check_deck(write(tmp_path, GOOD))
+    assert checked.findings == ()
+    assert [(window.part, window.tr, window.td) for window in checked.windows] == [(1, 0.02, 0.09)]
+
+
+SWAPPED = HEAD + PARTS + automatic(1, "0.09", rigid=["1"]) + automatic(2, "0.02", deformable=["1"]) + END
+
+
+@pytest.mark.parametrize(
+    "comment", ["$ d2rpick: ignore D2R102", "$D2RPICK:ignore D2R101, D2R102", "$ d2rpick: ignore D2R102\n$ why"]
+)
+def test_a_comment_before_the_card_silences_a_rule_for_it(tmp_path: Path, comment: str) -> None:
+    card = "*DEFORMABLE_TO_RIGID_AUTOMATIC"
+    first, second = (match.start() for match in re.finditer(re.escape(card), SWAPPED))
+    assert found(tmp_path, SWAPPED) == {"D2R102": 1}
+    assert not found(tmp_path, f"{SWAPPED[:second]}{comment}\n{SWAPPED[second:]}")
+    assert found(tmp_path, f"{SWAPPED[:first]}{comment}\n{SWAPPED[first:]}") == {"D2R102": 1}
+    assert found(tmp_path, f"{SWAPPED[:second]}{comment}\n*NODE\n{SWAPPED[second:]}") == {"D2R102": 1}
+
+
+def test_rules_are_selected_ignored_and_weighed(tmp_path: Path) -> None:
+    path = write(tmp_path, HEAD + PARTS + THERE + "*INCLUDE\nnowhere.k\n")
+
+    def rules(configuration: Configuration) -> dict[str, Severity]:
+        return {finding.rule: finding.severity for finding in check_deck(path, configuration).findings}
+
+    assert rules(Configuration()) == {"D2R003": "error", "D2R104": "info"}
+    assert rules(Configuration(select=("D2R1",))) == {"D2R104": "info"}
+    assert rules(Configuration(ignore=("D2R104",))) == {"D2R003": "error"}
+    assert rules(Configuration(severity={"D2R104": "error"}))["D2R104"] == "error"
+
+
+@pytest.mark.parametrize(
+    "configuration", [Configuration(select=("D2R999",)), Configuration(severity={"D2R1": "error"})]
+)
+def test_an_unknown_rule_is_an_error(tmp_path: Path, configuration: Configuration) -> None:
+    with pytest.raises(ConfigurationError, match="no rule"):
+        check_deck(write(tmp_path, GOOD), configuration)
+
+
+def test_decks_are_judged_apart(tmp_path: Path) -> None:
+    cards = {"cards.k": automatic(1, "0.5", rigid=["1"])}
+    decks = []
+    for name in "ab":
+        (tmp_path / name).mkdir()
+        decks.append(write(tmp_path / name, HEAD + PARTS + "*INCLUDE\ncards.k\n", cards))
+    alone = [check_deck(deck).findings for deck in decks]
+    assert all("D2R101" in {finding.rule for finding in findings} for findings in alone)
+    assert [finding.deck for findings in alone for finding in findings if finding.rule == "D2R101"] == decks
+    with pytest.raises(DeckError):
+        check_deck(str(tmp_path / "absent.k"))
+
+
+def test_one_wrong_id_does_not_hide_another(tmp_path: Path) -> None:
+    deck = HEAD + PARTS + automatic(1, "0.02", rigid=["7", "8", "1"]) + automatic(1, "0.3", deformable=["1"]) + END
+    assert found(tmp_path, deck) == {"D2R106": 1, "D2R101": 1, "D2R004": 1, "D2R104": 1}
+
+
+def test_parts_without_end_are_one_finding_per_card(tmp_path: Path) -> None:
+    deck = HEAD + automatic(1, "0.02", rigid=[str(part) for part in range(1, 40)]) + END
+    (finding,) = check_deck(write(tmp_path, deck)).findings
+    assert "parts 1-39" in finding.message
+
+
+@pytest.mark.parametrize(
+    ("comment", "silenced"),
+    [
+        ("ignore D2R1", True),
+        ("ignore D2R101 D2R102", True),
+        ("ignore D2R101 because D2R102 was annoying", False),
+        ("ignored D2R102", False),
+    ],
+)
+def test_only_the_list_behind_ignore_counts(tmp_path: Path, comment: str, silenced: bool) -> None:
+    checked = check_deck(write(tmp_path, before_the_second(f"$ d2rpick: {comment}")))
+    assert (not checked.findings) is silenced
+    assert checked.remarks == ()
+
+
+@pytest.mark.parametrize(
+    ("comment", "told"), [("ignore D2R10l", "did you mean D2R1"), ("ignore", "''"), ("ignore D", "'D'")]
+)
+def test_a_comment_that_names_no_rule_is_told(tmp_path: Path, comment: str, told: str) -> None:
+    checked = check_deck(write(tmp_path, before_the_second(f"$ d2rpick: {comment}")))
+    (remark,) = checked.remarks
+    assert told in remark
+    assert [finding.rule for finding in checked.findings] == ["D2R102"]
+
+
+def before_the_second(comment: str) -> str:
+    """A deck with one fault, and a comment before the card that has it."""
+    second = SWAPPED.rindex("*DEFORMABLE_TO_RIGID_AUTOMATIC")
+    return f"{SWAPPED[:second]}{comment}\n{SWAPPED[second:]}"
