@@ -79,7 +79,7 @@ class Recorder:
         spin = np.vdot(arms, momenta[:n]).imag / (self._box_masses @ np.abs(arms) ** 2)
         kinetic = (np.conj(mean) * momenta).real / 2
         self._reals[self._next] = (
-            motion.time, -np.angle(np.vdot(self._start, arms)), -spin,
+            motion.time, np.angle(np.vdot(arms, self._start)), -spin,
             motion.box.internal_energy(places), motion.step.internal_energy(places), kinetic[:n].sum(),
             kinetic[n:].sum(), accounts.external_work, accounts.contact, accounts.damping, accounts.lost,
         )  # fmt: skip
