@@ -103,11 +103,11 @@ def draw_rollover(reference: Record, switched: Record | None, window: Window | N
     return figure
 
 
-def draw_scan(reference: Record, outcomes: Sequence[Outcome], td: float, recommended: float | None) -> Figure:
+def draw_scan(reference: Record, outcomes: Sequence[Outcome], answer: Suggestion) -> Figure:
     """Energy of the box against its level at td; below it, against tr, the errors of roll and of mean energy."""
     figure = Figure(figsize=(9, 8), layout="constrained")
     energy, roll, mean = figure.subplots(3, 1, sharex=True)
-    before = reference.time <= td
+    before = reference.time <= answer.situation.td
     internal = reference.internal_energy[before, 0]
     energy.plot(reference.time[before], internal, color=_REFERENCE, linewidth=1, label="internal energy of the box")
     energy.axhline(internal[-1], color=_SWITCHED, linewidth=0.8, label=f"level at td, {internal[-1]:.4g}")
@@ -121,8 +121,8 @@ def draw_scan(reference: Record, outcomes: Sequence[Outcome], td: float, recomme
     for axes in (energy, roll, mean):
         if reference.released is not None:
             axes.axvspan(0, reference.released, color=_SWITCHED, alpha=0.1, linewidth=0, label="the sled pushes")
-        if recommended is not None:
-            axes.axvline(recommended, color=_GOOD, linestyle="--", linewidth=1, label="recommended tr")
+        if answer.recommended:
+            axes.axvline(answer.recommended.tr, color=_GOOD, linestyle="--", linewidth=1, label="recommended tr")
         _finish(axes)
     return figure
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
+import subprocess
+import sys
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
@@ -12,7 +15,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from tests.command import answer, run
+from d2rpick import plots
+from d2rpick.rollover.model import Parameters
+from d2rpick.rollover.run import Window, simulate
+from tests.command import ROOT, answer, codes, run
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,7 +59,20 @@ def test_a_switched_run_is_rigid_in_between_and_differs_after_it(tmp_path: Path)
     assert np.ptp(switched["internal_energy"][time > 0.2]) > 0.1
     plot = tmp_path / "motion.svg"
     assert run("rollover", *SMALL, "--tr", "0.1", "--td", "0.2", "--plot", str(plot)).stdout == ""
-    assert "without switching" in plot.read_text("utf-8") or plot.stat().st_size > 10_000
+    assert b"<svg" in plot.read_bytes()
+
+
+def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
+    window = Window(0.05, 0.2)
+    reference, switched = (simulate(Parameters(mesh=4), 0.25, rigid, interval=5e-4) for rigid in (None, window))
+    outlines, roll, height = plots.draw_rollover(reference, switched, window).axes
+    assert len(outlines.lines) == 16
+    corners = np.asarray(outlines.lines[8].get_xydata())
+    np.testing.assert_array_equal(corners[0], corners[-1])
+    for axes in (roll, height):
+        assert axes.get_legend_handles_labels()[1] == ["without switching", "switched", "rigid"]
+    np.testing.assert_array_equal(roll.lines[1].get_ydata(), np.degrees(switched.roll))
+    np.testing.assert_array_equal(height.lines[0].get_ydata(), reference.centre.imag)
 
 
 def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
@@ -72,10 +91,47 @@ def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
     assert f"recommended  tr = {found['recommended']:.6g}" in text
 
 
-def test_the_progress_of_a_scan_is_told_on_stderr() -> None:
-    result = run("rollover", "--scan", "--jobs", "1", "--td", "0.06", "--t-end", "0.07", *SMALL, "-f", "markdown")
+def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
+    scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.06", "--t-end", "0.1", *SMALL)
+    result = run(*scan, "-f", "markdown")
     assert result.stdout.startswith("| tr |")
-    assert "switched runs" in result.stderr
+    told = {line.split(": ")[1] for line in result.stderr.splitlines()}
+    assert told >= {"energy-only", "flight-from-energy"}
+    assert codes(answer(*scan)) == told
+
+
+def test_a_scan_at_whose_td_nothing_can_be_recommended_says_so() -> None:
+    scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.04", "--t-end", "0.1", *SMALL)
+    assert run(*scan, "-q").stdout.endswith("\n\nrecommended  none\n")
+    found = answer(*scan)
+    assert found["recommended"] is None
+    assert "no-candidate" in codes(found)
+
+
+def test_a_run_that_does_not_balance_its_energy_says_so() -> None:
+    assert "warning: energy-balance:" in run("rollover", *SHORT, "--damping", "300").stderr
+    assert run("rollover", *SHORT).stderr == ""
+
+
+def test_the_progress_of_a_scan_is_told_on_a_terminal_only() -> None:
+    pty = pytest.importorskip("pty", reason="terminals are a matter of POSIX")
+    scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.1", "--t-end", "0.11", "--mesh", "4", "--dt", "1e-3")
+    assert "switched runs" not in run(*scan).stderr
+    master, slave = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-m", "d2rpick", *scan], stdout=subprocess.PIPE, stderr=slave, cwd=ROOT
+    ) as process:
+        os.close(slave)
+        told = b""
+        try:
+            while piece := os.read(master, 1000):
+                told += piece
+        except OSError:  # how Linux tells that the other end is closed
+            pass
+        process.communicate(timeout=30)
+    os.close(master)
+    assert b"switched runs" in told
+    assert b"100%" in told
 
 
 @pytest.mark.parametrize(
@@ -83,6 +139,11 @@ def test_the_progress_of_a_scan_is_told_on_stderr() -> None:
     [
         (("--tr", "0.1"), "--tr and --td go together"),
         (("--tr", "0.2", "--td", "0.1"), "is not before"),
+        (("--tr", "0.2", "--td", "0.5"), "after the end of the run"),
+        (("--tr", "-1", "--td", "0.1"), "at least 0"),
+        (("--scan", "--td", "0", "--mesh", "4"), "no time for tr"),
+        (("--stiffness", "1e15"), "take softer bars"),
+        (("--mesh", "100000"), "200"),
         (("--scan", "--tr", "0.1"), "exclude each other"),
         (("--scan", "--write-as", "csv"), "exclude each other"),
         (("--jobs", "2"), "belongs to --scan"),

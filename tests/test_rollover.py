@@ -265,12 +265,17 @@ def test_times_of_a_scan_are_before_td_and_dense_in_the_trip() -> None:
     assert times == sorted(times)
     assert 0 < times[0] < times[-1] < 0.37
     assert sum(time < 0.086 for time in times) > 25
+    assert scan_times(0.086, 0.0331)[0] == times[0]
+    with pytest.raises(RangeError, match=r"earliest that does is 0\.033"):
+        scan_times(0.086, 0.0329)
 
 
 def test_what_is_no_model_or_no_window_is_refused() -> None:
     for wrong in ({"mesh": 3}, {"stiffness": 0.0}, {"speed": float("nan")}, {"friction": -0.1}):
         with pytest.raises(RangeError, match=next(iter(wrong))):
             Parameters(**wrong)
+    with pytest.raises(RangeError, match="softer bars"):
+        simulate(Parameters(stiffness=1e12), 100)
     with pytest.raises(RangeError, match="follow each other"):
         Window(0.2, 0.1)
     with pytest.raises(RangeError, match="end of the flight"):

@@ -13,6 +13,7 @@ from d2rpick.cli.output import Output
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from d2rpick.cautions import Caution
     from d2rpick.rollover.model import Parameters
     from d2rpick.rollover.record import Record
 
@@ -20,6 +21,7 @@ MOST_STATES = 1_000_000
 FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.writers, which --help does without
 PARAMETERS = ("speed", "stiffness", "yield_strain", "damping", "mesh")
 TD = 0.37  # of the published study, 10 ms before the ground comes
+BALANCED = 0.01  # so well the energy of a run must be balanced [-]
 
 EXAMPLES = """\b
 Examples:
@@ -40,7 +42,7 @@ Examples:
 @click.option("--stiffness", type=shared.POSITIVE, help="Of the bars of the box, E A in N.  [default: 4.5e6]")
 @click.option("--yield-strain", type=shared.POSITIVE, help="Of the bars of the box.  [default: 4.5e-3]")
 @click.option("--damping", type=shared.NOT_NEGATIVE, help="Rate of the mass damping, 1/s.  [default: 0.2]")
-@click.option("--mesh", type=click.IntRange(min=4), help="Cells along each side of the box.  [default: 16]")
+@click.option("--mesh", type=click.IntRange(4, 200), help="Cells along each side of the box.  [default: 16]")
 @click.option(
     "--write-as", type=click.Choice(FORMATS), help="Format of a history.  [default: by the name of -o, else csv]"
 )
@@ -78,6 +80,8 @@ def _check(
         raise click.UsageError("--tr and --td go together")
     if tr is not None and td is not None and not tr < td:
         raise click.UsageError(f"--tr {tr:g} is not before --td {td:g}")
+    if not scan and td is not None and td > t_end:
+        raise click.UsageError(f"--td {td:g} lies after the end of the run, --t-end {t_end:g}")
     if t_end / dt > MOST_STATES:
         raise click.UsageError(f"--t-end {t_end:g} holds more than {MOST_STATES} intervals of --dt {dt:g}")
 
@@ -102,6 +106,7 @@ def _run(options: dict[str, Any]) -> None:
         return simulate(parameters, options["t_end"], rigid, interval=options["dt"])
 
     record = simulated(window)
+    output.notes((), _unbalanced(record))
     if plot:
         from d2rpick import plots
 
@@ -119,23 +124,38 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     from d2rpick.rollover.scan import comparison_end, scan, scan_times
 
     output = Output.of(options)
-    parameters, td, plot = _parameters(options), options["td"] or TD, options["plot"]
+    parameters, td, plot = _parameters(options), TD if options["td"] is None else options["td"], options["plot"]
     reference = simulate(parameters, options["t_end"], interval=options["dt"])
     comparison_end(reference, td)
-    pair = suggestion_for(reference, td).recommended
-    recommended = pair.tr if pair else None
-    times = sorted({*scan_times(reference.released or td / 3, td), *([pair.tr] if pair else [])})
+    times = scan_times(reference.released or td / 3, td)
+    answer = suggestion_for(reference, td)
+    cautions = (*_unbalanced(reference), *answer.cautions)
+    output.notes((), cautions)
+    if answer.recommended:
+        times = sorted({*times, answer.recommended.tr})
     found = scan(parameters, reference, times, td, options["jobs"])
-    with click.progressbar(found, len(times), "switched runs", file=sys.stderr, hidden=options["quiet"]) as runs:
+    hidden = options["quiet"] or not sys.stderr.isatty()
+    with click.progressbar(found, len(times), "switched runs", file=sys.stderr, hidden=hidden) as runs:
         outcomes = list(runs)
     if plot:
         from d2rpick import plots
 
-        output.write(plot, plots.render(plots.draw_scan(reference, outcomes, td, recommended), plot))
+        output.write(plot, plots.render(plots.draw_scan(reference, outcomes, answer), plot))
     texts: dict[str, Callable[[], str]] = {
-        "table": lambda: report.as_table(reference, outcomes, td, recommended),
+        "table": lambda: report.as_table(reference, outcomes, answer),
         "markdown": lambda: report.as_markdown(outcomes),
         "csv": lambda: report.as_csv(outcomes),
-        "json": lambda: report.as_json(reference, outcomes, td, recommended, ctx.meta["d2rpick.command"]),
+        "json": lambda: report.as_json(reference, outcomes, answer, cautions, ctx.meta["d2rpick.command"]),
     }
     output.result(texts[options["output_format"] or "table"]())
+
+
+def _unbalanced(record: Record) -> tuple[Caution, ...]:
+    """Object to a run whose energy is not balanced, as with damping that is over within some steps."""
+    from d2rpick.cautions import Caution
+
+    off = float(abs(record.balance - 1).max())
+    if off <= BALANCED:
+        return ()
+    found = f"the energy is balanced within {off:.2g} of that at the start, {BALANCED} was expected"
+    return (Caution("energy-balance", f"{found}; these parameters are beyond what the model can do"),)

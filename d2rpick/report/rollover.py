@@ -13,23 +13,29 @@ from d2rpick.rollover.scan import Outcome
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.cautions import Caution
+    from d2rpick.choice import Suggestion
     from d2rpick.rollover.record import Record
 
 SCHEMA = "d2rpick/rollover/1"
 _COLUMNS = tuple(field.name for field in fields(Outcome))
 
 
-def as_table(reference: Record, outcomes: Sequence[Outcome], td: float, recommended: float | None) -> str:
+def as_table(reference: Record, outcomes: Sequence[Outcome], answer: Suggestion) -> str:
     """What happened without switching, a row for each tr, and how good the tr is that the tool recommends."""
+    td, recommended = answer.situation.td, _recommended(answer)
     rows = [["*" if one.tr == recommended else "", *_short(one)] for one in outcomes]
     lines = [
         f"load   until {_time(reference.released)} s, next contact at {_time(reference.landed)} s",
         f"td     {td:.6g} s: energy of the box {_energy(reference, td):.6g} J",
+        "units  s, J, m, rad/s; roll_error in degrees",
         "",
         tables.as_text(("", *_COLUMNS), rows),
     ]
     chosen = next((one for one in outcomes if one.tr == recommended), None)
-    if chosen:
+    if not chosen:
+        lines += ["", "recommended  none"]
+    else:
         worst = max(abs(one.roll_error) for one in outcomes)
         error = abs(chosen.roll_error)
         lines += [
@@ -50,23 +56,28 @@ def as_csv(outcomes: Sequence[Outcome]) -> str:
 
 
 def as_json(
-    reference: Record, outcomes: Sequence[Outcome], td: float, recommended: float | None, command: Sequence[str]
-) -> str:
+    reference: Record, outcomes: Sequence[Outcome], answer: Suggestion, cautions: Sequence[Caution],
+    command: Sequence[str],
+) -> str:  # fmt: skip
     """Everything by schema d2rpick/rollover/1."""
     return tables.as_json(
         {
             "schema": SCHEMA,
             "tool_version": __version__,
             "command": list(command),
-            "warnings": [],
+            "warnings": [asdict(caution) for caution in cautions],
             "released": reference.released,
             "landed": reference.landed,
-            "td": td,
-            "energy_td": _energy(reference, td),
-            "recommended": recommended,
+            "td": answer.situation.td,
+            "energy_td": _energy(reference, answer.situation.td),
+            "recommended": _recommended(answer),
             "runs": [asdict(one) for one in outcomes],
         }
     )
+
+
+def _recommended(answer: Suggestion) -> float | None:
+    return answer.recommended.tr if answer.recommended else None
 
 
 def _short(one: Outcome) -> list[tables.Cell]:

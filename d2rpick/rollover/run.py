@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 # States are given out in this time [s]: 25 of them for a mode of 400 Hz, and a step is not much shorter.
 INTERVAL = 1e-4
+# Some minutes; what asks for more was hardly meant.
+MOST_STEPS = 5_000_000
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Window:
 def simulate(
     parameters: Parameters, t_end: float, window: Window | None = None, *, interval: float = INTERVAL
 ) -> Record:
-    """Compute a run from 0 to ``t_end``, with a state every ``interval`` [s].
+    """Compute a run from 0 to ``t_end``, with a state every ``interval`` [s]; RangeError when it takes too many steps.
 
     Examples
     --------
@@ -41,7 +43,10 @@ def simulate(
     >>> run.time.size, bool(abs(run.balance - 1).max() < 0.01)
     (101, True)
     """
-    return proceed(Motion(parameters, interval), t_end, window)
+    motion = Motion(parameters, interval)
+    if motion.step_at(t_end) > MOST_STEPS:
+        raise RangeError(f"steps of {motion.dt:.3g} s make more than {MOST_STEPS} until {t_end:g}; take softer bars")
+    return proceed(motion, t_end, window)
 
 
 def proceed(motion: Motion, t_end: float, window: Window | None = None) -> Record:

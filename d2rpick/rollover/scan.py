@@ -45,8 +45,13 @@ class Outcome:
 
 
 def scan_times(released: float, td: float) -> list[float]:
-    """Times for tr: close together until half as long again after the load, sparse in the flight up to td [s]."""
+    """Times for tr: close together until half as long again after the load, sparse in the flight up to td [s].
+
+    RangeError when td leaves no time for any.
+    """
     dense = min(1.5 * released, td - _LAST)
+    if not dense > _FINE:
+        raise RangeError(f"td {td:g} leaves no time for tr; the earliest that does is {_FINE + _LAST:g}")
     return [*np.arange(_FINE, dense, _FINE).tolist(), *np.arange(dense, td - _LAST, _COARSE).tolist()]
 
 
