@@ -18,7 +18,7 @@ from d2rpick.mode import Mode
 from d2rpick.replay import Replay, Trajectory, from_mode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from matplotlib.axes import Axes
 
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from d2rpick.choice import Suggestion, Verdict
     from d2rpick.exhibits import Exhibit, Panel
     from d2rpick.history import Samples
+    from d2rpick.rollover.record import Record
+    from d2rpick.rollover.run import Window
+    from d2rpick.rollover.scan import Outcome
     from d2rpick.situation import Situation
 
 FORMATS = ("png", "svg", "pdf")
@@ -48,6 +51,8 @@ _FEW = 40
 _SIZES = {False: (10.0, 4.0, 6.5), True: (4.2, 3.9, 6.6)}
 # Share of the axes that the label of a switch time takes up, at most.
 _LABEL = {False: 0.14, True: 0.3}
+# Outlines of the rolling box, as many as can be told apart.
+_OUTLINES = 8
 
 
 def format_of(name: str) -> str:
@@ -163,6 +168,54 @@ def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> Non
     axes.set_ylabel(panel.ylabel)
     _finish(axes, legend=False)
     axes.legend(fontsize="small", loc="best")
+
+
+def draw_rollover(reference: Record, switched: Record | None, window: Window | None) -> Figure:
+    """Outlines of the box at even times, with and without switching; beside them roll and height over time."""
+    figure = Figure(figsize=(11, 5.5), layout="constrained")
+    outlines, roll, height = figure.subplot_mosaic([["o", "r"], ["o", "h"]], width_ratios=(1.4, 1)).values()
+    runs = [(reference, _REFERENCE, "without switching"), (switched, _SWITCHED, "switched")]
+    for record, colour, name in [(record, colour, name) for record, colour, name in runs if record]:
+        shown = np.linspace(0, record.time.size - 1, _OUTLINES).round().astype(int)
+        closed = np.column_stack([record.outline[shown], record.outline[shown, 0]]).T
+        style = "-" if record is reference else "--"
+        outlines.plot(closed.real, closed.imag, color=colour, linewidth=0.9, linestyle=style)
+        roll.plot(record.time, np.degrees(record.roll), color=colour, linewidth=1, linestyle=style, label=name)
+        height.plot(record.time, record.centre.imag, color=colour, linewidth=1, linestyle=style, label=name)
+    outlines.set(aspect="equal", xlabel="x [m]", ylabel="z [m]")
+    outlines.set_title(f"box every {reference.time[-1] / (_OUTLINES - 1) * 1e3:.3g} ms", fontsize="medium")
+    outlines.grid(visible=True, linewidth=0.3)
+    roll.set(ylabel="roll [degrees]")
+    height.set(ylabel="height of the centre [m]", xlabel="time [s]")
+    for axes in (roll, height):
+        if window:
+            axes.axvspan(window.tr, window.td, color=_FLIGHT, alpha=0.2, linewidth=0, label="rigid")
+        _finish(axes)
+    return figure
+
+
+def draw_scan(reference: Record, outcomes: Sequence[Outcome], answer: Suggestion) -> Figure:
+    """Energy of the box against its level at td; below it, against tr, the errors of roll and of mean energy."""
+    figure = Figure(figsize=(9, 8), layout="constrained")
+    energy, roll, mean = figure.subplots(3, 1, sharex=True)
+    before = reference.time <= answer.situation.td
+    internal = reference.internal_energy[before, 0]
+    energy.plot(reference.time[before], internal, color=_REFERENCE, linewidth=1, label="internal energy of the box")
+    energy.axhline(internal[-1], color=_SWITCHED, linewidth=0.8, label=f"level at td, {internal[-1]:.4g}")
+    times = [one.tr for one in outcomes]
+    roll.plot(times, [abs(one.roll_error) for one in outcomes], ".-", color=_REFERENCE, label="roll error at td")
+    mean.plot(times, [one.mean_ratio - 1 for one in outcomes], ".-", color=_REFERENCE, label="error of the mean energy")
+    mean.axhline(0, color=_REFERENCE, linewidth=0.5)
+    energy.set_ylabel("energy [J]")
+    roll.set(ylabel="|roll error| [degrees]", yscale="log")
+    mean.set(ylabel="mean energy after td,\nrelative error", xlabel="tr [s]")
+    for axes in (energy, roll, mean):
+        if reference.released is not None:
+            axes.axvspan(0, reference.released, color=_SWITCHED, alpha=0.1, linewidth=0, label="the sled pushes")
+        if answer.recommended:
+            axes.axvline(answer.recommended.tr, color=_GOOD, linestyle="--", linewidth=1, label="recommended tr")
+        _finish(axes)
+    return figure
 
 
 def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | None, *, narrow: bool = False) -> Figure:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick import __version__
 from d2rpick.errors import FormatError
@@ -16,14 +16,25 @@ if TYPE_CHECKING:
     from d2rpick.history import Samples
     from d2rpick.oscillator import Oscillator
     from d2rpick.replay import Trajectory
+    from d2rpick.rollover.record import Record
 
 Table = dict[str, "Samples"]
 
 _SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
-_TITLE: Final = " floating oscillator"
+_OSCILLATOR: Final = "floating oscillator"
+_ROLLOVER: Final = "rollover box"
 # No version of the solver wrote this; the word alone lets programs recognise the layout.
 _VERSION: Final = f"{' ' * 25}d2rpick {__version__}, layout of ls-dyna"
-_FRAME, _SUSPENDED, _SPRING = 1, 2, 3
+
+
+class PartColumns(NamedTuple):
+    """Histories of one part for a matsum, all of the same shape (n,)."""
+
+    title: str
+    internal_energy: Samples
+    kinetic_energy: Samples
+    x_momentum: Samples
+    z_momentum: Samples
 
 
 def table_csv(table: Table) -> bytes:
@@ -52,46 +63,70 @@ def trajectory_table(motion: Trajectory) -> Table:
     }  # fmt: skip
 
 
+def rollover_table(record: Record) -> Table:
+    """Columns of the box, time to kinetic_energy, and the momentum of box and step together."""
+    energies = record.internal_energy.T, record.kinetic_energy.T
+    flying = record.momentum.sum(axis=1)
+    return {
+        "time": record.time, "x": record.centre.real, "z": record.centre.imag, "roll": record.roll,
+        "vx": record.velocity.real, "vz": record.velocity.imag, "omega": record.omega,
+        "internal_energy": energies[0][0], "kinetic_energy": energies[1][0],
+        "momentum_x": flying.real, "momentum_z": flying.imag,
+    }  # fmt: skip
+
+
 def trajectory_glstat(motion: Trajectory) -> bytes:
-    """Blocks of ``label....... value`` with six significant digits (14 columns, E14.5)."""
+    """Energies of the oscillator; its time step is the output interval."""
     step = float(motion.time[1] - motion.time[0]) if motion.time.size > 1 else 0.0
-    blocks = (
-        f" dt of cycle{cycle:8d} is controlled by solid              1 of part         1\n\n"
-        + "".join(
-            f" {label:.<31}{value:14.5E}\n"
-            for label, value in (
-                ("time", time),
-                ("time step", step),
-                ("kinetic energy", kinetic),
-                ("internal energy", internal),
-                ("total energy", kinetic + internal),
-            )
-        )
-        for cycle, (time, kinetic, internal) in enumerate(
-            _rows(motion.time, motion.kinetic_energy, motion.internal_energy), start=1
-        )
-    )
-    return (f"{_TITLE}\n{_VERSION} glstat\n\n\n" + "\n\n".join(blocks)).encode()
+    internal, kinetic = motion.internal_energy, motion.kinetic_energy
+    return _glstat(
+        _OSCILLATOR,
+        {
+            "time": motion.time, "time step": 0 * motion.time + step, "kinetic energy": kinetic,
+            "internal energy": internal, "total energy": kinetic + internal,
+        },
+    )  # fmt: skip
+
+
+def rollover_glstat(record: Record) -> bytes:
+    """Energies of box and step together, what was exchanged with sled, curb and ground, and the mean velocity."""
+    internal, kinetic = record.internal_energy.sum(axis=1), record.kinetic_energy.sum(axis=1)
+    total = kinetic + internal + record.contact_energy + record.damping_energy
+    momentum, zero = record.momentum.sum(axis=1), 0 * record.time
+    speed = momentum / (momentum[0].real / record.velocity[0].real)
+    return _glstat(
+        _ROLLOVER,
+        {
+            "time": record.time, "time step": zero + record.dt, "kinetic energy": kinetic, "internal energy": internal,
+            "sliding interface energy": record.contact_energy, "external work": record.external_work,
+            "system damping energy": record.damping_energy, "total energy": total,
+            "total energy / initial energy": total / (kinetic[0] + record.external_work),
+            "global x velocity": speed.real, "global y velocity": zero, "global z velocity": speed.imag,
+        },
+    )  # fmt: skip
 
 
 def trajectory_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
-    """Parts frame, suspended mass and spring with their energies and momenta, five significant digits (E13.4)."""
+    """Parts frame, suspended mass and spring with their energies and momenta."""
     frame, suspended, state = oscillator.frame_mass, oscillator.mass, motion.state
     zero = 0.0 * motion.time
-    parts = {
-        (_FRAME, "frame"): (zero, frame / 2 * state.vz**2, frame * state.vz),
-        (_SUSPENDED, "suspended mass"): (zero, suspended / 2 * state.vy**2, suspended * state.vy),
-        (_SPRING, "spring"): (motion.internal_energy, zero, zero),
-    }
-    legend = "".join(f"{number:9d}     {title:<70}\n" for number, title in parts)
-    columns = [list(_rows(*columns)) for columns in parts.values()]
-    blocks = (
-        f"\n time ={time:13.4E}\n"
-        + "".join(_matsum_part(number, *rows[i]) for (number, _), rows in zip(parts, columns, strict=True))
-        for i, time in enumerate(motion.time.tolist())
+    parts = (
+        PartColumns("frame", zero, frame / 2 * state.vz**2, zero, frame * state.vz),
+        PartColumns("suspended mass", zero, suspended / 2 * state.vy**2, zero, suspended * state.vy),
+        PartColumns("spring", motion.internal_energy, zero, zero, zero),
     )
-    head = f"{_TITLE}\n{_VERSION} matsum\n\n{{BEGIN LEGEND}}\n Entity #        Title\n{legend}{{END LEGEND}}\n"
-    return (head + "\n".join(blocks)).encode()
+    return _matsum(_OSCILLATOR, motion.time, parts)
+
+
+def rollover_matsum(record: Record) -> bytes:
+    """Parts box and step with their energies and momenta; while the box is rigid, those of its motion as one body."""
+    from d2rpick.rollover.record import PARTS
+
+    columns = zip(
+        PARTS, record.internal_energy.T, record.kinetic_energy.T, record.momentum.T.real, record.momentum.T.imag,
+        strict=True,
+    )  # fmt: skip
+    return _matsum(_ROLLOVER, record.time, tuple(PartColumns(*one) for one in columns))
 
 
 def format_of(name: str | None, formats: Sequence[str]) -> str:
@@ -116,11 +151,34 @@ def _rows(*columns: Samples) -> zip[tuple[float, ...]]:
     return zip(*(column.tolist() for column in columns), strict=True)
 
 
-def _matsum_part(number: int, internal: float, kinetic: float, momentum: float) -> str:
+def _glstat(title: str, lines: Table) -> bytes:
+    """Blocks of ``label....... value`` with six significant digits (14 columns, E14.5), ``time`` first."""
+    blocks = (
+        f" dt of cycle{cycle:8d} is controlled by solid              1 of part         1\n\n"
+        + "".join(f" {label:.<31}{value:14.5E}\n" for label, value in zip(lines, values, strict=True))
+        for cycle, values in enumerate(_rows(*lines.values()), start=1)
+    )
+    return (f" {title}\n{_VERSION} glstat\n\n\n" + "\n\n".join(blocks)).encode()
+
+
+def _matsum(title: str, time: Samples, parts: Sequence[PartColumns]) -> bytes:
+    """Blocks of the parts, numbered from 1, with five significant digits (13 columns, E13.4)."""
+    legend = "".join(f"{number:9d}     {part.title:<70}\n" for number, part in enumerate(parts, start=1))
+    columns = [list(_rows(*part[1:])) for part in parts]
+    blocks = (
+        f"\n time ={moment:13.4E}\n"
+        + "".join(_matsum_part(number, *rows[i]) for number, rows in enumerate(columns, start=1))
+        for i, moment in enumerate(time.tolist())
+    )
+    head = f" {title}\n{_VERSION} matsum\n\n{{BEGIN LEGEND}}\n Entity #        Title\n{legend}{{END LEGEND}}\n"
+    return (head + "\n".join(blocks)).encode()
+
+
+def _matsum_part(number: int, internal: float, kinetic: float, x_momentum: float, z_momentum: float) -> str:
     return (
         f" mat.#={number:5d}             inten={internal:13.4E}     kinen={kinetic:13.4E}"
         f"     eroded_ie={0:13.4E}     eroded_ke={0:13.4E}\n"
-        f" x-mom={0:13.4E}     y-mom={0:13.4E}     z-mom={momentum:13.4E}\n"
+        f" x-mom={x_momentum:13.4E}     y-mom={0:13.4E}     z-mom={z_momentum:13.4E}\n"
         f" x-rbv={0:13.4E}     y-rbv={0:13.4E}     z-rbv={0:13.4E}\n"
         f"                         hgeng={0:13.4E}     +mass={0:13.4E}     eroded_he={0:13.4E}\n"
     )
@@ -133,3 +191,9 @@ TRAJECTORY_WRITERS: Final[Mapping[str, Callable[[Trajectory, Oscillator], bytes]
     "matsum": trajectory_matsum,
 }
 TABLE_WRITERS: Final[Mapping[str, Callable[[Table], bytes]]] = {"csv": table_csv, "hdf5": table_hdf5}
+ROLLOVER_WRITERS: Final[Mapping[str, Callable[[Record], bytes]]] = {
+    "csv": lambda record: table_csv(rollover_table(record)),
+    "hdf5": lambda record: table_hdf5(rollover_table(record)),
+    "glstat": rollover_glstat,
+    "matsum": rollover_matsum,
+}

@@ -38,12 +38,14 @@ ORDER = (
     "flight", "envelope", "signs", "measures", "profile", "replay", "situation",
     "cautions", "uncertainty", "contributions", "candidates", "expectation", "switched", "health", "choice", "window",
     "overview", "rules.judgement", "judged_card", "integration", "reproduction", "exhibits",
+    "rollover", "rollover.model", "rollover.bars", "rollover.contact", "rollover.rigid", "rollover.motion",
+    "rollover.record", "rollover.run", "rollover.scan", "rehearsal",
     "report", "report.findings", "report.rules", "report.tables", "report.situation", "report.suggestion",
     "report.verdict", "report.health", "report.overview", "report.html", "report.page",
-    "report.suggestion_page", "report.verdict_page", "report.reproduction",
+    "report.suggestion_page", "report.verdict_page", "report.reproduction", "report.rollover",
     "writers", "plots",
     "cli", "cli.options", "cli.output", "cli.progress", "cli.check", "cli.rule", "cli.card",
-    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract", "cli.reproduce",
+    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract", "cli.reproduce", "cli.rollover",
     "__main__",
 )  # fmt: skip
 # The only modules that may import these.
@@ -152,7 +154,7 @@ def test_the_command_line_offers_the_formats_there_are() -> None:
     assert tuple(TRAJECTORY_WRITERS) == replay.FORMATS
 
 
-SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check", "reproduce")]
+SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check", "reproduce", "rollover")]
 
 
 @pytest.mark.parametrize("name", ["py.typed", *SCHEMAS])

@@ -1,0 +1,161 @@
+"""The command ``rollover``."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from d2rpick.cli import options as shared
+from d2rpick.cli.output import Output
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from d2rpick.cautions import Caution
+    from d2rpick.rollover.model import Parameters
+    from d2rpick.rollover.record import Record
+
+MOST_STATES = 1_000_000
+FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.writers, which --help does without
+PARAMETERS = ("speed", "stiffness", "yield_strain", "damping", "mesh")
+TD = 0.37  # of the published study, 10 ms before the ground comes
+BALANCED = 0.01  # so well the energy of a run must be balanced [-]
+
+EXAMPLES = """\b
+Examples:
+  d2rpick rollover --t-end 0.05 -o rollover.matsum
+  d2rpick rollover --tr 0.09 --td 0.37 -o switched.csv --plot switched.png
+  d2rpick rollover --scan --mesh 6 --plot scan.png
+"""
+
+
+@click.command("rollover", epilog=EXAMPLES)
+@click.option("--tr", type=shared.NOT_NEGATIVE, metavar="T", help="Switch the box to rigid at this time; with --td.")
+@click.option("--td", type=shared.NOT_NEGATIVE, metavar="T", help="Switch it back.  [with --scan: 0.37]")
+@click.option("--scan", is_flag=True, help="Compute many tr, and hold each run against the one without switching.")
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes of a scan.  [default: one for each core]")
+@click.option("--t-end", type=shared.POSITIVE, default=0.42, show_default=True, metavar="T", help="Last time.")
+@click.option("--dt", type=shared.POSITIVE, default=1e-4, show_default=True, metavar="T", help="Output interval.")
+@click.option("--speed", type=shared.POSITIVE, help="Of the sled at the start, m/s.  [default: 7]")
+@click.option("--stiffness", type=shared.POSITIVE, help="Of the bars of the box, E A in N.  [default: 4.5e6]")
+@click.option("--yield-strain", type=shared.POSITIVE, help="Of the bars of the box.  [default: 4.5e-3]")
+@click.option("--damping", type=shared.NOT_NEGATIVE, help="Rate of the mass damping, 1/s.  [default: 0.2]")
+@click.option("--mesh", type=click.IntRange(4, 200), help="Cells along each side of the box.  [default: 16]")
+@click.option(
+    "--write-as", type=click.Choice(FORMATS), help="Format of a history.  [default: by the name of -o, else csv]"
+)
+@click.option(
+    "-f", "--output-format", type=click.Choice(["table", "json", "csv", "markdown"]), help="Form of a scan.  "
+    "[default: table]",
+)  # fmt: skip
+@click.option("--plot", metavar="FILE", help="Draw the motion of the box, or the scan, to FILE (png, svg, pdf).")
+@shared.file_options
+@click.pass_context
+def command(ctx: click.Context, /, scan: bool, **options: Any) -> None:
+    """Compute a planar box that trips over the curb of a braking sled, rolls and lands.  SI units.
+
+    It is deformable throughout, or rigid from tr to td; the step that meets the curb stays deformable.  Columns: time,
+    place, roll and velocities of the box, its energies, and the momentum of box and step.  glstat holds the energies
+    of both, matsum those of each.
+    """
+    _check(scan=scan, **options)
+    if scan:
+        _scan(ctx, options)
+    else:
+        _run(options)
+
+
+def _check(
+    *, scan: bool, tr: float | None, td: float | None, t_end: float, dt: float, output_format: str | None,
+    write_as: str | None, jobs: int | None, **_: Any,
+) -> None:  # fmt: skip
+    """UsageError where options contradict each other."""
+    if scan and (tr is not None or write_as):
+        raise click.UsageError(f"--scan and {'--write-as' if tr is None else '--tr'} exclude each other")
+    if not scan and (output_format or jobs):
+        raise click.UsageError(f"--{'output-format' if output_format else 'jobs'} belongs to --scan")
+    if not scan and (tr is None) != (td is None):
+        raise click.UsageError("--tr and --td go together")
+    if tr is not None and td is not None and not tr < td:
+        raise click.UsageError(f"--tr {tr:g} is not before --td {td:g}")
+    if not scan and td is not None and td > t_end:
+        raise click.UsageError(f"--td {td:g} lies after the end of the run, --t-end {t_end:g}")
+    if t_end / dt > MOST_STATES:
+        raise click.UsageError(f"--t-end {t_end:g} holds more than {MOST_STATES} intervals of --dt {dt:g}")
+
+
+def _parameters(options: dict[str, Any]) -> Parameters:
+    from d2rpick.rollover.model import Parameters
+
+    return Parameters(**{name: options[name] for name in PARAMETERS if options[name] is not None})
+
+
+def _run(options: dict[str, Any]) -> None:
+    """One run; for a plot also the one without switching."""
+    from d2rpick import writers
+    from d2rpick.rollover.run import Window, simulate
+
+    form = options["write_as"] or writers.format_of(options["output_file"], FORMATS)
+    output = Output.of(options)
+    parameters, plot = _parameters(options), options["plot"]
+    window = None if options["tr"] is None else Window(options["tr"], options["td"])
+
+    def simulated(rigid: Window | None) -> Record:
+        return simulate(parameters, options["t_end"], rigid, interval=options["dt"])
+
+    record = simulated(window)
+    output.notes((), _unbalanced(record))
+    if plot:
+        from d2rpick import plots
+
+        reference, switched = (simulated(None), record) if window else (record, None)
+        output.write(plot, plots.render(plots.draw_rollover(reference, switched, window), plot))
+    if options["output_file"] or not plot:
+        output.content(writers.ROLLOVER_WRITERS[form](record))
+
+
+def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
+    """Many switched runs, the tr that the tool recommends among them."""
+    from d2rpick.rehearsal import suggestion_for
+    from d2rpick.report import rollover as report
+    from d2rpick.rollover.run import simulate
+    from d2rpick.rollover.scan import comparison_end, scan, scan_times
+
+    output = Output.of(options)
+    parameters, td, plot = _parameters(options), TD if options["td"] is None else options["td"], options["plot"]
+    reference = simulate(parameters, options["t_end"], interval=options["dt"])
+    comparison_end(reference, td)
+    times = scan_times(reference.released or td / 3, td)
+    answer = suggestion_for(reference, td)
+    cautions = (*_unbalanced(reference), *answer.cautions)
+    output.notes((), cautions)
+    if answer.recommended:
+        times = sorted({*times, answer.recommended.tr})
+    found = scan(parameters, reference, times, td, options["jobs"])
+    hidden = options["quiet"] or not sys.stderr.isatty()
+    with click.progressbar(found, len(times), "switched runs", file=sys.stderr, hidden=hidden) as runs:
+        outcomes = list(runs)
+    if plot:
+        from d2rpick import plots
+
+        output.write(plot, plots.render(plots.draw_scan(reference, outcomes, answer), plot))
+    texts: dict[str, Callable[[], str]] = {
+        "table": lambda: report.as_table(reference, outcomes, answer),
+        "markdown": lambda: report.as_markdown(outcomes),
+        "csv": lambda: report.as_csv(outcomes),
+        "json": lambda: report.as_json(reference, outcomes, answer, cautions, ctx.meta["d2rpick.command"]),
+    }
+    output.result(texts[options["output_format"] or "table"]())
+
+
+def _unbalanced(record: Record) -> tuple[Caution, ...]:
+    """Object to a run whose energy is not balanced, as with damping that is over within some steps."""
+    from d2rpick.cautions import Caution
+
+    off = float(abs(record.balance - 1).max())
+    if off <= BALANCED:
+        return ()
+    found = f"the energy is balanced within {off:.2g} of that at the start, {BALANCED} was expected"
+    return (Caution("energy-balance", f"{found}; these parameters are beyond what the model can do"),)

@@ -1,0 +1,93 @@
+"""The scan of ``rollover`` as table, JSON, CSV and Markdown."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING
+
+from d2rpick import __version__
+from d2rpick.report import tables
+from d2rpick.rollover.record import BOX
+from d2rpick.rollover.scan import Outcome
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.cautions import Caution
+    from d2rpick.choice import Suggestion
+    from d2rpick.rollover.record import Record
+
+SCHEMA = "d2rpick/rollover/1"
+_COLUMNS = tuple(field.name for field in fields(Outcome))
+
+
+def as_table(reference: Record, outcomes: Sequence[Outcome], answer: Suggestion) -> str:
+    """What happened without switching, a row for each tr, and how good the tr is that the tool recommends."""
+    td, recommended = answer.situation.td, _recommended(answer)
+    rows = [["*" if one.tr == recommended else "", *_short(one)] for one in outcomes]
+    lines = [
+        f"load   until {_time(reference.released)} s, next contact at {_time(reference.landed)} s",
+        f"td     {td:.6g} s: energy of the box {_energy(reference, td):.6g} J",
+        "units  s, J, m, rad/s; roll_error in degrees",
+        "",
+        tables.as_text(("", *_COLUMNS), rows),
+    ]
+    chosen = next((one for one in outcomes if one.tr == recommended), None)
+    if not chosen:
+        lines += ["", "recommended  none"]
+    else:
+        worst = max(abs(one.roll_error) for one in outcomes)
+        error = abs(chosen.roll_error)
+        lines += [
+            "",
+            f"recommended  tr = {chosen.tr:.6g}: roll error {error:.3g} degrees, {error / worst:.2g} of the largest",
+        ]
+    return "\n".join(lines)
+
+
+def as_markdown(outcomes: Sequence[Outcome]) -> str:
+    """A row for each tr."""
+    return tables.as_markdown(_COLUMNS, [_short(one) for one in outcomes])
+
+
+def as_csv(outcomes: Sequence[Outcome]) -> str:
+    """A row for each tr, at full precision."""
+    return tables.as_csv(_COLUMNS, [list(asdict(one).values()) for one in outcomes]).rstrip("\n")
+
+
+def as_json(
+    reference: Record, outcomes: Sequence[Outcome], answer: Suggestion, cautions: Sequence[Caution],
+    command: Sequence[str],
+) -> str:  # fmt: skip
+    """Everything by schema d2rpick/rollover/1."""
+    return tables.as_json(
+        {
+            "schema": SCHEMA,
+            "tool_version": __version__,
+            "command": list(command),
+            "warnings": [caution._asdict() for caution in cautions],
+            "released": reference.released,
+            "landed": reference.landed,
+            "td": answer.situation.td,
+            "energy_td": _energy(reference, answer.situation.td),
+            "recommended": _recommended(answer),
+            "runs": [asdict(one) for one in outcomes],
+        }
+    )
+
+
+def _recommended(answer: Suggestion) -> float | None:
+    return answer.recommended.tr if answer.recommended else None
+
+
+def _short(one: Outcome) -> list[tables.Cell]:
+    """Four digits are enough to read: runs differ in the second."""
+    return [float(f"{value:.4g}") for value in asdict(one).values()]
+
+
+def _time(time: float | None) -> str:
+    return "-" if time is None else f"{time:.6g}"
+
+
+def _energy(reference: Record, time: float) -> float:
+    return float(reference.internal_energy[abs(reference.time - time).argmin(), BOX])

@@ -1,0 +1,74 @@
+"""Runs from start to end, switched or not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from d2rpick.errors import RangeError
+from d2rpick.rollover.motion import Motion
+from d2rpick.rollover.record import Recorder
+
+if TYPE_CHECKING:
+    from d2rpick.rollover.model import Parameters
+    from d2rpick.rollover.record import Record
+
+# States are given out in this time [s]: 25 of them for a mode of 400 Hz, and a step is not much shorter.
+INTERVAL = 1e-4
+# Some minutes; what asks for more was hardly meant.
+MOST_STEPS = 5_000_000
+
+
+@dataclass(frozen=True)
+class Window:
+    """The box is rigid from ``tr`` to ``td`` [s]; RangeError unless 0 <= tr <= td."""
+
+    tr: float
+    td: float
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.tr <= self.td:
+            raise RangeError(f"tr {self.tr:g} and td {self.td:g} must follow each other after the start at 0")
+
+
+def simulate(
+    parameters: Parameters, t_end: float, window: Window | None = None, *, interval: float = INTERVAL
+) -> Record:
+    """Compute a run from 0 to ``t_end``, with a state every ``interval`` [s]; RangeError when it takes too many steps.
+
+    Examples
+    --------
+    >>> from d2rpick.rollover.model import Parameters
+    >>> run = simulate(Parameters(mesh=4), 0.01)
+    >>> run.time.size, bool(abs(run.balance - 1).max() < 0.01)
+    (101, True)
+    """
+    motion = Motion(parameters, interval)
+    if motion.step_at(t_end) > MOST_STEPS:
+        raise RangeError(f"steps of {motion.dt:.3g} s make more than {MOST_STEPS} until {t_end:g}; take softer bars")
+    return proceed(motion, t_end, window)
+
+
+def proceed(motion: Motion, t_end: float, window: Window | None = None) -> Record:
+    """Go on with ``motion`` to ``t_end`` [s], switching at the first step at or after the times of ``window``."""
+    last = motion.every * (motion.step_at(t_end) // motion.every)
+    tr, td = (motion.step_at(window.tr), motion.step_at(window.td)) if window else (None, None)
+    recorder = Recorder(motion, last)
+    while True:
+        if motion.count == tr:
+            motion.make_rigid()
+        if motion.count == td:
+            motion.make_deformable()
+        mean = motion.advance()
+        if motion.count % motion.every == 0:
+            recorder.note(mean)
+        if motion.count >= last:
+            return recorder.record()
+        motion.move()
+
+
+def run_to(motion: Motion, time: float) -> None:
+    """Go on, without switching, to the first step at or after ``time`` [s]."""
+    for _ in range(motion.step_at(time) - motion.count):
+        motion.advance()
+        motion.move()

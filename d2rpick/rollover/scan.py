@@ -1,0 +1,114 @@
+"""Many switched runs of one model: how roll and energy after td depend on tr."""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.errors import RangeError
+from d2rpick.rollover.motion import Motion
+from d2rpick.rollover.record import BOX
+from d2rpick.rollover.run import Window, proceed, run_to
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.rollover.model import Parameters
+    from d2rpick.rollover.record import Record
+
+# Between the times of a scan [s], while the load may last and then; and how long before td the last one is.
+_FINE, _COARSE, _LAST = 0.003, 0.02, 0.03
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One switched run against the reference run.
+
+    ``energy`` [J]: of the box at tr, what is locked in; ``energy_ratio``: over that at td.  At td: ``roll_error``
+    [degrees], ``x_error``, ``z_error`` [m] of the centre of mass, ``omega_error`` [rad/s].  ``lost_energy`` [J] of the
+    vibration at tr.  ``mean_ratio``: mean energy of the box from td to the landing, over that of the reference.
+    """
+
+    tr: float
+    energy: float
+    energy_ratio: float
+    roll_error: float
+    x_error: float
+    z_error: float
+    omega_error: float
+    lost_energy: float
+    mean_ratio: float
+
+
+def scan_times(released: float, td: float) -> list[float]:
+    """Times for tr: close together until half as long again after the load, sparse in the flight up to td [s].
+
+    RangeError when td leaves no time for any.
+    """
+    dense = min(1.5 * released, td - _LAST)
+    if not dense > _FINE:
+        raise RangeError(f"td {td:g} leaves no time for tr; the earliest that does is {_FINE + _LAST:g}")
+    return [*np.arange(_FINE, dense, _FINE).tolist(), *np.arange(dense, td - _LAST, _COARSE).tolist()]
+
+
+def comparison_end(reference: Record, td: float) -> float:
+    """When the landing, or the record, ends the comparison after ``td`` [s]; RangeError when td is not before."""
+    end = float(reference.time[-1]) if reference.landed is None else reference.landed
+    if not td < end:
+        raise RangeError(f"td {td:g} is not before the end of the flight at {end:g}")
+    return end
+
+
+def scan(
+    parameters: Parameters, reference: Record, times: Sequence[float], td: float, jobs: int | None = None
+) -> Iterator[Outcome]:
+    """Compute a switched run for each of ``times``; give outcomes in the order of tr as they are ready.
+
+    All runs are the reference until their tr, so that is computed once; then ``jobs`` processes share them (None: one
+    for each core; 1: this one).
+    """
+    end = comparison_end(reference, td)
+    motion = Motion(parameters, _interval(reference))
+    if jobs == 1:
+        for tr in sorted(times):
+            run_to(motion, tr)
+            yield compare(reference, proceed(motion.copy(), end, Window(tr, td)), tr, td)
+        return
+    # a fresh process is safe whatever threads this one runs
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        tasks = []
+        for tr in sorted(times):
+            run_to(motion, tr)
+            tasks.append((tr, pool.submit(proceed, motion.copy(), end, Window(tr, td))))
+        for tr, task in tasks:
+            yield compare(reference, task.result(), tr, td)
+
+
+def compare(reference: Record, switched: Record, tr: float, td: float) -> Outcome:
+    """Hold a switched run, which may begin at tr, against the reference run at td and from there to the landing."""
+    interval = _interval(reference)
+    at, end = round(td / interval), round(comparison_end(reference, td) / interval)
+    begin = round(float(switched.time[0]) / interval)
+    here, there = slice(at, end), slice(at - begin, end - begin)
+    energy = float(np.interp(tr, reference.time, reference.internal_energy[:, BOX]))
+    way = complex(switched.centre[at - begin] - reference.centre[at])
+    means = [float(run.internal_energy[part, BOX].mean()) for run, part in ((switched, there), (reference, here))]
+    return Outcome(
+        tr=tr,
+        energy=energy,
+        energy_ratio=energy / float(reference.internal_energy[at, BOX]),
+        roll_error=float(np.degrees(switched.roll[at - begin] - reference.roll[at])),
+        x_error=way.real,
+        z_error=way.imag,
+        omega_error=float(switched.omega[at - begin] - reference.omega[at]),
+        lost_energy=float(switched.lost_energy[-1]),
+        mean_ratio=means[0] / means[1],
+    )
+
+
+def _interval(record: Record) -> float:
+    return float(record.time[1] - record.time[0])

@@ -1,0 +1,84 @@
+"""The twenty-one rehearsals as they are, and what switching saves: ``python -m tests.benchmarks.rollover``.
+
+Exit code 1 when a recommended tr rolls wrong, an energy comes back that was not announced, or a run costs more than a
+hundred of ``suggest`` on its history.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+import numpy as np
+
+from d2rpick.rehearsal import suggestion_for
+from d2rpick.rollover.model import Parameters
+from d2rpick.rollover.run import Window, simulate
+from tests.rehearsals import SETS, Rehearsal, rehearse
+
+WINDOW = Window(0.0970, 0.370)  # what suggest recommends for the default
+HEAD = (
+    " #  stiffness  yield  damping  speed  mesh  released  landed     td       tr  roll error  of worst  "
+    "announced   mean     off"
+)
+
+
+def rehearsed(number: int) -> Rehearsal:
+    """One set, a tr every 6 ms in the trip."""
+    with TemporaryDirectory() as folder:
+        return rehearse(SETS[number], Path(folder), every=2)
+
+
+def line(number: int, one: Rehearsal) -> tuple[str, bool]:
+    """Everything about one set, and whether it is right."""
+    p, run = one.parameters, one.reference
+    good = one.roll_share < 0.1 and abs(one.energy_off) < 0.25
+    text = (
+        f"{number:2d}  {p.stiffness:9.3g}  {p.yield_strain:.5f}  {p.damping:5.2f}  {p.speed:5.2f}  {p.mesh:4d}"
+        f"  {(run.released or np.nan) * 1e3:8.1f}  {(run.landed or np.nan) * 1e3:6.1f}  {one.td:.3f}"
+        f"  {one.tr or np.nan:.5f}  {one.error:10.4f}  {one.roll_share:8.4f}"
+        f"  {one.announced:9.3f}  {one.mean_ratio:.3f}  {one.energy_off:+.3f}{'' if good else '  FAILED'}"
+    )
+    return text, good
+
+
+def saving(mesh: int) -> str:
+    """Bar updates and wall time of a switched run over those of the run without switching."""
+    parameters = Parameters(mesh=mesh)
+    pairs = [(simulate(parameters, 0.42), simulate(parameters, 0.42, WINDOW)) for _ in range(3)]
+    seconds = [np.median([pair[i].seconds for pair in pairs]) for i in (0, 1)]
+    work = pairs[0][1].bar_updates / pairs[0][0].bar_updates
+    return f"{mesh:4d}  {pairs[0][0].dt:.2g}  {work:12.2f}  {seconds[1] / seconds[0]:10.2f}  {seconds[0]:8.2f}"
+
+
+def main() -> int:
+    """Print all rehearsals, the saving, and the cost of a run; tell whether all is well."""
+    missed = 0
+    print(HEAD)
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        for number, one in enumerate(pool.map(rehearsed, range(len(SETS)))):
+            text, good = line(number, one)
+            missed += not good
+            print(text, flush=True)
+    print(f"\nrigid from {WINDOW.tr} to {WINDOW.td} of 0.42 s: shares of the run without switching")
+    print("mesh  step     bar updates   wall time  seconds")
+    for mesh in (8, 16, 32, 64):
+        print(saving(mesh), flush=True)
+    run = simulate(Parameters(), 0.4)
+    start = perf_counter()
+    suggestion_for(run, 0.37)
+    ratio = run.seconds / (perf_counter() - start)
+    print(f"\none run of 400 ms costs {ratio:.1f} runs of suggest on its history, at most 100")
+    return int(missed > 0 or ratio > 100)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,126 @@
+"""Twenty-one rollovers, fixed in advance, and what the tool says of each against what happens at every tr."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick import writers
+from d2rpick.rollover.model import Parameters
+from d2rpick.rollover.record import BOX, Record
+from d2rpick.rollover.run import Window, simulate
+from d2rpick.rollover.scan import scan, scan_times
+from tests.command import answer
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from d2rpick.rollover.scan import Outcome
+
+T_END = 0.55
+# td is this long before the ground comes [s], to the millisecond; as in the published study.
+BEFORE_LANDING = 0.010
+# The mean energy is taken over this time after td [s], with the ground taken away: two periods of the lowest mode.
+MEAN_OVER = 0.1
+NO_GROUND = 50.0
+
+
+def _halton(index: int, base: int) -> float:
+    """Give the ``index``-th number of a sequence that fills [0, 1) evenly."""
+    value, share = 0.0, 1.0
+    while index:
+        share /= base
+        value += share * (index % base)
+        index //= base
+    return value
+
+
+def _set(index: int) -> Parameters:
+    stiffness, strain, damping, speed, mesh = (_halton(index, base) for base in (2, 3, 5, 7, 11))
+    return Parameters(
+        stiffness=3e6 * 3**stiffness,
+        yield_strain=3.5e-3 * 2**strain,
+        damping=3 * damping,
+        speed=6.4 + 1.2 * speed,
+        mesh=8 + round(12 * mesh),
+    )
+
+
+SETS = (Parameters(), *(_set(index) for index in range(1, 21)))
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """One set: the reference run, what the tool recommends, how the switched runs compare.
+
+    ``announced``: mean energy after td over that of the reference, as the tool expects it.  ``mean_ratio``: what it is
+    over two periods after td, ``mean_to_landing``: in the few milliseconds that are left.
+    """
+
+    parameters: Parameters
+    reference: Record
+    td: float
+    flight: tuple[float, float, str]
+    tr: float | None
+    worst: float
+    error: float
+    announced: float
+    mean_ratio: float
+    mean_to_landing: float
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def roll_share(self) -> float:
+        """Roll error of the recommended tr over the largest of the scan."""
+        return self.error / self.worst
+
+    @property
+    def energy_off(self) -> float:
+        """How far the mean energy after td is from what was announced."""
+        return self.mean_ratio / self.announced - 1
+
+
+def rehearse(parameters: Parameters, folder: Path, *, every: int = 1, interval: float = 1e-4) -> Rehearsal:
+    """Run one set; of the times of a scan take one in ``every``."""
+    reference = simulate(parameters, T_END, interval=interval)
+    assert reference.landed is not None
+    assert reference.released is not None
+    shown = reference.time <= reference.landed + 0.04
+    td = round(reference.landed - BEFORE_LANDING, 3)
+    file = folder / "reference.matsum"
+    file.write_bytes(writers.rollover_matsum(_until(reference, int(shown.sum()))))
+    found = answer("suggest", "--td", str(td), "--part", "box", str(file))
+    tr = found["recommended"]["tr"] if found["recommended"] else None
+    flight = found["flight"]
+    times = sorted({*scan_times(reference.released, td)[::every], *([tr] if tr else [])})
+    outcomes = tuple(scan(parameters, reference, times, td, jobs=1))
+    chosen = next((one for one in outcomes if one.tr == tr), None)
+    return Rehearsal(
+        parameters=parameters,
+        reference=reference,
+        td=td,
+        flight=(flight["start"], flight["end"], flight["source"]),
+        tr=tr,
+        worst=max(abs(one.roll_error) for one in outcomes),
+        error=abs(chosen.roll_error) if chosen else np.nan,
+        announced=found["expected"]["ratio"] if chosen else np.nan,
+        mean_ratio=_mean_ratio(parameters, tr, td, interval) if tr else np.nan,
+        mean_to_landing=chosen.mean_ratio if chosen else np.nan,
+        outcomes=outcomes,
+    )
+
+
+def _mean_ratio(parameters: Parameters, tr: float, td: float, interval: float) -> float:
+    """Mean energy of the box after td, switched over not switched, if no ground came."""
+    flying = replace(parameters, ground=NO_GROUND)
+    runs = (simulate(flying, td + MEAN_OVER, window, interval=interval) for window in (Window(tr, td), None))
+    means = [float(run.internal_energy[run.time > td, BOX].mean()) for run in runs]
+    return means[0] / means[1]
+
+
+def _until(record: Record, states: int) -> Record:
+    """Give the first states of a record."""
+    columns = {name: value[:states] for name, value in vars(record).items() if isinstance(value, np.ndarray)}
+    return Record(**{**vars(record), **columns})

@@ -1,0 +1,32 @@
+"""The tool on twenty-one structures of many modes: what it recommends, against what happens at every tr."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.rehearsal import suggestion_for
+from tests.rehearsals import SETS, rehearse
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# The suite takes coarse boxes; tests/benchmarks/rollover.py runs the sets as they are.
+MESH, INTERVAL, EVERY = 4, 3e-4, 11
+
+
+@pytest.mark.parametrize("number", range(len(SETS)))
+def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_announced(
+    number: int, tmp_path: Path
+) -> None:
+    coarse = replace(SETS[number], mesh=MESH)
+    found = rehearse(coarse, tmp_path, every=EVERY, interval=INTERVAL)
+    assert found.tr is not None
+    assert found.flight[2] == "momentum"
+    assert found.roll_share < 0.1
+    assert abs(found.energy_off) < 0.25
+    pair = suggestion_for(found.reference, found.td).recommended
+    assert pair is not None
+    assert pair.tr == pytest.approx(found.tr, abs=INTERVAL)

@@ -1,0 +1,282 @@
+"""The rollover box: what mechanics asks of it, what switching keeps, and that it is the study's time table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from d2rpick.errors import RangeError
+from d2rpick.rollover.bars import Bars, stiffest_rate
+from d2rpick.rollover.contact import SLIP, Contact
+from d2rpick.rollover.model import Parameters, Truss, build
+from d2rpick.rollover.motion import Motion
+from d2rpick.rollover.record import BOX
+from d2rpick.rollover.rigid import RigidBody
+from d2rpick.rollover.run import Window, proceed, run_to, simulate
+from d2rpick.rollover.scan import compare, comparison_end, scan, scan_times
+
+COARSE = Parameters(mesh=4, damping=1.0)
+INTERVAL = 2e-4
+ANGLES = st.floats(-np.pi, np.pi)
+TIMES = st.floats(0.0, 0.12)
+
+
+def momenta(motion: Motion) -> tuple[complex, float]:
+    """Momentum and angular momentum about the origin, of everything."""
+    each = motion.structure.masses * motion.velocities
+    return complex(each.sum()), float(np.vdot(motion.places, each).imag)
+
+
+def at(time: float, parameters: Parameters = COARSE) -> Motion:
+    """A run that has come to ``time``."""
+    motion = Motion(parameters, INTERVAL)
+    run_to(motion, time)
+    return motion
+
+
+def test_by_default_the_trip_is_over_and_the_ground_comes_when_they_do_in_the_study() -> None:
+    run = simulate(Parameters(), 0.42)
+    assert run.released is not None
+    assert run.landed is not None
+    assert 0.070 <= run.released <= 0.090
+    assert run.landed == pytest.approx(0.380, abs=0.005)
+    assert np.abs(run.balance - 1).max() < 0.01
+
+
+@pytest.mark.parametrize("window", [None, Window(0.03, 0.2), Window(0.1, 0.35)])
+@pytest.mark.parametrize("parameters", [COARSE, Parameters(mesh=6, stiffness=2e6, yield_strain=2e-3)])
+def test_energy_is_balanced_within_one_percent_through_trip_flight_and_landing(
+    parameters: Parameters, window: Window | None
+) -> None:
+    run = simulate(parameters, 0.45, window, interval=INTERVAL)
+    assert run.landed is not None
+    assert np.abs(run.balance - 1).max() < 0.01
+
+
+@pytest.mark.parametrize("window", [None, (0.03, 0.35)])
+def test_momentum_and_angular_momentum_change_by_the_impulses_alone(window: tuple[float, float] | None) -> None:
+    motion = Motion(COARSE, INTERVAL)
+    linear, angular = momenta(motion)
+    scale = abs(linear)
+    for count in range(motion.step_at(0.42)):
+        if window and count == motion.step_at(window[0]):
+            motion.make_rigid()
+        if window and count == motion.step_at(window[1]):
+            motion.make_deformable()
+        motion.advance()
+        now, turning = momenta(motion)
+        assert abs(now - linear - motion.accounts.impulse) < 1e-9 * scale
+        assert abs(turning - angular - motion.accounts.angular_impulse) < 1e-9 * scale
+        motion.move()
+
+
+@settings(max_examples=20, deadline=None)
+@given(TIMES)
+def test_the_switch_to_rigid_keeps_both_momenta_and_loses_kinetic_energy(tr: float) -> None:
+    motion = at(tr)
+    motion.box.forces(motion.places)  # yields where it does at this step
+    before, energy = momenta(motion), motion.box.internal_energy(motion.places)
+    kinetic = float(motion.structure.masses @ np.abs(motion.velocities) ** 2) / 2
+    motion.make_rigid()
+    assert momenta(motion) == pytest.approx(before, rel=1e-10, abs=1e-8)
+    lost = kinetic - float(motion.structure.masses @ np.abs(motion.velocities) ** 2) / 2
+    assert lost >= -1e-9 * kinetic
+    assert motion.accounts.lost == pytest.approx(lost, abs=1e-9 * kinetic)
+    assert motion.box.internal_energy(motion.places) == energy
+
+
+@settings(max_examples=8, deadline=None)
+@given(TIMES, st.floats(0.0, 0.25))
+def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(tr: float, rigid: float) -> None:
+    motion = at(tr)
+    motion.make_rigid()
+    frozen, pulls = motion.box.internal_energy(motion.places), motion.box.forces(motion.places)
+    assert motion.body is not None
+    turned = motion.body.arms[0]
+    run_to(motion, tr + rigid)
+    turned = motion.body.arms[0] / turned
+    before = momenta(motion)
+    motion.make_deformable()
+    assert momenta(motion) == before
+    assert motion.box.internal_energy(motion.places) == pytest.approx(frozen, rel=1e-9, abs=1e-12)
+    np.testing.assert_allclose(motion.box.forces(motion.places), pulls * turned, atol=1e-6 * (1 + np.abs(pulls).max()))
+
+
+@settings(max_examples=10, deadline=None)
+@given(TIMES)
+def test_a_rigid_phase_of_no_length_takes_the_vibration_velocity_and_nothing_else(tr: float) -> None:
+    motion, untouched = at(tr), at(tr)
+    motion.make_rigid()
+    motion.make_deformable()
+    np.testing.assert_array_equal(motion.places, untouched.places)
+    lost = untouched.velocities - motion.velocities
+    masses, of_box = motion.structure.masses, slice(motion.structure.of_box)
+    assert not lost[motion.structure.of_box :].any()
+    assert abs((masses * lost).sum()) < 1e-9 * masses.sum()
+    assert abs(np.vdot(motion.places[of_box], (masses * lost)[of_box]).imag) < 1e-9 * masses.sum()
+    rigid = RigidBody(masses[of_box], motion.places[of_box], untouched.velocities[of_box])
+    np.testing.assert_allclose(motion.velocities[of_box], rigid.velocities)
+
+
+def test_a_window_of_no_length_is_a_run_that_goes_on() -> None:
+    run = simulate(COARSE, 0.2, Window(0.1, 0.1), interval=INTERVAL)
+    assert run.lost_energy[-1] > 0
+    assert run.internal_energy[run.time > 0.1, BOX].std() > 0
+
+
+def test_while_it_is_rigid_the_box_keeps_its_energy_and_computes_no_bars() -> None:
+    whole, switched = (simulate(COARSE, 0.3, window, interval=INTERVAL) for window in (None, Window(0.1, 0.3)))
+    rigid = switched.time > 0.1
+    assert np.ptp(switched.internal_energy[rigid, BOX]) < 1e-9
+    structure = build(COARSE)
+    of_box, of_step = structure.box.rest.size, structure.step.rest.size
+    steps = whole.bar_updates / (of_box + of_step)
+    assert switched.bar_updates == pytest.approx(steps * of_step + steps / 3 * of_box, rel=0.01)
+
+
+@settings(max_examples=25, deadline=None)
+@given(ANGLES, st.integers(0, 2**32 - 1))
+def test_bars_turn_with_their_points_and_push_nothing_as_a_whole(angle: float, seed: int) -> None:
+    structure = build(COARSE)
+    shaken = structure.places + 1e-4 * np.random.default_rng(seed).normal(size=structure.places.size)
+    here, there = (Bars(structure.box, structure.places.size) for _ in range(2))
+    turn = np.exp(1j * angle)
+    forces, turned = here.forces(shaken), there.forces(shaken * turn + 3)
+    scale = np.abs(forces).max()
+    np.testing.assert_allclose(turned, forces * turn, atol=1e-6 * scale)
+    assert abs(forces.sum()) < 1e-9 * scale
+    assert abs(np.vdot(shaken, forces).imag) < 1e-9 * scale
+    assert there.internal_energy(shaken * turn + 3) == pytest.approx(here.internal_energy(shaken), rel=1e-6)
+
+
+def test_forces_are_the_slope_of_the_elastic_energy() -> None:
+    structure = build(Parameters(mesh=4, yield_strain=1.0))
+    bars = Bars(structure.box, structure.places.size)
+    places = structure.places + 1e-3 * np.random.default_rng(1).normal(size=structure.places.size)
+    forces = bars.forces(places)
+    for point in (0, 7, 20):
+        for way in (1e-6, 1e-6j):
+            moved, back = places.copy(), places.copy()
+            moved[point] += way
+            back[point] -= way
+            slope = (bars.internal_energy(moved) - bars.internal_energy(back)) / 2e-6
+            assert slope == pytest.approx(-(forces[point] * np.conj(way)).real / 1e-6, rel=1e-5)
+
+
+def test_a_bar_yields_at_its_strength_and_keeps_the_plastic_work() -> None:
+    truss = Truss.between(np.array([0j, 1 + 0j]), [(0, 1)], axial=1e6, yield_strain=1e-3)
+    bars = Bars(truss, 2)
+    assert bars.forces(np.array([0j, 1.003 + 0j])).tolist() == pytest.approx([1e3, -1e3])
+    assert bars.elastic_energy(np.array([0j, 1.003 + 0j])) == pytest.approx(0.5)
+    assert bars.internal_energy(np.array([0j, 1.003 + 0j])) == pytest.approx(0.5 + 2.0)
+    assert bars.forces(np.array([0j, 1.002 + 0j])).tolist() == pytest.approx([0, 0], abs=1e-6)
+    assert bars.internal_energy(np.array([0j, 1.002 + 0j])) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("mesh", [4, 7])
+def test_no_mode_is_faster_than_the_stiffest_bar_says(mesh: int) -> None:
+    structure = build(Parameters(mesh=mesh))
+    count = structure.places.size
+    stiffness = np.zeros((2 * count, 2 * count))
+    for truss in (structure.box, structure.step):
+        for (one, other), rigidity in zip(truss.ends, truss.stiffness, strict=True):
+            along = structure.places[other] - structure.places[one]
+            row = np.zeros(2 * count)
+            row[[2 * other, 2 * other + 1]] = along.real / abs(along), along.imag / abs(along)
+            row[[2 * one, 2 * one + 1]] = -row[[2 * other, 2 * other + 1]]
+            stiffness += rigidity * np.outer(row, row)
+    masses = np.repeat(structure.masses, 2)
+    fastest = np.sqrt(np.linalg.eigvalsh(stiffness / np.sqrt(np.outer(masses, masses)))[-1])
+    bound = stiffest_rate(structure.masses, structure.box, structure.step, extra=np.zeros(count))
+    assert fastest <= bound <= 2 * fastest
+
+
+def test_a_body_without_forces_moves_and_turns_evenly() -> None:
+    masses, places = np.array([1.0, 2.0, 3.0]), np.array([0j, 1 + 0j, 1j])
+    body = RigidBody(masses, places, np.asarray(2.0 + 1j * 3.0 * (places - 0.5), dtype=np.complex128))
+    spin, velocity, centre = body.spin, body.velocity, body.centre
+    for _ in range(100):
+        body.push(np.zeros(3, dtype=complex), 0.0, 0.01)
+        body.move(0.01)
+    assert (body.spin, body.velocity) == (spin, velocity)
+    expected = centre + velocity + (places - centre) * np.exp(1j * spin)
+    np.testing.assert_allclose(body.places, expected, atol=1e-12)
+
+
+def test_floor_and_ground_push_up_with_coulomb_friction_against_the_sliding() -> None:
+    p = Parameters(tilt=0.0, mesh=4)
+    structure = build(p)
+    for depth, level in ((0.001, 0.0), (0.002, -p.ground - 5.0)):
+        contact = Contact(structure, Parameters(tilt=0.0, mesh=4, ground=p.ground + 5.0))
+        places = structure.places + 1j * (level - depth)
+        push = contact.push(1.0, places - 1.0 + p.speed * p.braking / 2, np.full(places.size, 2.0 + 0j))
+        assert push is not None
+        normal = push.forces.imag
+        assert normal.min() >= 0
+        np.testing.assert_allclose(push.forces.real, -p.friction * normal * 2.0 / np.hypot(2.0, SLIP))
+        assert (push.of_sled != 0) == (level == 0)
+
+
+def test_the_cushion_is_crushed_for_good_at_its_force_until_it_is_solid() -> None:
+    p = Parameters(tilt=0.0, mesh=4, friction=0.0)
+    structure = build(p)
+    contact = Contact(structure, p)
+    rest = structure.places + p.speed * p.braking / 2 + 0.01j
+
+    def against(way: float) -> float:
+        push = contact.push(1.0, rest + way, np.zeros(rest.size, dtype=complex))
+        return -push.forces[structure.toes[0]].real if push else 0.0
+
+    forces = [against(way) for way in (0.02, 0.06, 0.1, 0.3 * p.cushion_depth)]
+    assert forces[:2] == pytest.approx([min(p.cushion, 5e5 * 0.02), p.cushion])
+    assert forces[2] >= p.cushion - 1e-6
+    assert forces[3] == 0.0
+
+
+def test_contact_sleeps_in_the_flight_and_misses_nothing() -> None:
+    motion, awake = at(0.1), at(0.1)
+    for _ in range(motion.step_at(0.32)):
+        awake.contact._sleeps_until = 0.0
+        for run in (motion, awake):
+            run.advance()
+            run.move()
+    np.testing.assert_array_equal(motion.places, awake.places)
+
+
+def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> None:
+    reference = simulate(COARSE, 0.42, interval=INTERVAL)
+    times, td = [0.02, 0.06, 0.15], 0.36
+    alone = [compare(reference, simulate(COARSE, 0.42, Window(tr, td), interval=INTERVAL), tr, td) for tr in times]
+    assert list(scan(COARSE, reference, times[::-1], td, jobs=1)) == alone
+    assert list(scan(COARSE, reference, times, td, jobs=2)) == alone
+    assert abs(alone[0].roll_error) > abs(alone[2].roll_error)
+
+
+def test_a_run_goes_on_from_a_copy_as_it_would_have() -> None:
+    motion = at(0.08)
+    twin = motion.copy()
+    assert proceed(twin, 0.2).roll.tolist() == proceed(motion, 0.2).roll.tolist()
+
+
+def test_times_of_a_scan_are_before_td_and_dense_in_the_trip() -> None:
+    times = scan_times(0.086, 0.37)
+    assert times == sorted(times)
+    assert 0 < times[0] < times[-1] < 0.37
+    assert sum(time < 0.086 for time in times) > 25
+    assert scan_times(0.086, 0.0331)[0] == times[0]
+    with pytest.raises(RangeError, match=r"earliest that does is 0\.033"):
+        scan_times(0.086, 0.0329)
+
+
+def test_what_is_no_model_or_no_window_is_refused() -> None:
+    for wrong in ({"mesh": 3}, {"stiffness": 0.0}, {"speed": float("nan")}, {"friction": -0.1}):
+        with pytest.raises(RangeError, match=next(iter(wrong))):
+            Parameters(**wrong)
+    with pytest.raises(RangeError, match="softer bars"):
+        simulate(Parameters(stiffness=1e12), 100)
+    with pytest.raises(RangeError, match="follow each other"):
+        Window(0.2, 0.1)
+    with pytest.raises(RangeError, match="end of the flight"):
+        comparison_end(simulate(COARSE, 0.05), 0.06)
