@@ -100,6 +100,12 @@ def verify(history: History, tr: float, td: float, settings: Settings) -> Verdic
     )
 
 
+def approve(situation: Situation, times: Iterable[float]) -> list[bool]:
+    """Tell for each of ``times`` before td whether ``verify`` would verify it as tr."""
+    judged = judge(situation, [Found(tr, "given", None) for tr in times])
+    return [candidate.acceptable and not _over_limits(situation, candidate) for candidate in judged]
+
+
 def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:
     """Add what a finished switched run shows; a wrong motion of it overrules the verdict."""
     return replace(

@@ -7,6 +7,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from d2rpick.errors import FormatError
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from d2rpick.candidates import Candidate
     from d2rpick.choice import Suggestion, Verdict
     from d2rpick.situation import Situation
+    from d2rpick.study import Study
 
 FORMATS = ("png", "svg", "pdf")
 # Okabe and Ito's palette: told apart with any colour vision.
@@ -69,6 +71,42 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
         if switched:
             axes.axvspan(switched.tr, switched.td, color=_FLIGHT, alpha=0.2, label="rigid", linewidth=0)
         _finish(axes)
+    return figure
+
+
+def draw_study(answer: Study) -> Figure:
+    """Energies of all runs over each other, the tr of each, the common one and td."""
+    figure = Figure(figsize=(10, 5), layout="constrained")
+    axes = figure.subplots()
+    curves = [row.curve for row in answer.rows if row.curve is not None]
+    alone = len(curves) == 1
+    many = len(curves) > _FEW
+    # as a whole they stay as dark as ten lines
+    lines = LineCollection(
+        [curve.T for curve in curves], colors=_REFERENCE, linewidths=1 if alone else 0.6,
+        alpha=max(0.02, min(1.0, 10 / len(curves))) if curves else 1, rasterized=many,
+        label="internal energy" if alone else f"internal energy of {len(curves)} runs",
+    )  # fmt: skip
+    axes.add_collection(lines)
+    axes.autoscale_view()
+    if answer.common.window:
+        axes.axvspan(*answer.common.window, color=_GOOD, alpha=0.2, linewidth=0, label="acceptable in all runs")
+    points = [(row.tr, row.energy_td) for row in answer.rows if row.tr is not None]
+    if points:
+        axes.scatter(
+            *zip(*points, strict=True), s=8 if many else 28, linewidths=0.7, facecolors=_GOOD, edgecolors="white",
+            zorder=3, label="tr of each run", rasterized=many,
+        )  # fmt: skip
+    _mark(axes, answer.common.tr, answer.td)
+    levels = [energy for _, energy in points if energy is not None]
+    highest = max((float(curve[1].max()) for curve in curves), default=0.0)
+    if levels and min(levels) > 0 and highest > _LOGARITHMIC * max(levels):
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=min(min(levels) / 2, float(np.median(levels)) / 10**_DECADES_BELOW_LEVEL))
+    units = {row.time_unit for row in answer.rows if row.judged}
+    unit = units.pop() if len(units) == 1 else ""
+    axes.set(xlabel=f"time [{unit}]" if unit else "time", ylabel="internal energy")
+    _finish(axes)
     return figure
 
 

@@ -86,12 +86,18 @@ _ENERGY = click.option(
     help="Energy column, label or HDF5 path; given several times, their sum.",
 )  # fmt: skip
 _FLYING = click.option("--flying", metavar="IDS", multiple=True, type=NAMES, help="Parts that fly together with them.")
+_PLOT = click.option("--plot", metavar="FILE", help="Draw energy and motion to FILE (png, svg, pdf).")
 
 
 def history_options(function: Decorated) -> Decorated:
     """HISTORY... and how to read it; collected by ``selection`` and ``open_run``."""
+    argument = click.argument("history", metavar="HISTORY...", nargs=-1, required=True)
+    return _stack(argument, reading_options)(function)
+
+
+def reading_options(function: Decorated) -> Decorated:
+    """How to read a history; collected by ``selection``."""
     return _stack(
-        click.argument("history", metavar="HISTORY...", nargs=-1, required=True),
         _FORMAT, _TIME, _ENERGY,
         click.option(
             "--part", metavar="IDS", multiple=True, type=NAMES,
@@ -157,6 +163,11 @@ def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
 
 def choosing_options(function: Decorated) -> Decorated:
     """Options of ``suggest`` and ``verify``; collected by ``settings``."""
+    return _stack(judging_options, _PLOT)(function)
+
+
+def judging_options(function: Decorated) -> Decorated:
+    """How to judge a tr; collected by ``settings``."""
     return _stack(
         _AFTER,
         _MARGIN,
@@ -168,7 +179,6 @@ def choosing_options(function: Decorated) -> Decorated:
         oscillator_options(required=False),
         click.option("--fit-window", type=(TIME, TIME), metavar="LO HI", help="Identify the oscillator here only."),
         click.option("--no-verify", is_flag=True, help="Judge by the energy level alone, without an oscillator."),
-        click.option("--plot", metavar="FILE", help="Draw energy and motion to FILE (png, svg, pdf)."),
     )(function)  # fmt: skip
 
 
