@@ -108,7 +108,7 @@ def common_windows(runs: Sequence[Samples]) -> Samples:
     [[1.0, 2.0], [4.0, 4.5]]
     """
     stretches, counts = coverage(runs)
-    return stretches[counts == len(runs)]
+    return np.asarray(stretches[counts == len(runs)])
 
 
 def _grid(answer: Suggestion) -> Samples:
@@ -119,20 +119,20 @@ def _grid(answer: Suggestion) -> Samples:
     if start is None or start >= td:
         return np.zeros(0)
     turns = situation.fitted.extrema(float(history.time[0]), td) if situation.fitted else ()
-    span = situation.span or ()
-    times = np.concatenate(
-        [history.time, [c.tr for c in answer.candidates], turns, span, [start, np.nextafter(td, -np.inf)]]
-    )
+    known = situation.profile.time if situation.profile else ()
+    found = [candidate.tr for candidate in answer.candidates]
+    ends = [start, *(situation.span or ()), np.nextafter(td, -np.inf)]
+    times = np.concatenate([history.time, found, turns, known, ends])
     return np.unique(times[(times >= max(start, history.time[0])) & (times < td)])
 
 
 def _errors(situation: Situation, times: Samples) -> Samples:
     """What the tolerance is held against, of the shape of ``times``; infinite where no tolerance would help [-]."""
-    td, mode, span = situation.td, situation.mode, situation.span
-    if mode and span:
-        same = mode.deformation(times) * mode.deformation(td) >= 0
-        described = (times >= span.start) & (times <= span.end)
-        return np.where(same & described, measures.lock_in_error(mode, times, td), np.inf)
+    td, vibration = situation.td, situation.vibration
+    if vibration:
+        first, last = situation.measured_span
+        comparable = (times >= first) & (times <= last) & measures.sign_match(vibration, times, td)
+        return np.where(comparable, measures.lock_in_error(vibration, times, td), np.inf)
     energy, level = np.interp(times, situation.history.time, situation.history.energy), situation.energy_td
     if not level > 0:
         return np.full(times.shape, np.inf)
@@ -168,4 +168,4 @@ def _within(finer: Samples, kept: Samples) -> Samples:
     inside = (
         (holder >= 0) & (finer[:, 1] <= kept[np.maximum(holder, 0), 1]) if kept.size else np.zeros(len(finer), bool)
     )
-    return finer[inside]
+    return np.asarray(finer[inside])

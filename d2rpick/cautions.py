@@ -29,6 +29,7 @@ def cautions_of(situation: Situation) -> Iterator[Caution]:
     if not situation.history.complete:
         yield Caution("truncated-input", "the input stops inside a state; only whole states were used")
     yield from _of_energy(situation)
+    yield from _of_parts(situation)
     yield from _of_flight(situation)
 
 
@@ -37,14 +38,23 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
     if situation.energy_td <= 0:
         found = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
         yield Caution("no-energy", f"{found}; a level to lock in needs a positive energy")
-    if situation.no_mode:
-        yield Caution("energy-only", f"{situation.no_mode}; candidates are judged by their energy level alone")
+    if situation.no_vibration:
+        yield Caution("energy-only", f"{situation.no_vibration}; candidates are judged by their energy level alone")
     if share is not None and share > POOR_KINETIC_SHARE:
         lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g}"
         yield Caution("poor-td", f"{lost} and cannot be kept by any tr")
     if mode and (mode.preload or abs(mode.energy_plastic) > _NOTABLE_PLASTIC * float(mode.vibration_energy(td))):
         found = f"plastic work {mode.energy_plastic:.4g} and a preload energy of {mode.preload**2:.4g} fit the record"
         yield Caution("plastic-or-preload", f"{found}; energy alone cannot tell them from each other with certainty")
+
+
+def _of_parts(situation: Situation) -> Iterator[Caution]:
+    if situation.kinetic_share_estimated:
+        found = f"the kinetic share is an estimate from the envelope of the energy: {situation.no_mode}"
+        yield Caution("kinetic-share-estimated", found)
+    if situation.part_vibration:
+        for part in situation.part_vibration.parts.unsigned:
+            yield Caution("part-without-sign", f"{part.name} was left out: {part.reason}")
 
 
 def _of_flight(situation: Situation) -> Iterator[Caution]:

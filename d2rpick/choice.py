@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 
 from d2rpick.candidates import Candidate, Found, find_candidates, judge
 from d2rpick.cautions import POOR_KINETIC_SHARE, Caution, cautions_of
-from d2rpick.crossings import find_extrema
 from d2rpick.errors import RangeError
+from d2rpick.expectation import Expectation, expectation
+from d2rpick.health import Health, assess, cautions_of_health
 from d2rpick.situation import Settings, Situation, examine
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from d2rpick.balance import Balance
     from d2rpick.history import History
     from d2rpick.switched import Comparison
 
@@ -32,13 +34,19 @@ class Pair:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """Answer of ``suggest``: ranked candidates, the recommended pair, a better td, and what to be aware of."""
+    """Answer of ``suggest``: ranked candidates, the recommended pair, a better td, and what to be aware of.
+
+    ``td_window`` is where td was chosen, if it was; ``expected`` what the energy alone tells of the time after td.
+    """
 
     situation: Situation
     candidates: tuple[Candidate, ...]
     recommended: Pair | None
     better_td: Pair | None
     cautions: tuple[Caution, ...]
+    health: Health | None = None
+    td_window: tuple[float, float] | None = None
+    expected: Expectation | None = None
 
 
 @dataclass(frozen=True)
@@ -62,7 +70,7 @@ def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     """Rank the candidates for tr at ``td`` and recommend one; RangeError when td lies outside the record."""
     situation = examine(history, td, settings)
     candidates = rank(find_candidates(situation))
-    best = _best(situation, candidates)
+    best = best_of(situation, candidates)
     if best:
         candidates = tuple(replace(c, recommended=c is best) for c in candidates)
     better = better_pair(situation)
@@ -72,7 +80,8 @@ def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     if not better:
         cautions.append(Caution("no-better-td", "no peak of the energy in the flight has an acceptable tr"))
     recommended = Pair(best.tr, td, best.residual) if best else None
-    return Suggestion(situation, candidates, recommended, better, tuple(cautions))
+    expected = expectation(situation, best.energy if best else None)
+    return Suggestion(situation, candidates, recommended, better, tuple(cautions), expected=expected)
 
 
 def verify(history: History, tr: float, td: float, settings: Settings) -> Verdict:
@@ -106,6 +115,19 @@ def approve(situation: Situation, times: Iterable[float]) -> list[bool]:
     return [candidate.acceptable and not _over_limits(situation, candidate) for candidate in judged]
 
 
+def with_health(answer: Suggestion, balance: Balance) -> Suggestion:
+    """Add how far the reference run can be trusted, above all in the rigid window, else in the flight up to td.
+
+    ``balance`` is that of the reference run up to td: what comes later does not matter for the choice.
+    """
+    history, td = answer.situation.history, answer.situation.td
+    start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
+    window = None if start is None or start >= td else (start, td)
+    locked = history.mean_energy(*window) if window else None
+    health = assess(balance, window, locked)
+    return replace(answer, health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
+
+
 def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:
     """Add what a finished switched run shows; a wrong motion of it overrules the verdict."""
     return replace(
@@ -119,13 +141,14 @@ def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:
 def rank(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
     """Order candidates, best first, and number them.
 
-    Acceptable ones first; of these, and of the rest, first those whose error is within 0.02 of the smallest,
-    by the length of the rigid window; then the others by their error.
+    Acceptable ones first, of them those on the same swing as td last: they save nothing.  Of each group first those
+    whose error is within 0.02 of the smallest, by the length of the rigid window; then the others by their error.
     """
     ordered: list[Candidate] = []
     candidates = list(candidates)
-    for acceptable in (True, False):
-        group = [c for c in candidates if c.acceptable == acceptable]
+    worth = [(not c.acceptable, c.acceptable and c.same_swing) for c in candidates]
+    for wanted in sorted(set(worth)):
+        group = [c for c, own in zip(candidates, worth, strict=True) if own == wanted]
         limit = min((c.error for c in group), default=0.0) + EQUALLY_GOOD
         good = sorted((c for c in group if c.error <= limit), key=lambda c: c.tr)
         ordered += good + sorted((c for c in group if c.error > limit), key=lambda c: (c.error, c.tr))
@@ -147,32 +170,26 @@ def _over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _best(situation: Situation, ranked: Iterable[Candidate]) -> Candidate | None:
+def best_of(situation: Situation, ranked: Iterable[Candidate]) -> Candidate | None:
+    """Give the first acceptable candidate that keeps the limits asked for."""
     return next((c for c in ranked if c.acceptable and not _over_limits(situation, c)), None)
 
 
 def better_pair(situation: Situation) -> Pair | None:
     """Give the nearest peak of the energy in the flight that has an acceptable tr, and the best one there."""
-    for td in sorted(_peaks(situation), key=lambda peak: abs(peak - situation.td)):
+    start = situation.earliest_tr
+    if start is None:
+        return None
+    # where nothing tells the end of the flight, it is not sought beyond td
+    end = situation.td if situation.flight.end is None and not situation.span else situation.latest_td
+    for td in sorted(situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)):
         there = situation.at(td)
         if situation.fitted and not there.mode:
             continue  # the oscillator has sunk into the scatter there
-        best = _best(there, rank(find_candidates(there)))
-        if best:
+        best = best_of(there, rank(find_candidates(there)))
+        if best and not best.same_swing:
             return Pair(best.tr, td, best.residual)
     return None
-
-
-def _peaks(situation: Situation) -> list[float]:
-    """Peaks of the energy in the flight; where nothing tells its end, up to td."""
-    start, history = situation.earliest_tr, situation.history
-    if start is None:
-        return []
-    mode, span = situation.fitted, situation.span
-    if mode and span:
-        return list(mode.peaks(max(start, span.start), min(situation.latest_td, span.end)))
-    extrema = find_extrema(history.time, history.energy)
-    return [e.time for e in extrema if e.peak and start < e.time <= min(situation.latest_td, situation.td)]
 
 
 def _why_none(situation: Situation, ranked: tuple[Candidate, ...]) -> str:

@@ -99,7 +99,7 @@ def _answer(number: int, future: Future[Any]) -> Answer:
 
 
 class Here:
-    """This process, one call after the other."""
+    """In the calling process, one call after the other."""
 
     room = 1
 

@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.mode import energy_and_jacobian
+
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from d2rpick.history import Samples
@@ -27,42 +31,26 @@ _MAX_CELLS: Final = 8192  # bounds memory at 5 MB; enough for 1000 periods of th
 _CELLS_PER_PERIOD: Final = 24  # of the strongest vibration in E, which a preload makes the slower of two
 
 # Of the least squares:
-_COARSE: Final = 400  # samples on which starts are compared and first refined
-_STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
-_CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
+COARSE: Final = 400  # samples on which starts are compared and first refined
+STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
+CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
 _MAX_STEPS: Final = 40  # a good start needs 4 to 8
-
-
-def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Samples, Samples]:
-    """Return E(s), shape (n,), and its derivatives by the first ``size`` parameters, shape (size, n)."""
-    omega, alpha, cosine, sine, plastic, preload = parameters
-    angle, decay = omega * s, np.exp(-alpha / 2 * s)
-    cos, sin = decay * np.cos(angle), decay * np.sin(angle)
-    swing = cosine * cos + sine * sin
-    q = preload + swing
-    jacobian = np.ones((6, s.size))
-    jacobian[0] = 2 * q * s * (sine * cos - cosine * sin)
-    jacobian[1] = -q * s * swing
-    jacobian[2] = 2 * q * cos
-    jacobian[3] = 2 * q * sin
-    jacobian[5] = 2 * q
-    return plastic + q * q, jacobian[:size]
 
 
 def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) -> Samples:
     """Return the least-squares parameters with the first ``size`` of them free, the others zero."""
-    stride = -(-s.size // _COARSE)
+    stride = -(-s.size // COARSE)
     coarse_s, coarse_e = s[::stride], e[::stride]
-    enough = _CERTAIN * float(np.sum((coarse_e - np.mean(coarse_e)) ** 2))
+    enough = CERTAIN * float(np.sum((coarse_e - np.mean(coarse_e)) ** 2))
     best, least = np.zeros(6), np.inf
     for start in _starts(poles, coarse_s, coarse_e, size):
-        found, cost = _minimise(start, coarse_s, coarse_e, size)
+        found, cost = minimise(start, lambda p: energy_and_jacobian(p, coarse_s, size), coarse_e)
         if cost < least:
             best, least = found, cost
         if least < enough:
             break
     if stride > 1:
-        best = _minimise(best, s, e, size)[0]
+        best = minimise(best, lambda p: energy_and_jacobian(p, s, size), e)[0]
     if best[5] < 0:  # q and -q make the same energy; the preload is taken positive
         best[[2, 3, 5]] *= -1
     if best[0] < 0:
@@ -70,9 +58,10 @@ def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) -> Sam
     return best
 
 
-def rates(s: Samples, e: Samples) -> NDArray[np.complex128]:
+def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
     """Read the complex rates p = -damping + i frequency of exp(p s) that E may consist of, frequency > 0.
 
+    ``orders`` are the numbers of exponentials that are tried.
     Matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 1990): the leading right singular vectors of the
     Hankel matrix of equidistant values span the exponentials, and shifting them by one cell multiplies
     each by exp(p h).  Means over cells of an exponential are the same exponential, so cells also serve
@@ -87,7 +76,7 @@ def rates(s: Samples, e: Samples) -> NDArray[np.complex128]:
     hankel = np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
     vectors = np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1]
     found = []
-    for order in _ORDERS:
+    for order in orders:
         v = vectors[:, :order]
         found.append(np.linalg.eigvals(np.linalg.lstsq(v[:-1], v[1:], rcond=None)[0]))
     z = np.concatenate(found).astype(np.complex128)
@@ -127,32 +116,38 @@ def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) ->
         # within half a radian over the record two starts lie in the same valley
         if all(abs(start[0] - other[0]) > 0.5 or abs(start[1] - other[1]) > 0.5 for other in best):
             best.append(start)
-    return best[:_STARTS]
+    return best[:STARTS]
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a trial step too far; it is rejected
-def _minimise(parameters: Samples, s: Samples, e: Samples, size: int) -> tuple[Samples, float]:
-    """Refine the first ``size`` parameters by Levenberg-Marquardt; return them and the sum of squares."""
+def minimise(
+    parameters: Samples, model: Callable[[Samples], tuple[Samples, Samples]], e: Samples
+) -> tuple[Samples, float]:
+    """Refine parameters by Levenberg-Marquardt; return them and the sum of squares.
+
+    ``model`` gives the energies (n,) and their derivatives (p, n) by the first p parameters; the others stay.
+    """
     damping = 1e-4  # of the unit diagonal: starts are close, so steps may be long
-    model, jacobian = energy_and_jacobian(parameters, s, size)
-    rest = e - model
+    energy, jacobian = model(parameters)
+    rest = e - energy
     cost = float(rest @ rest)
+    free = len(jacobian)
     for _ in range(_MAX_STEPS):
         normal, gradient = jacobian @ jacobian.T, jacobian @ rest
         scale = np.sqrt(np.diag(normal)) + 1e-150
-        normal = normal / (scale * scale[:, None]) + damping * np.eye(size)
-        step = np.zeros(6)
-        step[:size] = np.linalg.solve(normal, gradient / scale) / scale
-        trial = parameters + step
-        model, trial_jacobian = energy_and_jacobian(trial, s, size)
-        rest_trial = e - model
+        normal = normal / (scale * scale[:, None]) + damping * np.eye(free)
+        trial = parameters.copy()
+        step = np.linalg.solve(normal, gradient / scale) / scale
+        trial[:free] += step
+        energy, trial_jacobian = model(trial)
+        rest_trial = e - energy
         trial_cost = float(rest_trial @ rest_trial)
-        expected = float(step[:size] @ gradient)
+        expected = float(step @ gradient)
         if trial_cost <= cost:
             parameters, rest, jacobian, cost = trial, rest_trial, trial_jacobian, trial_cost
             damping = max(damping / 10, 1e-10)
         else:
             damping *= 10
-        if expected <= 1e-12 * cost + 1e-31 * s.size:
+        if expected <= 1e-12 * cost + 1e-31 * e.size:
             break
     return parameters, cost

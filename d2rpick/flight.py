@@ -46,12 +46,14 @@ class Flight:
 
     ``source`` tells how the start was found: "given", "momentum", "oscillator", "energy", or None.  ``parts`` are
     those that were seen to fly together, None where the momentum did not tell, or told it of the whole model.
+    ``damping`` is alpha of their momentum [1/time], 0 where it did not tell.
     """
 
     start: float | None
     end: float | None
     source: str | None
     parts: tuple[Part, ...] | None = None
+    damping: float = 0.0
 
 
 class Span(NamedTuple):
@@ -77,7 +79,7 @@ def described_span(
     bounds : Span
         Where to look [time].
     fitter : callable
-        Gives the oscillator for some samples.
+        Gives the oscillator for some samples: `identify`, `identify_several` or one that is given.
     whole : bool
         Try nothing shorter than the bounds and their part up to td: it is known that no load acts there.
 
@@ -104,7 +106,7 @@ def span_of(history: History, anchor: float, fit: Identification, bounds: Span) 
     """
     assert fit.mode is not None
     time, energy = _samples(history, bounds)
-    period = 2 * np.pi / fit.mode.omega
+    period = 2 * np.pi / fit.mode.fastest
     width = max(3, round(period / _MEANS_PER_PERIOD / float(np.sort(np.diff(time))[(time.size - 1) // 2])))
     with np.errstate(over="ignore", invalid="ignore"):  # far off, a damped fit grows beyond all numbers
         least = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)

@@ -96,6 +96,7 @@ class History:
     Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
     in them was taken for the energy, ``parts`` whose energy it is, None for the whole model.  ``complete``
     is False when a file stopped inside a state; ``notes`` say in plain sentences what was left out or assumed.
+    Where the energy is a sum, ``part_names`` (k,) and ``part_energies`` (n, k) are its terms that are not always zero.
     ``time_unit`` is given only where the file names it; solver databases do not.  ``momenta`` tell when parts fly
     freely, where the files have them: of the parts, then of the whole model.
     """
@@ -109,6 +110,8 @@ class History:
     time_precision: Precision = EXACT
     energy_precision: Precision = EXACT
     time_unit: str = ""
+    part_names: tuple[str, ...] = ()
+    part_energies: Samples | None = None
     momenta: tuple[Momenta, ...] = ()
     complete: bool = True
     notes: tuple[str, ...] = ()
@@ -129,6 +132,14 @@ class History:
         if np.any(np.diff(time) <= 0):
             state = int(np.argmax(np.diff(time) <= 0)) + 1
             raise HistoryError(f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}")
+        if self.part_energies is not None:
+            terms = _frozen(self.part_energies)
+            if terms.shape != (time.size, len(self.part_names)):
+                raise HistoryError(
+                    f"{where}: the energies of {len(self.part_names)} parts have shape {terms.shape}, "
+                    f"({time.size}, {len(self.part_names)}) was expected"
+                )
+            object.__setattr__(self, "part_energies", terms)
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "energy", energy)
 
@@ -143,6 +154,11 @@ class History:
             span = f"{self.time[0]:g} to {self.time[-1]:g}"
             raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}")
         return float(np.interp(time, self.time, self.energy))
+
+    def mean_energy(self, start: float, end: float) -> float | None:
+        """Mean energy of the states in a window; None where there is none [energy]."""
+        inside = self.energy[slice(*np.searchsorted(self.time, [start, np.nextafter(end, np.inf)]))]
+        return float(inside.mean()) if inside.size else None
 
 
 def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.fitting import VIBRATION, WITH_PLASTIC, WITH_PRELOAD, energy_and_jacobian, fit, rates
-from d2rpick.mode import Mode
+from d2rpick.fitting import VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, rates
+from d2rpick.fitting_several import fit_several
+from d2rpick.mode import Mode, energy_and_jacobian
+from d2rpick.modes import Modes, sum_and_jacobian
 
 if TYPE_CHECKING:
     from d2rpick.history import Samples
@@ -30,13 +32,22 @@ _FLOOR: Final = 1e-4  # of the highest vibration energy
 _MODELS: Final = ((VIBRATION, 1.25), (WITH_PLASTIC, 1.5), (WITH_PRELOAD, 2.0))
 
 
+# Modes of one sum: with more of them almost any record could be described.  Two slowest periods tell their energies
+# apart, as they do a preload from a vibration.
+_SEVERAL: Final = (2, 3)
+_PERIODS_OF_SEVERAL: Final = 2.0
+# Least difference of two rates over the record [rad], half a beat of q: two modes nearer than that and out of step
+# make up any decay.
+_APART: Final = np.pi / 2
+
+
 @dataclass(frozen=True, eq=False)
 class Identification:
     """The mode that was fitted to an energy history, and whether it describes it.
 
     Parameters
     ----------
-    mode : Mode or None
+    mode : Mode, Modes or None
         Least-squares fit, also when it was refused; None when nothing could be fitted.
     describes_record : bool
         True when the fit was accepted.
@@ -51,11 +62,10 @@ class Identification:
     start, end : float
         Window of the fit [time].
     covariance : array of shape (p, p)
-        Of omega, alpha, cosine, sine and, where the model has them, energy_plastic and preload; for
-        independent errors of the samples.
+        Of the parameters in the order of ``mode.energy_gradient``, for independent errors of the samples.
     """
 
-    mode: Mode | None
+    mode: Mode | Modes | None
     describes_record: bool
     reason: str | None
     misfit: float | None
@@ -73,9 +83,7 @@ class Identification:
         t = np.atleast_1d(np.asarray(times, dtype=np.float64))
         if self.mode is None:
             return np.full(t.shape, np.nan)
-        m = self.mode
-        parameters = np.array([m.omega, m.alpha, m.cosine, m.sine, m.energy_plastic, m.preload])
-        jacobian = energy_and_jacobian(parameters, t - m.origin, len(self.covariance))[1]
+        jacobian = self.mode.energy_gradient(t, len(self.covariance))
         variance: Samples = np.sum(jacobian * (self.covariance @ jacobian), axis=0)
         return np.sqrt(np.maximum(variance, 0.0))
 
@@ -119,10 +127,46 @@ def identify(time: Samples, energy: Samples) -> Identification:
         return _nothing(time, "the energy does not oscillate: nothing vibrates, or it is overdamped")
     refused = []
     for size, least_periods in _MODELS:
-        attempt, follows = _judged(fit(poles, record.s, record.e, size), size, least_periods, record)
+        parameters = fit(poles, record.s, record.e, size)
+        attempt, follows = _judged(_one(parameters, size, record), least_periods, record)
         if follows:  # a richer model would follow as well, and be no more plausible
             return attempt
         refused.append(attempt)
+    return min(refused, key=lambda attempt: attempt.rms)
+
+
+def identify_several(time: Samples, energy: Samples) -> Identification:
+    """Fit two vibrations of one damping to E(t), else three, and judge the fit.
+
+    Parameters and result as for ``identify``; for records that one vibration does not describe.
+
+    Notes
+    -----
+    With damping proportional to mass the energies of modes add up (see `Modes`).  That holds for the energy of all
+    parts together, not for a part's own, in which the modes mix; such a record is refused like any other that leaves
+    a systematic rest.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 6.0, 401)
+    >>> found = identify_several(t, np.sin(5.0 * t) ** 2 + 0.5 * np.cos(8.0 * t) ** 2)
+    >>> found.describes_record, [f"{mode.omega:.6f}" for mode in found.mode.modes]
+    (True, ['5.000000', '8.000000'])
+    """
+    lacking = _lacking(time, energy)
+    if lacking:
+        return _nothing(time, lacking)
+    record = _Record.scaled(time, energy)
+    refused = []
+    for count in _SEVERAL:
+        parameters = fit_several(record.s, record.e, count)
+        if parameters is not None:
+            attempt, follows = _judged(_sum(parameters, record), _PERIODS_OF_SEVERAL, record)
+            if follows:
+                return attempt
+            refused.append(attempt)
+    if not refused:
+        return _nothing(time, "the energy does not oscillate at two rates")
     return min(refused, key=lambda attempt: attempt.rms)
 
 
@@ -139,7 +183,7 @@ def assess(mode: Mode, time: Samples, energy: Samples) -> Identification:
     cosine = mode.deformation(start) - mode.preload
     sine = (mode.velocity(start) + mode.alpha / 2 * cosine) / mode.omega
     parameters = np.array([mode.omega, mode.alpha, cosine, sine, mode.energy_plastic, mode.preload])
-    held, follows = _judged(parameters / record.units, WITH_PRELOAD, 0.0, record)
+    held, follows = _judged(_one(parameters / record.units, WITH_PRELOAD, record), 0.0, record)
     reason = None if follows else held.reason
     return replace(held, mode=mode, describes_record=follows, reason=reason, covariance=np.zeros((6, 6)))
 
@@ -174,23 +218,48 @@ def _lacking(time: Samples, energy: Samples) -> str | None:
     return None
 
 
-def _judged(parameters: Samples, size: int, least_periods: float, record: _Record) -> tuple[Identification, bool]:
+class _Attempt(NamedTuple):
+    """A fit: scaled and in the units of the record, with its scaled energies (n,) and derivatives (p, n)."""
+
+    name: str
+    scaled: Mode | Modes
+    mode: Mode | Modes
+    energy: Samples
+    jacobian: Samples
+    units: Samples
+
+
+def _one(parameters: Samples, size: int, record: _Record) -> _Attempt:
+    """Fit of one mode with its first ``size`` parameters free."""
+    fitted, jacobian = energy_and_jacobian(parameters, record.s, size)
+    scaled, mode = _mode(parameters, 0.0), _mode(parameters * record.units, record.start)
+    return _Attempt("one oscillator", scaled, mode, fitted, jacobian, record.units[:size])
+
+
+def _sum(parameters: Samples, record: _Record) -> _Attempt:
+    """Fit of several modes."""
+    fitted, jacobian = sum_and_jacobian(parameters, record.s)
+    rate, root = record.units[1], record.units[2]
+    count = parameters.size // 3
+    units = np.array([rate, *(rate, root, root) * count])
+    scaled, modes = Modes.of(parameters, 0.0), Modes.of(parameters * units, record.start)
+    return _Attempt(f"a sum of {count} modes", scaled, modes, fitted, jacobian, units)
+
+
+def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> tuple[Identification, bool]:
     """Return a fit with its verdict, and whether it follows the samples."""
     s, e = record.s, record.e
-    fitted, jacobian = energy_and_jacobian(parameters, s, size)
-    rest = e - fitted
+    rest = e - attempt.energy
     rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), _structure(rest)
-    scaled = _mode(parameters, 0.0)
-    vibration = scaled.vibration_energy(s)
-    # where noise exceeds the vibration, a rest says nothing about a second mode
+    vibration = attempt.scaled.vibration_energy(s)
+    # where noise exceeds the vibration, a rest says nothing about a further mode
     local_structure = _structure(rest / np.maximum(vibration, max(rms, _FLOOR * np.max(vibration))))
-    loose = _loose(rms / spread, structure / spread, local_structure)
+    loose = _loose(attempt.name, rms / spread, structure / spread, local_structure)
     # the interval that a moment of the record lies in, on average: gaps count by their length
     interval = float(np.sum(np.diff(s) ** 2))
-    reason = loose or _implausible(scaled, interval, least_periods, record.end - record.start)
-    units = record.units[:size]
+    reason = loose or _implausible(attempt.scaled, interval, least_periods, record.end - record.start)
     found = Identification(
-        mode=_mode(parameters * record.units, record.start),
+        mode=attempt.mode,
         describes_record=reason is None,
         reason=reason,
         misfit=rms / spread,
@@ -198,29 +267,29 @@ def _judged(parameters: Samples, size: int, least_periods: float, record: _Recor
         structure=structure * record.scale,
         start=record.start,
         end=record.end,
-        covariance=_covariance(jacobian, rest) * units * units[:, None],
+        covariance=_covariance(attempt.jacobian, rest) * attempt.units * attempt.units[:, None],
     )
     return found, loose is None
 
 
-def _loose(misfit: float, structure: float, local_structure: float) -> str | None:
+def _loose(name: str, misfit: float, structure: float, local_structure: float) -> str | None:
     """Say how the fit fails to follow the samples."""
     if misfit > MAX_MISFIT:
-        return f"one oscillator misses the energy by {misfit:.2g} of its standard deviation, more than {MAX_MISFIT}"
+        return f"{name} misses the energy by {misfit:.2g} of its standard deviation, more than {MAX_MISFIT}"
     if structure > MAX_STRUCTURE:
         return (
-            f"one oscillator leaves a systematic rest of {structure:.2g} of the energy's standard deviation, "
+            f"{name} leaves a systematic rest of {structure:.2g} of the energy's standard deviation, "
             f"more than {MAX_STRUCTURE}"
         )
     if local_structure > MAX_LOCAL_STRUCTURE:
         return (
-            f"one oscillator leaves a systematic rest of {local_structure:.2g} of the vibration energy "
+            f"{name} leaves a systematic rest of {local_structure:.2g} of the vibration energy "
             f"at the time, more than {MAX_LOCAL_STRUCTURE}"
         )
     return None
 
 
-def _implausible(mode: Mode, interval: float, least_periods: float, span: float) -> str | None:
+def _implausible(mode: Mode | Modes, interval: float, least_periods: float, span: float) -> str | None:
     """Say why a scaled fit that follows the samples is still no evidence of one free vibration."""
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
@@ -228,6 +297,8 @@ def _implausible(mode: Mode, interval: float, least_periods: float, span: float)
             f"the record shows {periods:.3g} vibration periods, fewer than the {least_periods} that tell a "
             "vibration from a drift"
         )
+    if mode.apart < _APART:
+        return "two of the modes have almost the same rate: their difference would not show within the record"
     if mode.alpha < -MAX_GROWTH:
         return (
             f"the vibration grows, alpha times the record's length is {mode.alpha:.2g}, below {-MAX_GROWTH}: "
@@ -236,10 +307,11 @@ def _implausible(mode: Mode, interval: float, least_periods: float, span: float)
     if mode.energy_plastic < MIN_PLASTIC:
         share = mode.energy_plastic
         return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
-    density = 1 / (2 * periods * interval)  # the energy has two periods in one of the vibration
+    fastest = mode.fastest / (2 * np.pi)
+    density = 1 / (2 * fastest * interval)  # the energy has two periods in one of the vibration
     if density < MIN_SAMPLES_PER_PERIOD:
         # a tenth finer than the limit, so that rounding to two digits stays on its safe side
-        finer = span / (2 * periods) / (1.1 * MIN_SAMPLES_PER_PERIOD)
+        finer = span / (2 * fastest) / (1.1 * MIN_SAMPLES_PER_PERIOD)
         return (
             f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}, and "
             f"aliasing may fake this mode: ask for an output interval of {finer:.2g} or less"

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from d2rpick.cards import ls_dyna
 from d2rpick.choice import verify
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.cards import PrintedCard
-    from d2rpick.choice import Verdict
+    from d2rpick.choice import Suggestion, Verdict
     from d2rpick.history import History
     from d2rpick.situation import Settings
 
@@ -22,6 +23,15 @@ def judged(
     plain = write(())
     verdict = verify(history, plain.tr, plain.td, settings)
     return write(tuple(_remarks(verdict))), verdict
+
+
+def of_suggestion(answer: Suggestion) -> tuple[PrintedCard, Verdict] | None:
+    """Write the LS-DYNA card of the recommended pair, judged; None without a pair or parts that are switched."""
+    pair, history = answer.recommended, answer.situation.history
+    if pair is None or not history.parts:
+        return None
+    ids = [part.id for part in history.parts]
+    return judged(lambda remarks: ls_dyna(pair.tr, pair.td, ids, remarks=remarks), history, answer.situation.settings)
 
 
 def _remarks(verdict: Verdict) -> Iterator[str]:

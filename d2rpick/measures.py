@@ -9,13 +9,29 @@ from q(tr) - q(td) and -q'(td).  All measures compare that difference with the v
 from __future__ import annotations
 
 from math import sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from d2rpick.history import Samples
     from d2rpick.mode import Mode
+
+
+class Vibration(Protocol):
+    """What the measures need to know: deformations with signs, of modes or of parts, and the energy of all."""
+
+    def amplitudes(self, t: Samples | float) -> Samples:
+        """Signed deformations, of the shape of ``t`` with an axis for modes or parts before it [sqrt(energy)]."""
+
+    def kinetic_energy(self, t: Samples | float) -> Samples:
+        """T [energy]."""
+
+    def vibration_energy(self, t: Samples | float) -> Samples:
+        """V [energy]."""
+
 
 # The growth of the lock-in error that ``timing_tolerance`` allows.
 TOLERATED_GROWTH = 0.05
@@ -35,20 +51,51 @@ def level_error(energy_tr: float, energy_td: float) -> float | None:
     return abs(sqrt(energy_tr / energy_td) - 1)
 
 
-def kinetic_share(mode: Mode, td: float) -> float:
+def kinetic_share(vibration: Vibration, td: float) -> float:
     """K = T(td)/V(td) [-]: the share of the vibration energy that is kinetic at td, which no tr can save.
 
     V = T + (q - q0)^2 is the energy of the vibration about the preload q0; without preload V = T + E.
     """
-    return float(mode.kinetic_energy(td) / mode.vibration_energy(td))
+    return float(vibration.kinetic_energy(td) / vibration.vibration_energy(td))
 
 
-def lock_in_error(mode: Mode, tr: Samples | float, td: float) -> Samples:
+def lock_in_error(vibration: Vibration, tr: Samples | float, td: float) -> Samples:
     """L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the deformation that is locked in, of the shape of ``tr``.
 
-    The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1.
+    The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1; for
+    several modes or parts the root of the sum of squares over them, since their energies add up.
     """
-    return np.asarray(np.abs(mode.deformation(tr) - mode.deformation(td)) / np.sqrt(mode.vibration_energy(td)))
+    apart = np.linalg.norm(_apart(vibration, tr, td), axis=0)
+    return np.asarray(apart / np.sqrt(vibration.vibration_energy(td)))
+
+
+def part_mismatch(vibration: Vibration, tr: Samples | float, td: float) -> Samples:
+    """D = L/sqrt(1 - K) [-]: the same error against the internal energy at td alone, of the shape of ``tr``."""
+    apart = np.linalg.norm(_apart(vibration, tr, td), axis=0)
+    return np.asarray(apart / np.linalg.norm(vibration.amplitudes(td)))
+
+
+def mismatch_shares(vibration: Vibration, tr: float, td: float) -> Samples:
+    """Give the share of each mode or part in D^2, shape (k,) [-]; zero where nothing is off."""
+    square = _apart(vibration, tr, td) ** 2
+    total = square.sum()
+    return square / total if total > 0 else square
+
+
+def sign_match(vibration: Vibration, tr: Samples | float, td: float) -> NDArray[np.bool_]:
+    """Whether the deformations at tr and td point the same way, of the shape of ``tr``.
+
+    For one mode or part: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a part which is
+    hardly deformed does not decide.
+    """
+    at_td = vibration.amplitudes(td)
+    return np.asarray(np.tensordot(at_td, vibration.amplitudes(tr), axes=1) >= 0)
+
+
+def _apart(vibration: Vibration, tr: Samples | float, td: float) -> Samples:
+    """q(tr) - q(td), of the shape of ``tr`` with an axis for modes or parts before it [sqrt(energy)]."""
+    at_tr = vibration.amplitudes(tr)
+    return np.asarray((at_tr.T - vibration.amplitudes(td)).T)
 
 
 def residual(lock_in: float, kinetic: float) -> float:
@@ -60,6 +107,29 @@ def residual(lock_in: float, kinetic: float) -> float:
     0.5
     """
     return sqrt(lock_in**2 + kinetic)
+
+
+def run_time_share(rigid_fraction: float, cost_share: float, step_ratio: float) -> float:
+    """Expected run time of the switched run over that of the reference, 1 - f (1 - (1 - c)/n) [-].
+
+    In the rigid window, a fraction f of the run, the share c of the cost of a step that the switched parts' elements
+    take is saved, and there are n times fewer steps.
+
+    Parameters
+    ----------
+    rigid_fraction : float
+        f = (td - tr)/(span of the record) [-].
+    cost_share : float
+        c, from 0 to 1 [-].
+    step_ratio : float
+        n, time step while rigid over that while deformable [-].
+
+    Examples
+    --------
+    >>> run_time_share(0.5, 0.8, 1.0), run_time_share(0.5, 0.5, 2.0)
+    (0.6, 0.625)
+    """
+    return 1 - rigid_fraction * (1 - (1 - cost_share) / step_ratio)
 
 
 def timing_tolerance(mode: Mode, tr: Samples, td: float) -> Samples:

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from d2rpick.history import Samples
 
 _EPS = float(np.finfo(np.float64).eps)
+# Of the amplitude: below, a deformation is zero but for rounding.
+_ZERO = 1e-9
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,21 @@ class Mode:
     preload: float = 0.0
 
     @property
+    def modes(self) -> tuple[Mode, ...]:
+        """The modes behind the energy: this one."""
+        return (self,)
+
+    @property
+    def fastest(self) -> float:
+        """Rate of the fastest mode, the only one [1/time]."""
+        return self.omega
+
+    @property
+    def apart(self) -> float:
+        """Least difference of the rates of two modes: there is no other [1/time]."""
+        return float("inf")
+
+    @property
     def omega_0(self) -> float:
         """Undamped angular rate, omega_0**2 = omega**2 + alpha**2 / 4 [1/time]."""
         return float(np.hypot(self.omega, self.alpha / 2))
@@ -74,6 +91,10 @@ class Mode:
     def velocity(self, t: Samples | float) -> Samples:
         """dq/dt [sqrt(energy)/time]."""
         return self._swing(t, *self._velocity_parts)
+
+    def amplitudes(self, t: Samples | float) -> Samples:
+        """Signed deformations of all modes, of the shape of ``t`` with an axis of length one before it."""
+        return self.deformation(t)[np.newaxis]
 
     def elastic_energy(self, t: Samples | float) -> Samples:
         """q(t)**2, the energy that springs back [energy]."""
@@ -93,6 +114,17 @@ class Mode:
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Energy of the vibration about the preload, V = (q - q_0)**2 + T; dV/dt = -2 alpha T [energy]."""
         return self._swing(t, self.cosine, self.sine) ** 2 + self.kinetic_energy(t)
+
+    def energy_slopes(self, t: Samples | float) -> tuple[Samples, Samples]:
+        """E' [energy/time] and E'' [energy/time^2], from q'' = -alpha q' - omega_0**2 (q - q_0)."""
+        q, velocity = self.deformation(t), self.velocity(t)
+        acceleration = -self.alpha * velocity - self.omega_0**2 * (q - self.preload)
+        return 2 * q * velocity, 2 * (velocity**2 + q * acceleration)
+
+    def energy_gradient(self, t: Samples, size: int) -> Samples:
+        """Derivatives of E(t) by the first ``size`` parameters in the order of the class, less origin, (size, n)."""
+        own = np.array([self.omega, self.alpha, self.cosine, self.sine, self.energy_plastic, self.preload])
+        return energy_and_jacobian(own, t - self.origin, size)[1]
 
     def standstill_after(self, t: Samples | float) -> Samples:
         """Find the first time at or after ``t`` where the deformation stands still; the next is half a period on."""
@@ -128,6 +160,13 @@ class Mode:
         cells = np.flatnonzero(above[:-1] * above[1:] < 0)  # between neighbouring extrema q is monotone
         return tuple(self._roots(level_q, edges[cells], edges[cells + 1], above[cells]).tolist())
 
+    def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
+        """Find the times in (start, td), ascending, where the energy passes its level at ``td`` [time]."""
+        level = float(self.deformation(td))
+        # a level of zero is met once by each passage, whatever rounding makes of its sign
+        levels = {level, -level} if abs(level) > _ZERO * np.sqrt(self.vibration_energy(td)) else {0.0}
+        return tuple(sorted(t for q in levels for t in self.crossings(q, start, td)))
+
     def _roots(self, level_q: float, low: Samples, high: Samples, above_low: Samples) -> Samples:
         """Root of q = level_q in each bracket: Newton, and halving where Newton leaves the bracket."""
         t = (low + high) / 2
@@ -156,3 +195,22 @@ class Mode:
         decay = np.exp(-self.alpha / 2 * s)
         swing: Samples = decay * (cosine * np.cos(angle) + sine * np.sin(angle))
         return swing
+
+
+def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Samples, Samples]:
+    """Return E(s), shape (n,), and its derivatives by the first ``size`` parameters, shape (size, n).
+
+    The parameters are omega, alpha, cosine, sine, energy_plastic, preload of a `Mode` with its origin at s = 0.
+    """
+    omega, alpha, cosine, sine, plastic, preload = parameters
+    angle, decay = omega * s, np.exp(-alpha / 2 * s)
+    cos, sin = decay * np.cos(angle), decay * np.sin(angle)
+    swing = cosine * cos + sine * sin
+    q = preload + swing
+    jacobian = np.ones((6, s.size))
+    jacobian[0] = 2 * q * s * (sine * cos - cosine * sin)
+    jacobian[1] = -q * s * swing
+    jacobian[2] = 2 * q * cos
+    jacobian[3] = 2 * q * sin
+    jacobian[5] = 2 * q
+    return plastic + q * q, jacobian[:size]

@@ -42,13 +42,15 @@ _MOST_ATTACHED = 12
 class FreeFlight:
     """Window [time] in which ``parts`` fly freely together; None for parts: the whole model.
 
-    ``end_seen`` is False where the record ends while it still flies.
+    ``end_seen`` is False where the record ends while it still flies.  ``damping`` is alpha, by which the momentum
+    decays there [1/time].
     """
 
     start: float
     end: float
     parts: tuple[Part, ...] | None
     end_seen: bool
+    damping: float = 0.0
 
 
 def to_be_asked(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
@@ -92,8 +94,12 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float) -> FreeFlight
         return FreeFlight(float(time[0]), float(time[-1]), parts, False) if _moves(momenta, members, noise) else None
     if noise > TOLERANCE * extent:
         return None
-    window = _lasting_window(_Fit(time, momentum), td, extent, noise)
-    return window and FreeFlight(*window, parts, window[1] < time[-1])
+    fit = _Fit(time, momentum)
+    window = _lasting_window(fit, td, extent, noise)
+    if window is None:
+        return None
+    first, last = window
+    return FreeFlight(float(time[first]), float(time[last]), parts, time[last] < time[-1], fit.damping(first, last))
 
 
 def all_flights(momenta: Momenta) -> tuple[FreeFlight, ...]:
@@ -121,8 +127,8 @@ def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
     return size > _VISIBLE * noise
 
 
-def _lasting_window(fit: _Fit, td: float, extent: float, noise: float) -> tuple[float, float] | None:
-    """Find the window around ``td`` with a misfit within the tolerance that a tighter one does not shrink, or None."""
+def _lasting_window(fit: _Fit, td: float, extent: float, noise: float) -> tuple[int, int] | None:
+    """Find the states around ``td`` with a misfit within the tolerance that a tighter one does not shrink, or None."""
     time, room, tight = fit.time, TOLERANCE * extent + noise, _TIGHTER * TOLERANCE * extent + noise
     first, last = fit.window(td, room)
     length = time[last] - time[first]
@@ -131,7 +137,7 @@ def _lasting_window(fit: _Fit, td: float, extent: float, noise: float) -> tuple[
     tight_first, tight_last = fit.window(td, tight)
     if time[tight_last] - time[tight_first] < (1 + np.cbrt(tight / room)) / 2 * length:
         return None
-    return float(time[first]), float(time[last])
+    return first, last
 
 
 class _Fit:
@@ -173,13 +179,21 @@ class _Fit:
 
     def _misfit(self, i: int, j: int) -> float:
         """Largest deviation of the momentum from free flight between two states [momentum]."""
-        i, j = min(i, j), max(i, j) + 1
-        if j - i < 4:  # three numbers per component fit any three states
+        if abs(j - i) < 3:  # three numbers per component fit any three states
             return 0.0
-        p, impulse = _bent(self.time[i:j], self.momentum[i:j]), _bent(self.time[i:j], self.integral[i:j])
-        power = float(np.sum(impulse**2))
-        alpha = max(0.0, -float(np.sum(impulse * p)) / power) if power > 0 else 0.0
+        p, impulse, alpha = self._fitted(min(i, j), max(i, j))
         return float(np.abs(p + alpha * impulse).max())
+
+    def damping(self, first: int, last: int) -> float:
+        """Least-squares alpha between two states [1/time]."""
+        return self._fitted(first, last)[2]
+
+    def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
+        """What is not straight of momentum and impulse, and the alpha >= 0 that explains the one by the other."""
+        states = slice(first, last + 1)
+        p, impulse = (_bent(self.time[states], values[states]) for values in (self.momentum, self.integral))
+        power = float(np.sum(impulse**2))
+        return p, impulse, max(0.0, -float(np.sum(impulse * p)) / power) if power > 0 else 0.0
 
 
 def _bent(time: Samples, values: Samples) -> Samples:

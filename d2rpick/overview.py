@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import FormatError
+from d2rpick.health import Health, assess
 from d2rpick.momentum import FreeFlight, all_flights, to_be_asked
+from d2rpick.readers.balance import balance_of
 from d2rpick.readers.companions import doubts
 from d2rpick.readers.selection import select_parts
 
@@ -44,7 +46,8 @@ class Overview:
     Times in the unit of the run, which ``time_unit`` gives only where a file names it.  ``sampling`` is None where
     there is a single state; it and the times are None where there is no state, and they and ``states`` where the time
     has to be chosen among several columns.
-    ``flights`` are the windows in which the parts asked for, or all, fly freely by their momentum.
+    ``flights`` are the windows in which the parts asked for, or all, fly freely by their momentum, ``health`` is that
+    of the run, with the longest of them as its window; None without energies.
     """
 
     source: tuple[str, ...]
@@ -60,6 +63,7 @@ class Overview:
     channels: tuple[str, ...]
     parts: tuple[PartOverview, ...]
     flights: tuple[FreeFlight, ...]
+    health: Health | None
     notes: tuple[str, ...]
 
 
@@ -76,6 +80,7 @@ def survey(run: Run, selection: Selection) -> Overview:
     except FormatError as error:  # several columns may be the time: there is still a list of them
         notes.append(str(error))
     steps = np.diff(time)
+    flights = _flights(run, selection)
     return Overview(
         source=run.sources,
         format=" + ".join(database.format for database in run.databases),
@@ -89,7 +94,8 @@ def survey(run: Run, selection: Selection) -> Overview:
         complete=all(database.complete for database in run.databases),
         channels=tuple(dict.fromkeys(name for database in run.databases for name in database.channels)),
         parts=tuple(_overviews(run)),
-        flights=_flights(run, selection),
+        flights=flights,
+        health=_health(run, flights),
         notes=tuple(dict.fromkeys(notes)),
     )
 
@@ -116,6 +122,14 @@ def _highest(run: Run, part: Part) -> float | None:
         return float(run.part_energies([part]).max())
     except FormatError:
         return None
+
+
+def _health(run: Run, flights: tuple[FreeFlight, ...]) -> Health | None:
+    balance = balance_of(run, run.parts)
+    if balance is None:
+        return None
+    longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)
+    return assess(balance, (longest.start, longest.end) if longest else None)
 
 
 def _flights(run: Run, selection: Selection) -> tuple[FreeFlight, ...]:

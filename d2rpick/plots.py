@@ -3,32 +3,51 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import PurePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from d2rpick.errors import FormatError
+from d2rpick.mode import Mode
 from d2rpick.replay import Replay, Trajectory, from_mode
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from matplotlib.axes import Axes
 
     from d2rpick.candidates import Candidate
     from d2rpick.choice import Suggestion, Verdict
+    from d2rpick.exhibits import Exhibit, Panel
+    from d2rpick.history import Samples
     from d2rpick.situation import Situation
     from d2rpick.study import Study
 
 FORMATS = ("png", "svg", "pdf")
 # Okabe and Ito's palette: told apart with any colour vision.
 _REFERENCE, _SWITCHED, _GOOD, _FLIGHT = "#000000", "#d55e00", "#009e73", "#56b4e9"
+_COLOURS = (_REFERENCE, _SWITCHED, _GOOD)
+_STYLES: Final[Mapping[str, dict[str, Any]]] = {
+    "line": {"linewidth": 1}, "thin": {"linewidth": 0.6, "linestyle": "--"}, "dots": {"linestyle": "", "marker": "."},
+}  # fmt: skip
+# Dots on a curve: few enough that the line below stays in sight.
+_DOTS = 100
 # Beyond this ratio of the highest energy to the level, the level would vanish on a linear axis.
 _LOGARITHMIC = 20.0
 _DECADES_BELOW_LEVEL = 2.0
 # Up to so many candidates their marks leave the curve visible.
 _FEW = 40
+# Many curves over each other are together as dark as so many, and none is fainter than this.
+_DARK, _FAINTEST = 10, 0.02
+# Width of a figure, and the height of one panel and of two [inch]; on a narrow page letters keep their size.
+_SIZES = {False: (10.0, 4.0, 6.5), True: (4.2, 3.9, 6.6)}
+# Share of the axes that the label of a switch time takes up, at most.
+_LABEL = {False: 0.14, True: 0.3}
 
 
 def format_of(name: str) -> str:
@@ -40,16 +59,37 @@ def format_of(name: str) -> str:
 
 
 def render(figure: Figure, name: str) -> bytes:
-    """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for."""
-    content = io.BytesIO()
-    figure.savefig(content, format=format_of(name), dpi=150)
+    """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for, always the same."""
+    content, form = io.BytesIO(), format_of(name)
+    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
+    with mpl.rc_context({"svg.hashsalt": "d2rpick"}):
+        figure.savefig(content, format=form, dpi=150, metadata=undated)
     return content.getvalue()
 
 
-def draw_suggestion(answer: Suggestion) -> Figure:
+def svg_element(figure: Figure, prefix: str) -> str:
+    """Turn a figure into an SVG element for a page, whose ids all begin with ``prefix``; letters stay letters."""
+    content = io.StringIO()
+    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": prefix}):
+        figure.savefig(content, format="svg", metadata=nothing)
+    element = content.getvalue()
+    element = element[element.index("<svg") :]
+    element = re.sub(r' (?:width|height)="[\d.]+pt"', "", element, count=2)  # the page says how wide
+    element = re.sub(r'(?<= id=")|(?<=href="#)|(?<=url\(#)', prefix, element)
+    return element.replace("<svg", '<svg role="img"', 1)
+
+
+def draw_suggestion(answer: Suggestion, *, narrow: bool = False) -> Figure:
     """Energy with level, candidates and the recommended pair; below it the motion after that pair."""
     tr = answer.recommended.tr if answer.recommended else None
-    return _draw(answer.situation, answer.candidates, tr)
+    return _draw(answer.situation, answer.candidates, tr, narrow=narrow)
+
+
+def draw_better(answer: Suggestion, *, narrow: bool = False) -> Figure:
+    """Draw the same for the better pair; there must be one."""
+    assert answer.better_td is not None
+    return _draw(answer.situation.at(answer.better_td.td), (), answer.better_td.tr, narrow=narrow)
 
 
 def draw_verdict(answer: Verdict) -> Figure:
@@ -74,63 +114,111 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
     return figure
 
 
-def draw_study(answer: Study) -> Figure:
+def draw_study(answer: Study, *, narrow: bool = False) -> Figure:
     """Energies of all runs over each other, the tr of each, the common one and td."""
-    figure = Figure(figsize=(10, 5), layout="constrained")
+    width, height, _ = _SIZES[narrow]
+    figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots()
     curves = [row.curve for row in answer.rows if row.curve is not None]
-    alone = len(curves) == 1
     many = len(curves) > _FEW
-    # as a whole they stay as dark as ten lines
+    # taken together they stay as dark as ten lines
     lines = LineCollection(
-        [curve.T for curve in curves], colors=_REFERENCE, linewidths=1 if alone else 0.6,
-        alpha=max(0.02, min(1.0, 10 / len(curves))) if curves else 1, rasterized=many,
-        label="internal energy" if alone else f"internal energy of {len(curves)} runs",
+        [curve.T for curve in curves], colors=_REFERENCE, linewidths=0.6 if many else 1, rasterized=many,
+        alpha=max(_FAINTEST, min(1.0, _DARK / max(1, len(curves)))),
+        label="internal energy" if len(curves) == 1 else f"internal energy of {len(curves)} runs",
     )  # fmt: skip
     axes.add_collection(lines)
     axes.autoscale_view()
     if answer.common.window:
         axes.axvspan(*answer.common.window, color=_GOOD, alpha=0.2, linewidth=0, label="acceptable in all runs")
-    points = [(row.tr, row.energy_td) for row in answer.rows if row.tr is not None]
-    if points:
+    points = np.array([(row.tr, row.energy_td) for row in answer.rows if row.tr is not None])
+    if points.size:
         axes.scatter(
-            *zip(*points, strict=True), s=8 if many else 28, linewidths=0.7, facecolors=_GOOD, edgecolors="white",
+            points[:, 0], points[:, 1], s=8 if many else 28, linewidths=0.7, facecolors=_GOOD, edgecolors="white",
             zorder=3, label="tr of each run", rasterized=many,
         )  # fmt: skip
-    _mark(axes, answer.common.tr, answer.td)
-    levels = [energy for _, energy in points if energy is not None]
-    highest = max((float(curve[1].max()) for curve in curves), default=0.0)
-    if levels and min(levels) > 0 and highest > _LOGARITHMIC * max(levels):
-        axes.set_yscale("log")
-        axes.set_ylim(bottom=min(min(levels) / 2, float(np.median(levels)) / 10**_DECADES_BELOW_LEVEL))
+        _scale(axes, points[:, 1], max(float(curve[1].max()) for curve in curves))
     units = {row.time_unit for row in answer.rows if row.judged}
     unit = units.pop() if len(units) == 1 else ""
     axes.set(xlabel=f"time [{unit}]" if unit else "time", ylabel="internal energy")
-    _finish(axes)
+    _finish(axes, legend=not narrow)
+    if narrow:
+        figure.legend(loc="outside lower left", ncols=1, fontsize="small", frameon=False)
+    _mark(axes, answer.common.tr, answer.td, _LABEL[narrow])
     return figure
 
 
-def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | None) -> Figure:
-    with_motion = tr is not None and situation.described(tr)
-    figure = Figure(figsize=(10, 6.5 if with_motion else 4), layout="constrained")
+def _scale(axes: Axes, levels: Samples, highest: float) -> None:
+    """Make the axis logarithmic where the levels would vanish on a linear one; the lowest stays in sight."""
+    if levels.min() > 0 and highest > _LOGARITHMIC * levels.max():
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=min(float(levels.min()) / 2, float(np.median(levels)) / 10**_DECADES_BELOW_LEVEL))
+
+
+def draw_exhibit(exhibit: Exhibit) -> Figure:
+    """All panels of an exhibit over their common time."""
+    rows, columns = len(exhibit.panels), len(exhibit.panels[0])
+    figure = Figure(figsize=(9 if columns == 1 else 5.2 * columns, 3.2 * rows), layout="constrained")
+    figure.suptitle(exhibit.title, fontsize="medium")
+    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for axes, panel in zip(grid.flat, (panel for row in exhibit.panels for panel in row), strict=True):
+        _draw_panel(axes, panel, exhibit.columns)
+    for axes in grid[-1]:
+        axes.set_xlabel("time [ms]")
+    return figure
+
+
+def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
+    time = next(iter(columns.values()))
+    drawn = dict.fromkeys(_STYLES, 0)
+    for curve in panel.curves:
+        every = max(1, time.size // _DOTS) if curve.style == "dots" else 1
+        axes.plot(
+            time[::every], columns[curve.column][::every], label=curve.label,
+            color=_COLOURS[drawn[curve.style]], **_STYLES[curve.style],
+        )  # fmt: skip
+        drawn[curve.style] += 1
+    for name, level in panel.levels:
+        axes.axhline(level, color=_SWITCHED, linewidth=0.8, label=name)
+        _show_level(axes, level, max(float(columns[curve.column].max()) for curve in panel.curves))
+    for x, y in panel.points:
+        axes.plot(x, y, "o", color=_GOOD, markersize=5)
+    if panel.rigid:
+        axes.axvspan(*panel.rigid, color=_FLIGHT, alpha=0.2, linewidth=0, label="rigid")
+    axes.set_title(panel.title, fontsize="small")
+    axes.set_ylabel(panel.ylabel)
+    _finish(axes, legend=False)
+    axes.legend(fontsize="small", loc="best")
+
+
+def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | None, *, narrow: bool = False) -> Figure:
+    with_motion = tr is not None and isinstance(situation.mode, Mode) and situation.described(tr)
+    width, one, two = _SIZES[narrow]
+    figure = Figure(figsize=(width, two if with_motion else one), layout="constrained")
     axes = figure.subplots(2 if with_motion else 1, 1, sharex=True, squeeze=False)[:, 0]
-    _draw_energy(axes[0], situation, candidates, tr)
+    _draw_energy(axes[0], situation, candidates)
     if with_motion and tr is not None:
         _draw_motion(axes[1], situation, tr)
     unit = situation.history.time_unit
     axes[-1].set_xlabel(f"time [{unit}]" if unit else "time")
     for panel in axes:
-        _finish(panel)
+        _finish(panel, legend=not narrow)
+        _mark(panel, tr, situation.td, _LABEL[narrow])
+    if narrow:  # a legend inside would hide the curves
+        axes[-1].locator_params(axis="x", nbins=4)
+        known = [dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True)) for panel in axes]
+        handles = {name: handle for one in known for name, handle in one.items()}
+        figure.legend(handles.values(), handles, loc="outside lower left", ncols=2, fontsize="small", frameon=False)
     return figure
 
 
-def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, ...], tr: float | None) -> None:
+def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, ...]) -> None:
     history, level, flight = situation.history, situation.energy_td, situation.flight
     if flight.start is not None:
         known = situation.span.end if situation.span else situation.td  # without a contact, as far as it was seen
         end = known if flight.end is None else flight.end
         axes.axvspan(flight.start, end, color=_FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
-    axes.plot(history.time, history.energy, color=_REFERENCE, linewidth=1, label=history.channel)
+    axes.plot(history.time, history.energy, color=_REFERENCE, linewidth=1, label=_plain(history.channel))
     axes.axhline(level, color=_SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
     for acceptable, fill, name in ((True, _GOOD, "acceptable tr"), (False, "none", "other candidates")):
         some = [c for c in candidates if c.acceptable == acceptable]
@@ -140,16 +228,19 @@ def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, 
             axes.scatter(
                 times, energies, s=size, linewidths=0.7, facecolors=fill, edgecolors=_GOOD, zorder=3, label=name
             )
-    _mark(axes, tr, situation.td)
-    if level > 0 and float(history.energy.max()) > _LOGARITHMIC * level:
+    _show_level(axes, level, float(history.energy.max()))
+    axes.set_ylabel("internal energy")
+
+
+def _show_level(axes: Axes, level: float, highest: float) -> None:
+    if level > 0 and highest > _LOGARITHMIC * level:
         axes.set_yscale("log")
         axes.set_ylim(bottom=level / 10**_DECADES_BELOW_LEVEL)
-    axes.set_ylabel("internal energy")
 
 
 def _draw_motion(axes: Axes, situation: Situation, tr: float) -> None:
     mode, span, td = situation.mode, situation.span, situation.td
-    assert mode is not None
+    assert isinstance(mode, Mode)
     assert span is not None
     time = np.linspace(span.start, max(span.end, td), 2000)
     oscillator, start = from_mode(mode, span.start)
@@ -159,13 +250,23 @@ def _draw_motion(axes: Axes, situation: Situation, tr: float) -> None:
         (replay.motion(time), _SWITCHED, "switched"),
     ):
         axes.plot(time, mode.preload + states.y - states.z, color=colour, linewidth=1, label=name)
-    _mark(axes, tr, td)
-    axes.set_ylabel("deformation [square root of energy]")
+    axes.set_ylabel("deformation [√energy]")
 
 
-def _mark(axes: Axes, tr: float | None, td: float) -> None:
-    """Mark the switch times; their labels stand above the axes, away from each other and from the curves."""
-    for name, time, side in (("tr", tr, "right"), ("td", td, "left")):
+def _mark(axes: Axes, tr: float | None, td: float, width: float) -> None:
+    """Mark the switch times; their labels stand above the axes, away from each other and from the edges.
+
+    A label takes up ``width`` of the axes: where one would reach over an edge it changes its side if there is room.
+    """
+    low, high = axes.get_xlim()
+    places = [None if time is None else (time - low) / (high - low) for time in (tr, td)]
+    room = 1.0 if places[0] is None or places[1] is None else places[1] - places[0]
+    sides = ["right", "left"]
+    if places[0] is not None and places[0] < width < room:
+        sides[0] = "left"
+    if places[1] is not None and places[1] > 1 - width and room > width * (1 + (sides[0] == "left")):
+        sides[1] = "right"
+    for name, time, side in zip(("tr", "td"), (tr, td), sides, strict=True):
         if time is not None:
             axes.axvline(time, color=_SWITCHED, linestyle="--", linewidth=0.8)
             axes.annotate(
@@ -174,7 +275,13 @@ def _mark(axes: Axes, tr: float | None, td: float) -> None:
             )  # fmt: skip
 
 
-def _finish(axes: Axes) -> None:
+def _finish(axes: Axes, *, legend: bool = True) -> None:
     axes.grid(visible=True, linewidth=0.3)
     axes.margins(x=0)
-    axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    if legend:
+        axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _plain(name: str) -> str:
+    """Keep a name from a file from being read as a formula, or, with an underscore in front, as one to be hidden."""
+    return name.replace("$", r"\$") if not name.startswith("_") else f" {name}".replace("$", r"\$")

@@ -13,6 +13,7 @@ from d2rpick.oscillator import Oscillator, State
 
 if TYPE_CHECKING:
     from d2rpick.history import Samples
+    from d2rpick.modes import Modes
 
 
 @dataclass(frozen=True)
@@ -55,23 +56,29 @@ class Replay:
 
     def residual(self) -> float:
         """Energy norm of what the switched run lacks at td, over that of the reference vibration [-]."""
-        return float(residual(self.oscillator, self.reference(self.td), self.motion(self.td)))
+        reference = self.reference(self.td)
+        lack = lacking_energy(self.oscillator, reference, self.motion(self.td))
+        return float(np.sqrt(lack / self.oscillator.vibration_energy(reference)))
 
 
-def residual(oscillator: Oscillator, reference: State, switched: State) -> Samples:
-    """Energy norm of what ``switched`` lacks, over that of the vibration of ``reference`` [-].
-
-    Both are states at td, numbers or arrays; R of a replayed motion.
-    """
+def lacking_energy(oscillator: Oscillator, reference: State, switched: State) -> Samples:
+    """Energy of the vibration that ``switched`` lacks against ``reference``, states at td, numbers or arrays."""
     lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
-    return np.sqrt(oscillator.vibration_energy(lack) / oscillator.vibration_energy(reference))
+    return oscillator.vibration_energy(lack)
 
 
-def replayed_residual(mode: Mode, tr: Samples, td: float) -> Samples:
-    """Replay each tr of shape (n,) up to ``td`` and give the residual there [-]."""
-    oscillator, at_td = from_mode(mode, td)
-    at_tr = oscillator.free(at_td, tr - td)  # the closed form runs backwards as well
-    return residual(oscillator, at_td, oscillator.rigid(at_tr, td - tr))
+def replayed_residual(vibration: Mode | Modes, tr: Samples, td: float) -> Samples:
+    """Replay each tr of shape (n,) up to ``td`` and give the residual there, of all modes together [-].
+
+    Energy norm of what the switched run lacks at td, over that of the reference vibration.
+    """
+    lack, whole = np.zeros(tr.shape), 0.0
+    for mode in vibration.modes:
+        oscillator, at_td = from_mode(mode, td)
+        at_tr = oscillator.free(at_td, tr - td)  # the closed form runs backwards as well
+        lack += lacking_energy(oscillator, at_td, oscillator.rigid(at_tr, td - tr))
+        whole += float(oscillator.vibration_energy(at_td))
+    return np.sqrt(lack / whole)
 
 
 def from_mode(mode: Mode, time: float) -> tuple[Oscillator, State]:

@@ -9,15 +9,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick import measures
+from d2rpick.crossings import find_extrema
+from d2rpick.envelope import upper_envelope
 from d2rpick.errors import RangeError
 from d2rpick.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
-from d2rpick.identify import Identification, assess, identify
+from d2rpick.identify import Identification, assess, identify, identify_several
+from d2rpick.modes import Modes
 from d2rpick.momentum import FreeFlight, flight_around, to_be_asked
+from d2rpick.profile import Profile
+from d2rpick.signs import Parts, PartVibration, read_parts
 
 if TYPE_CHECKING:
-    from d2rpick.history import History
+    from d2rpick.history import History, Samples
     from d2rpick.mode import Mode
 
+# Of the fastest mode: what a parabola through three of them misses of a minimum is of the order of 1e-4 of a period.
+_POINTS_PER_PERIOD = 64
 # Where the scatter of the last period exceeds this share of the vibration energy at td, the vibration has sunk
 # into it: its sign is no longer certain.
 _DROWNED = 0.2
@@ -33,7 +40,8 @@ class Settings:
     the next contact.  ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
     given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
-    the energy level alone.
+    the energy level alone.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the
+    step while rigid to that while deformable; without the first nothing is said of the run time.
     """
 
     after: float | None = None
@@ -44,6 +52,8 @@ class Settings:
     oscillator: Mode | None = None
     fit_window: tuple[float, float] | None = None
     replay: bool = True
+    cost_share: float | None = None
+    step_ratio: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,8 @@ class Situation:
     """A history seen from one td [time].
 
     ``fit`` is None only where no oscillator was looked for; ``span`` is the window in which it describes the record.
+    ``parts`` are the deformations of single parts, where their energies are known and an oscillator was looked for;
+    ``part_vibration`` is their vibration, where they have a sign.
     """
 
     history: History
@@ -59,15 +71,17 @@ class Situation:
     flight: Flight
     fit: Identification | None
     span: Span | None
+    parts: Parts | None = None
+    part_vibration: PartVibration | None = None
 
     @cached_property
-    def mode(self) -> Mode | None:
-        """Mode of the oscillator where it can be relied on at td."""
+    def mode(self) -> Mode | Modes | None:
+        """Mode of the oscillator, or several, where it can be relied on at td."""
         return None if self.no_mode else self.fitted
 
     @property
-    def fitted(self) -> Mode | None:
-        """Mode of the oscillator that describes the span, whatever it is worth at td."""
+    def fitted(self) -> Mode | Modes | None:
+        """Mode of the oscillator, or several, that describes the span, whatever it is worth at td."""
         return self.fit.mode if self.fit and self.span else None
 
     @cached_property
@@ -94,8 +108,13 @@ class Situation:
 
     @property
     def basis(self) -> str:
-        """What a choice rests on: "oscillator" or "energy"."""
-        return "oscillator" if self.mode else "energy"
+        """What a choice rests on: "parts", "oscillator" (one or several of them) or "energy"."""
+        return "parts" if self.part_vibration else "oscillator" if self.mode else "energy"
+
+    @property
+    def vibration(self) -> PartVibration | Mode | Modes | None:
+        """Deformations with their signs, or None on basis "energy"."""
+        return self.part_vibration or self.mode
 
     @property
     def energy_td(self) -> float:
@@ -103,9 +122,22 @@ class Situation:
         return self.energy_at(self.td)
 
     @property
+    def no_vibration(self) -> str | None:
+        """Why no deformation with its sign is known, None where one is."""
+        if self.vibration:
+            return None
+        unsigned = self.parts.unsigned if self.parts else ()
+        return "; ".join([self.no_mode or "", *(f"{part.name}: {part.reason}" for part in unsigned)])
+
+    @property
     def kinetic_share(self) -> float | None:
         """K, or None on basis "energy" [-]."""
-        return measures.kinetic_share(self.mode, self.td) if self.mode else None
+        return measures.kinetic_share(self.vibration, self.td) if self.vibration else None
+
+    @property
+    def kinetic_share_estimated(self) -> bool:
+        """Whether K comes from the envelope of the energy, for want of an oscillator that describes the record."""
+        return self.part_vibration is not None and self.mode is None
 
     @property
     def prescribed(self) -> bool:
@@ -134,12 +166,58 @@ class Situation:
         """End of the flight with the margin; infinite when no contact was seen [time]."""
         return float("inf") if self.flight.end is None else self.flight.end - self.settings.margin
 
+    @property
+    def in_flight(self) -> bool:
+        """Whether td lies in a known flight, with the margin."""
+        return self.earliest_tr is not None and self.earliest_tr < self.td <= self.latest_td
+
+    def peaks(self, start: float, end: float) -> tuple[float, ...]:
+        """Times in (start, end], ascending, where the energy peaks: of the oscillator, of the samples without one."""
+        if self.fitted and self.span:
+            return self.fitted.peaks(max(start, self.span.start), min(end, self.span.end))
+        history = self.history
+        return tuple(e.time for e in find_extrema(history.time, history.energy) if e.peak and start < e.time <= end)
+
     def described(self, time: float) -> bool:
         """Whether there is an oscillator to rely on that describes the record at ``time``."""
         return self.mode is not None and self._in_span(time)
 
     def _in_span(self, time: float) -> bool:
         return self.span is not None and self.span.start <= time <= self.span.end
+
+    @property
+    def measured_span(self) -> tuple[float, float]:
+        """First and last time whose deformation can be compared with that at td; nothing is between them without."""
+        if self.part_vibration:
+            parts = self.part_vibration.parts
+            return parts.comparable_since(self.td), float(parts.time[-1])
+        return self.span if self.mode and self.span else (np.inf, -np.inf)
+
+    def measured(self, time: float) -> bool:
+        """Whether the deformation at ``time`` can be compared with that at td."""
+        first, last = self.measured_span
+        return first <= time <= last
+
+    @cached_property
+    def profile(self) -> Profile | None:
+        """Lock-in error over all times before td that can be compared with it; None where it has a closed form."""
+        if self.part_vibration:
+            parts = self.part_vibration.parts
+            known = parts.time[parts.time >= parts.comparable_since(self.td)]
+            return Profile.of(self.part_vibration, known, self.td)
+        if isinstance(self.mode, Modes) and self.span:
+            step = 2 * np.pi / self.mode.fastest / _POINTS_PER_PERIOD
+            count = max(3, int(np.ceil((self.td - self.span.start) / step)) + 1)
+            return Profile.of(self.mode, np.linspace(self.span.start, self.td, count), self.td)
+        return None
+
+    def turns_since(self, time: float) -> int:
+        """How often the sampled energy turns between ``time`` and td."""
+        return int(np.count_nonzero((self._turns > time) & (self._turns < self.td)))
+
+    @cached_property
+    def _turns(self) -> Samples:
+        return np.array([e.time for e in find_extrema(self.history.time, self.history.energy)])
 
     def energy_at(self, time: float) -> float:
         """Energy at ``time``: of the oscillator where it describes the record, of the samples elsewhere [energy]."""
@@ -168,7 +246,12 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
         _inside(history, settings.after, "--after")
     seen = next(filter(None, (flight_around(momenta, td) for momenta in to_be_asked(history.momenta))), None)
     fit, span = _oscillator(history, td, settings, seen)
-    return Situation(history, td, settings, _flight(history, td, settings.after, seen, span), fit, span)
+    situation = Situation(history, td, settings, _flight(history, td, settings.after, seen, span), fit, span)
+    if history.part_energies is None or not settings.replay:
+        return situation
+    # without a sign of the next contact nothing is known of what comes after td
+    end = situation.flight.end or (float(history.time[-1]) if seen or span else td)
+    return _with_parts(situation, history.part_energies, end)
 
 
 def _oscillator(
@@ -185,9 +268,27 @@ def _oscillator(
             _inside(history, bound, "--fit-window")
         fit = identify_within(history, Span(*settings.fit_window))
         return fit, span_of(history, td, fit, bounds) if fit.describes_record else None
-    fitter = partial(assess, settings.oscillator) if settings.oscillator else identify
-    span, fit = described_span(history, td, bounds, fitter, whole=seen is not None)
+    if settings.oscillator:
+        span, fit = described_span(history, td, bounds, partial(assess, settings.oscillator), whole=seen is not None)
+        return fit, span
+    span, fit = described_span(history, td, bounds, identify, whole=seen is not None)
+    if span is None:
+        span, several = described_span(history, td, bounds, identify_several, whole=seen is not None)
+        fit = several if span else fit
     return fit, span
+
+
+def _with_parts(situation: Situation, energies: Samples, end: float) -> Situation:
+    """Add what the energies of single parts, (n, k), tell of the flight up to ``end``."""
+    history, td, start = situation.history, situation.td, situation.flight.start
+    first = min(td, float(history.time[0]) if start is None else start)
+    inside = slice(*np.searchsorted(history.time, [first, np.nextafter(end, np.inf)]))
+    if history.time[inside].size < 3:
+        return situation
+    parts = read_parts(history.time[inside], energies[inside], history.part_names)
+    whole = situation.mode or upper_envelope(history.time[inside], history.energy[inside])
+    vibration = PartVibration(parts, whole) if parts.signed and whole else None
+    return replace(situation, parts=parts, part_vibration=vibration)
 
 
 def _flight(history: History, td: float, after: float | None, seen: FreeFlight | None, span: Span | None) -> Flight:
@@ -195,7 +296,7 @@ def _flight(history: History, td: float, after: float | None, seen: FreeFlight |
     if seen:
         end = seen.end if seen.end_seen else None
         start, source = (seen.start, "momentum") if after is None else (after, "given")
-        return Flight(start, end, source, seen.parts)
+        return Flight(start, end, source, seen.parts, seen.damping)
     end = span.end if span and span.end < history.time[-1] else None
     if after is not None:
         return Flight(after, end, "given")
@@ -210,7 +311,7 @@ def _inside(history: History, time: float, option: str) -> None:
         )
 
 
-def _drowned(history: History, td: float, mode: Mode, span: Span | None) -> str | None:
+def _drowned(history: History, td: float, mode: Mode | Modes, span: Span | None) -> str | None:
     """Say so when the vibration at td is no more than the scatter of the record about it."""
     assert span is not None  # td lies in it
     last = (history.time >= max(td - 2 * np.pi / mode.omega, span.start)) & (history.time <= max(td, span.start))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,9 +13,10 @@ import numpy as np
 from d2rpick import __version__
 from d2rpick.acceptable import acceptable_windows, common_windows, coverage
 from d2rpick.cautions import Caution
-from d2rpick.choice import suggest
+from d2rpick.choice import suggest, with_health
 from d2rpick.errors import D2RPickError, RangeError
 from d2rpick.readers import Selection, open_run
+from d2rpick.readers.balance import balance_of
 from d2rpick.readers.names import listing
 from d2rpick.readers.source import expand
 
@@ -37,13 +38,16 @@ _SAVED = 0.5
 _STRETCHES = 200
 
 
+_DEFAULT = Selection()
+
+
 @dataclass(frozen=True)
 class Question:
     """What is asked of every run: ``curve`` whether its energy will be drawn."""
 
     td: float
     settings: Settings
-    selection: Selection = Selection()
+    selection: Selection = _DEFAULT
     input_format: str = "auto"
     curve: bool = False
     tool_version: str = __version__
@@ -152,21 +156,19 @@ def ask(question: Question, source: str) -> Row:
         run = open_run([source], question.selection, question.input_format)
         history = run.history(question.selection, with_momenta=True)
         answer = suggest(history, question.td, question.settings)
+        if balance := balance_of(run, history.parts, question.td):
+            answer = with_health(answer, balance)
     except (D2RPickError, OSError) as error:
         status = OUT_OF_RANGE if isinstance(error, RangeError) else UNREADABLE
         text = f"{source}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)
         return Row(source, status, text, files=files)
     best = next((candidate for candidate in answer.candidates if candidate.recommended), None)
     said = {caution.code: caution.message for caution in answer.cautions}
-    return Row(
+    row = Row(
         source=source,
-        status=OK if best else NONE,
+        status=NONE,
         message=said.get("no-candidate"),
-        tr=best and best.tr,
-        tr_low=best and best.tr_low,
-        tr_high=best and best.tr_high,
         energy_td=answer.situation.energy_td,
-        residual=best and best.residual,
         basis=answer.situation.basis,
         warnings=tuple(code for code in said if code not in _NOT_REPEATED),
         time_unit=history.time_unit,
@@ -174,6 +176,9 @@ def ask(question: Question, source: str) -> Row:
         files=files,
         curve=outline(history) if question.curve else None,
     )
+    if best is None:
+        return row
+    return replace(row, status=OK, tr=best.tr, tr_low=best.tr_low, tr_high=best.tr_high, residual=best.residual)
 
 
 def failed(source: str, error: BaseException) -> Row:

@@ -7,15 +7,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from d2rpick.history import History, Samples
+    from numpy.typing import NDArray
+
+    from d2rpick.history import History, Precision, Samples
     from d2rpick.identify import Identification
     from d2rpick.mode import Mode
+    from d2rpick.modes import Modes
 
 # Between samples E'' may exceed what second differences of the samples show; on random vibrations a quarter
 # more covers 99 % of the true crossings from 8 samples per vibration period on.
 _BEND_RESERVE = 1.25
 # Three standard deviations: 99.7 % of normal errors.
 _DEVIATIONS = 3.0
+# Rounding errors are many, independent and of either sign: 2.6 standard deviations of their sum hold 99 % of it, and
+# they add to the error of the bend as independent errors do.
+_ROUNDING_DEVIATIONS = 2.6
 # However well a fit follows the samples, it is a model of what happens between them: this share of the output
 # interval is kept in reserve.
 _BETWEEN_SAMPLES = 1e-3
@@ -35,25 +41,24 @@ def sampled_reach(history: History, times: Samples, td: float) -> Samples:
     Returns
     -------
     array of shape (n,)
-        The true crossing lies within tr - x and tr + x [time]; at most two output intervals and what the
-        printed times leave open.
+        The true crossing lies within tr - x and tr + x [time]; at most two output intervals.
     """
     time, energy = history.time, history.energy
-    cell = np.clip(np.searchsorted(time, times, side="right") - 1, 0, time.size - 2)
-    interval = time[cell + 1] - time[cell]
+    cell, interval = _cells(time, times)
+    at_td, _ = _cells(time, np.atleast_1d(td))
     bend = curvature(time, energy, times)
-    at_td = int(np.clip(np.searchsorted(time, td, side="right") - 1, 0, time.size - 2))
     # Newton's error of linear interpolation: E''/2 times the distances to both neighbours; zero on a sample.
     off_td = float(curvature(time, energy, td)) * (td - time[at_td]) * (time[at_td + 1] - td) / 2
-    printed = _half_quantum(history, "energy", np.interp(times, time, energy)) + _half_quantum(
-        history, "energy", np.atleast_1d(history.energy_at(td))
+    curved = _BEND_RESERVE * (bend * interval**2 / 8 + off_td)
+    most, square = (
+        a + b for a, b in zip(_rounding(history, times), _rounding(history, np.atleast_1d(td)), strict=True)
     )
-    error = _BEND_RESERVE * (bend * interval**2 / 8 + off_td) + printed
+    rounded = np.minimum(most, _ROUNDING_DEVIATIONS * np.sqrt(square))
     slope = np.abs((energy[cell + 1] - energy[cell]) / interval)
-    return np.minimum(reach(slope, bend, error), 2 * interval) + _time_quanta(history, times, td)
+    return np.minimum(reach(slope, bend, np.hypot(curved, rounded)), 2 * interval)
 
 
-def fitted_reach(history: History, fit: Identification, mode: Mode, times: Samples, td: float) -> Samples:
+def fitted_reach(history: History, fit: Identification, mode: Mode | Modes, times: Samples, td: float) -> Samples:
     """Distance to the true crossing where tr and the level come from the fitted oscillator.
 
     The energy error is that of the fitted curve at tr and at td: its standard deviation from the scatter of the
@@ -61,19 +66,37 @@ def fitted_reach(history: History, fit: Identification, mode: Mode, times: Sampl
     """
     deviation = fit.energy_deviation(np.append(times, td))
     error = _DEVIATIONS * (deviation[:-1] + deviation[-1]) + fit.structure
-    q, velocity = mode.deformation(times), mode.velocity(times)
-    acceleration = -mode.alpha * velocity - mode.omega_0**2 * (q - mode.preload)
-    distance = reach(np.abs(2 * q * velocity), np.abs(2 * (velocity**2 + q * acceleration)), error)
+    slope, bend = mode.energy_slopes(times)
+    distance = reach(np.abs(slope), np.abs(bend), error)
     return np.minimum(distance, 2 * history.step) + _BETWEEN_SAMPLES * history.step + _time_quanta(history, times, td)
 
 
-def _half_quantum(history: History, column: str, values: Samples) -> Samples:
-    precision = history.energy_precision if column == "energy" else history.time_precision
+def _cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
+    """Index of the sample before each time, and the interval to the next."""
+    cell = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
+    return cell, time[cell + 1] - time[cell]
+
+
+def _rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
+    """Largest error that the printed digits leave in the interpolated energy, and its mean square [energy].
+
+    Energy and time of both neighbours are off by up to half a quantum each, any value as likely as another.
+    """
+    cell, interval = _cells(history.time, at)
+    share = (at - history.time[cell]) / interval
+    slope = np.diff(history.energy)[cell] / interval
+    energies = _half_quanta(history.energy_precision, np.interp(at, history.time, history.energy))
+    times = slope * _half_quanta(history.time_precision, at)
+    square = (energies**2 + times**2) / 3 * ((1 - share) ** 2 + share**2)
+    return energies + np.abs(times), square
+
+
+def _half_quanta(precision: Precision, values: Samples) -> Samples:
     return np.array([precision.quantum(float(value)) / 2 for value in values])
 
 
 def _time_quanta(history: History, times: Samples, td: float) -> Samples:
-    return _half_quantum(history, "time", times) + history.time_precision.quantum(td) / 2
+    return _half_quanta(history.time_precision, times) + history.time_precision.quantum(td) / 2
 
 
 def curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:

@@ -122,7 +122,7 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         ("dance", ["No such command 'dance'", "suggest, verify, replay"]),
         ("suggest --tdd 1 x", ["--tdd", "Did you mean", "--td", "d2rpick suggest --help"]),
         ("verify --tolerence 1 x", ["--tolerence", "Did you mean", "--tolerance"]),
-        ("suggest x", ["--td"]),
+        ("suggest --td 1 --td-window 1 2 x", ["--td", "--td-window"]),
         ("verify --td 1 x", ["--tr"]),
         ("suggest --td 1", ["HISTORY"]),
         ("suggest --td 1 x y", ["x: no such file"]),

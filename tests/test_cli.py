@@ -246,7 +246,7 @@ def test_without_a_command_the_help_is_an_error_message() -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_shell_completes_the_names_of_commands(command: str) -> None:
-    env = {"_D2RPICK_COMPLETE": "bash_complete", "COMP_WORDS": f"d2rpick {command[:3]}", "COMP_CWORD": "1"}
+    env = {"_D2RPICK_COMPLETE": "bash_complete", "COMP_WORDS": f"d2rpick {command[:4]}", "COMP_CWORD": "1"}
     assert run(env=env).stdout.strip() == f"plain,{command}"
 
 

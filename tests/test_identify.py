@@ -25,7 +25,7 @@ def accepted(time: Samples, energy: Samples) -> tuple[Identification, Mode]:
     found = identify(time, energy)
     assert found.describes_record, found.reason
     assert found.reason is None
-    assert found.mode is not None
+    assert isinstance(found.mode, Mode)
     return found, found.mode
 
 

@@ -33,14 +33,18 @@ ORDER = (
     "readers.curves", "readers.csv_table", "readers.database", "readers.fortran", "readers.fixed_text",
     "readers.glstat", "readers.matsum", "readers.repeat", "readers.lsda", "readers.binout_states",
     "readers.binout_branch", "readers.binout", "readers.hdf5_columns", "readers.hdf5_file", "readers.radioss_th",
-    "readers.companions", "readers.run", "readers",
-    "momentum", "crossings", "oscillator", "mode", "fitting", "identify", "measures", "replay", "flight", "situation",
-    "cautions", "uncertainty", "candidates", "switched", "choice", "overview", "rules.judgement", "judged_card",
+    "readers.companions", "readers.run", "balance", "readers.balance", "readers",
+    "momentum", "crossings", "oscillator", "mode", "modes", "fitting", "fitting_several", "identify",
+    "flight", "envelope", "signs", "measures", "profile", "replay", "situation",
+    "cautions", "uncertainty", "contributions", "candidates", "expectation", "switched", "health", "choice", "window",
+    "overview", "rules.judgement", "judged_card", "acceptable", "study", "ledger", "farm",
+    "integration", "reproduction", "exhibits",
     "report", "report.findings", "report.rules", "report.tables", "report.situation", "report.suggestion",
-    "report.verdict", "report.overview",
+    "report.verdict", "report.health", "report.overview", "report.html", "report.page", "report.study",
+    "report.study_page", "report.reproduction",
     "writers", "plots",
     "cli", "cli.options", "cli.output", "cli.progress", "cli.check", "cli.rule", "cli.card",
-    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract",
+    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract", "cli.study", "cli.reproduce",
     "__main__",
 )  # fmt: skip
 # The only modules that may import these.
@@ -134,7 +138,7 @@ def test_the_command_line_offers_the_formats_there_are() -> None:
     assert tuple(TRAJECTORY_WRITERS) == replay.FORMATS
 
 
-SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check")]
+SCHEMAS = [f"schemas/{name}-1.json" for name in ("study", "suggest", "verify", "info", "check")]
 
 
 @pytest.mark.parametrize("name", ["py.typed", *SCHEMAS])

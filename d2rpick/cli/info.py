@@ -22,7 +22,7 @@ Examples:
 @shared.output_options("table", "json", "csv", "markdown")
 @click.pass_context
 def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **options: Any) -> None:  # noqa: ARG001
-    """Tell what is in the HISTORY of a run: format, states, sampling, channels, parts, flights."""
+    """Tell what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health."""
     from d2rpick.overview import survey
     from d2rpick.report import overview as report
 
@@ -30,6 +30,7 @@ def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **option
         run = shared.open_run(options)
         output = Output.of(options, *run.sources)
         overview = survey(run, shared.selection(options))
+    output.notes((), report.cautions(overview))
     texts = {
         "table": lambda: report.as_table(overview),
         "markdown": lambda: report.as_markdown(overview),

@@ -18,12 +18,12 @@ Decorated = Any  # a command function; click's decorators do not say more
 
 
 class Number(click.ParamType[float]):
-    """A finite number with a point, not below ``low`` (or above it, when ``above``)."""
+    """A finite number with a point, not below ``low`` (or above it, when ``above``) and not above ``high``."""
 
     name = "number"
 
-    def __init__(self, low: float = -math.inf, *, above: bool = False) -> None:
-        self.low, self.above = low, above
+    def __init__(self, low: float = -math.inf, high: float = math.inf, *, above: bool = False) -> None:
+        self.low, self.high, self.above = low, high, above
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Read a number or fail with what was found and what was expected."""
@@ -39,6 +39,8 @@ class Number(click.ParamType[float]):
                 param,
                 ctx,
             )
+        if number > self.high:
+            self.fail(f"{value} was found, a number of at most {self.high:g} was expected", param, ctx)
         return number
 
 
@@ -56,6 +58,7 @@ NAMES = Names()
 TIME = Number()
 POSITIVE = Number(0.0, above=True)
 NOT_NEGATIVE = Number(0.0)
+FRACTION = Number(0.0, high=1.0)
 
 
 def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
@@ -86,7 +89,6 @@ _ENERGY = click.option(
     help="Energy column, label or HDF5 path; given several times, their sum.",
 )  # fmt: skip
 _FLYING = click.option("--flying", metavar="IDS", multiple=True, type=NAMES, help="Parts that fly together with them.")
-_PLOT = click.option("--plot", metavar="FILE", help="Draw energy and motion to FILE (png, svg, pdf).")
 
 
 def history_options(function: Decorated) -> Decorated:
@@ -163,7 +165,17 @@ def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
 
 def choosing_options(function: Decorated) -> Decorated:
     """Options of ``suggest`` and ``verify``; collected by ``settings``."""
-    return _stack(judging_options, _PLOT)(function)
+    return _stack(
+        judging_options,
+        click.option(
+            "--cost-share", type=FRACTION, metavar="C",
+            help="Share of the cost of a step that the switched parts' elements take; tells the run time.",
+        ),
+        click.option(
+            "--step-ratio", type=POSITIVE, metavar="N", help="Time step while rigid over that before.  [default: 1]",
+        ),
+        click.option("--plot", metavar="FILE", help="Draw energy and motion to FILE (png, svg, pdf)."),
+    )(function)  # fmt: skip
 
 
 def judging_options(function: Decorated) -> Decorated:
@@ -241,6 +253,9 @@ def settings(options: dict[str, Any]) -> Settings:
     chosen = [name for name, value in ways.items() if value]
     if len(chosen) > 1:
         raise click.UsageError(f"{chosen[0]} and {chosen[1]} exclude each other")
+    cost_share, step_ratio = options.get("cost_share"), options.get("step_ratio")
+    if step_ratio is not None and cost_share is None:
+        raise click.UsageError("--step-ratio needs --cost-share too: together they tell the run time")
     if window and not window[0] < window[1]:
         raise click.UsageError(f"--fit-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
     return Settings(
@@ -252,6 +267,8 @@ def settings(options: dict[str, Any]) -> Settings:
         oscillator=to_mode(given, options["v0"]) if given else None,
         fit_window=window,
         replay=not options["no_verify"],
+        cost_share=cost_share,
+        step_ratio=step_ratio or 1.0,
     )
 
 

@@ -38,11 +38,14 @@ class Output:
             from d2rpick import plots
 
             plots.format_of(plot)
-        names = [name for name in (file, plot) if name is not None]
-        for name in names:
-            output.claim(name)
-        if len({os.path.realpath(name) for name in names}) < len(names):
-            raise D2RPickError(f"{plot}: --plot and --output-file name the same file; name two")
+        names = {"--output-file": options["output_file"], "--plot": plot, "--report": options.get("report")}
+        claimed: dict[str, str] = {}
+        for option, name in names.items():
+            if name is not None:
+                output.claim(name)
+                other = claimed.setdefault(os.path.realpath(name), option)
+                if other != option:
+                    raise D2RPickError(f"{name}: {option} and {other} name the same file; name two")
         return output
 
     def spare(self, inputs: Iterable[str]) -> None:

@@ -49,6 +49,7 @@ Examples:
 @shared.reading_options
 @shared.judging_options
 @click.option("--plot", metavar="FILE", help="Draw the energies of all runs to FILE (png, svg, pdf).")
+@click.option("--report", metavar="FILE", help="Write all of it to FILE, one HTML page to read, print and sign.")
 @shared.output_options("table", "json", "csv", "markdown", "ndjson")
 @click.pass_context
 def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exit_zero: bool, **options: Any) -> None:
@@ -67,7 +68,7 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
     _check_ledger(options)
     question = Question(
         options["td"], shared.settings(options), shared.selection(options), options["input_format"],
-        curve=bool(options["plot"]),
+        curve=bool(options["plot"] or options["report"]),
     )  # fmt: skip
     asked, rows = fingerprint(question), []
     streaming = output_format == "ndjson" and output.file is None
@@ -76,12 +77,8 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
         if streaming:
             output.result(line(row, asked))
     answer = summarise(question.td, rows)
-    _spare(output, options["plot"], rows)
     output.notes((), answer.cautions)
-    if options["plot"]:
-        from d2rpick import plots
-
-        output.write(options["plot"], plots.render(plots.draw_study(answer), options["plot"]))
+    _write_files(answer, options, replace(output, inputs=_files_of(rows)), ctx.meta["d2rpick.command"])
     before = [] if streaming else [line(row, asked) for row in rows]
     output.result(_text(answer, output_format, ctx.meta["d2rpick.command"], before))
     if not answer.judged:
@@ -135,18 +132,37 @@ def _check_ledger(options: dict[str, Any]) -> None:
     name = options["resume"]
     if name is None:
         return
-    for option in ("output_file", "plot"):
+    for option in ("output_file", "plot", "report"):
         if options[option] is not None and os.path.realpath(options[option]) == os.path.realpath(name):
             raise D2RPickError(f"{name}: --resume and --{option.replace('_', '-')} name the same file; name two")
     if os.path.exists(name) and os.path.samestat(os.stat(name), os.fstat(1)):  # noqa: PTH110, PTH116
         raise D2RPickError(f"{name}: --resume and standard output are the same file; send one elsewhere")
 
 
-def _spare(output: Output, plot: str | None, rows: Sequence[Row]) -> None:
-    """Raise D2RPickError when a file to be written is one that was read in the folder of a run."""
-    careful = replace(output, inputs=tuple(stamp.name for row in rows for stamp in row.files))
-    for name in filter(None, (output.file, plot)):
-        careful.claim(name)
+def _files_of(rows: Sequence[Row]) -> tuple[str, ...]:
+    """Files that were read, those in folders too."""
+    return tuple(dict.fromkeys(stamp.name for row in rows for stamp in row.files))
+
+
+def _write_files(answer: Study, options: dict[str, Any], output: Output, command_line: Sequence[str]) -> None:
+    """Write figure and page where they are asked for; D2RPickError when one would replace a file that was read."""
+    for name in (output.file, options["plot"], options["report"]):
+        if name is not None:
+            output.claim(name)
+    if options["plot"] is None and options["report"] is None:
+        return
+    from d2rpick import plots
+
+    if options["plot"] is not None:
+        output.write(options["plot"], plots.render(plots.draw_study(answer), options["plot"]))
+    if options["report"] is not None:
+        from d2rpick.report.study_page import as_page
+
+        drawing = (
+            plots.svg_element(plots.draw_study(answer), "wide-"),
+            plots.svg_element(plots.draw_study(answer, narrow=True), "narrow-"),
+        )
+        output.write(options["report"], as_page(answer, command_line, drawing).encode())
 
 
 def _rows(question: Question, sources: Sequence[str], options: dict[str, Any], *, quiet: bool) -> Iterator[Row]:

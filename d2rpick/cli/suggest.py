@@ -12,18 +12,26 @@ from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
     from d2rpick.choice import Suggestion
+    from d2rpick.history import History
+    from d2rpick.readers import Run
+    from d2rpick.situation import Settings
 
 EXAMPLES = """\b
 Examples:
   d2rpick suggest --td 0.064 sample_data/energy.csv
+  d2rpick suggest --td-window 0.06 0.07 sample_data/energy.csv
   d2rpick suggest --td 0.37 --energy boxIE_J sample_data/rollover.csv
   d2rpick suggest --td 0.064 -f json sample_data/energy.glstat
   d2rpick suggest --td 0.37 --part box -f card sample_data/rolloverT01.gz
+  d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
 """
 
 
 @click.command("suggest", epilog=EXAMPLES)
-@click.option("--td", type=shared.TIME, required=True, metavar="T", help="Switch back to deformable at this time.")
+@click.option("--td", type=shared.TIME, metavar="T", help="Switch back to deformable at this time.")
+@click.option(
+    "--td-window", type=(shared.TIME, shared.TIME), metavar="LO HI", help="Choose the time to switch back in here."
+)
 @click.option(
     "--limit",
     type=click.IntRange(min=1),
@@ -33,29 +41,43 @@ Examples:
 )
 @shared.history_options
 @shared.choosing_options
+@click.option("--report", metavar="FILE", help="Write all of it to FILE, one HTML page to read, print and sign.")
 @shared.output_options("table", "json", "csv", "markdown", "value", "card")
 @click.pass_context
-def command(ctx: click.Context, /, td: float, limit: int, output_format: str, exit_zero: bool, **options: Any) -> None:
-    """Rank the times tr at which the parts of HISTORY can be made rigid until td.
+def command(
+    ctx: click.Context,
+    /,
+    td: float | None,
+    td_window: tuple[float, float] | None,
+    limit: int,
+    output_format: str,
+    exit_zero: bool,
+    **options: Any,
+) -> None:
+    """Rank the times tr at which the parts of HISTORY can be made rigid until td, or choose both times.
 
     A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
-    from d2rpick.choice import suggest
+    from d2rpick.choice import with_health
+    from d2rpick.readers.balance import balance_of
     from d2rpick.report import suggestion as report
 
-    if output_format == "card" and not options["part"]:
-        raise click.UsageError("-f card needs --part, the parts that are switched")
+    _check_usage(td, td_window, card=output_format == "card", parts=options["part"])
     with reading(options["history"], quiet=options["quiet"]):
         run = shared.open_run(options)
         output = Output.of(options, *run.sources)
         history = run.history(shared.selection(options), with_momenta=True)
-    answer = suggest(history, td, shared.settings(options))
+    answer = _answer(history, td, td_window, shared.settings(options))
+    if balance := balance_of(run, history.parts, answer.situation.td):
+        answer = with_health(answer, balance)
     output.notes(history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick import plots
 
         output.write(options["plot"], plots.render(plots.draw_suggestion(answer), options["plot"]))
+    if options["report"]:
+        output.write(options["report"], _page(answer, run, ctx.meta["d2rpick.command"]).encode())
     if output_format == "card":
         written = _card(answer, output)
         finish(ctx, objection=not written, exit_zero=exit_zero)
@@ -71,20 +93,56 @@ def command(ctx: click.Context, /, td: float, limit: int, output_format: str, ex
     finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
 
 
+def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: bool, parts: tuple[str, ...]) -> None:
+    """Raise UsageError where what is asked for makes no sense, before a file is opened."""
+    if td is not None and window:
+        raise click.UsageError("--td and --td-window exclude each other")
+    if window and not window[0] < window[1]:
+        raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
+    if card and not parts:
+        raise click.UsageError("-f card needs --part, the parts that are switched")
+
+
+def _answer(history: History, td: float | None, window: tuple[float, float] | None, settings: Settings) -> Suggestion:
+    """Choose tr for ``td``, or both in ``window``; UsageError with what the record tells when neither is given."""
+    from d2rpick.choice import suggest
+    from d2rpick.window import advice, suggest_in_window
+
+    if window:
+        return suggest_in_window(history, window, settings)
+    if td is None:
+        raise click.UsageError(advice(history, settings))
+    return suggest(history, td, settings)
+
+
+def _page(answer: Suggestion, run: Run, command: tuple[str, ...]) -> str:
+    """Draw the figures, wide and narrow, and write the page around them."""
+    from d2rpick import plots
+    from d2rpick.report.page import as_page, better_pair
+
+    drawings = {"Internal energy with its level at td, and the choice": plots.draw_suggestion}
+    if better_pair(answer):
+        drawings["The better pair"] = plots.draw_better
+    figures = {
+        caption: (
+            plots.svg_element(draw(answer), f"wide{number}-"),
+            plots.svg_element(draw(answer, narrow=True), f"narrow{number}-"),
+        )
+        for number, (caption, draw) in enumerate(drawings.items())
+    }
+    return as_page(answer, run, command, figures)
+
+
 def _card(answer: Suggestion, output: Output) -> bool:
     """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
-    from d2rpick.cards import ls_dyna
     from d2rpick.cli.card import all_cautions
-    from d2rpick.judged_card import judged
+    from d2rpick.judged_card import of_suggestion
 
-    pair, history = answer.recommended, answer.situation.history
-    if pair is None:
+    found = of_suggestion(answer)
+    if found is None:
         output.content(b"")
         return False
-    ids = [part.id for part in history.parts or ()]
-    card, verdict = judged(
-        lambda remarks: ls_dyna(pair.tr, pair.td, ids, remarks=remarks), history, answer.situation.settings
-    )
+    card, verdict = found
     said = set(answer.cautions)
     output.notes(card.notes, [caution for caution in all_cautions(verdict) if caution not in said])
     output.content(card.text.encode())

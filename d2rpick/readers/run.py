@@ -138,7 +138,9 @@ class Run:
         idle = [part for part, energy in zip(chosen, energies.T, strict=True) if not energy.any()]
         notes = (f"never any internal energy: part {menu(idle)}; rigid, or without elements?",) if idle else ()
         channel = "internal energy of " + ", ".join(part.title or f"part {part.id}" for part in chosen)
-        return self._made(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
+        names = [part.title or f"part {part.id}" for part in chosen]
+        history = self._made(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
+        return _with_terms(history, names, energies)
 
     def _of_all_parts(self) -> History:
         if not self.parts:
@@ -154,9 +156,9 @@ class Run:
             raise FormatError(f"{self.name}: an energy is asked for twice; name each once")
         columns = [database.channel(name) for name in names]
         channel = " + ".join(names)
-        return self._made(
-            database, database.time, np.sum(columns, axis=0), channel, names, quantity_note(channel), None
-        )
+        notes = quantity_note(channel)
+        history = self._made(database, database.time, np.sum(columns, axis=0), channel, names, notes, None)
+        return _with_terms(history, names, np.stack(columns, axis=1))
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
         """Find the database that has all these channels, under the names it gives them."""
@@ -188,3 +190,11 @@ class Run:
             complete=all(one.complete for one in self.databases),
             notes=(*self.notes, *notes),
         )
+
+
+def _with_terms(history: History, names: Sequence[str], energies: Samples) -> History:
+    """Add the terms of a summed energy, (n, k), but those that are always zero; one alone is the energy itself."""
+    active = np.flatnonzero(energies.any(axis=0))
+    if active.size < 2:
+        return history
+    return replace(history, part_names=tuple(names[i] for i in active.tolist()), part_energies=energies[:, active])

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
+from d2rpick.health import cautions_of_health
 from d2rpick.report import tables
+from d2rpick.report.health import HEAD as HEALTH_HEAD
+from d2rpick.report.health import measures_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.cautions import Caution
     from d2rpick.momentum import FreeFlight
     from d2rpick.overview import Overview
 
@@ -20,6 +24,11 @@ _PARTS_HEAD = ("part", "title", "highest internal energy")
 _PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "time_unit", "complete")
 
 
+def cautions(overview: Overview) -> tuple[Caution, ...]:
+    """What to know of the health of the run."""
+    return tuple(cautions_of_health(overview.health)) if overview.health else ()
+
+
 def as_table(overview: Overview) -> str:
     """One line per fact, the channels, and a table of the parts."""
     rows = _rows(overview)
@@ -27,6 +36,8 @@ def as_table(overview: Overview) -> str:
     lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in rows]
     if overview.parts:
         lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview))]
+    if health := _health(overview):
+        lines += ["", tables.as_text(HEALTH_HEAD, health)]
     return "\n".join([*lines, *(f"note: {note}" for note in overview.notes)])
 
 
@@ -34,7 +45,8 @@ def as_markdown(overview: Overview) -> str:
     """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
     facts = tables.as_markdown(("what", "value"), _rows(overview))
     parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
-    return "\n\n".join([facts, *parts, *(f"* {note}" for note in overview.notes)])
+    health = [tables.as_markdown(HEALTH_HEAD, _health(overview))] if _health(overview) else []
+    return "\n\n".join([facts, *parts, *health, *(f"* {note}" for note in overview.notes)])
 
 
 def as_csv(overview: Overview) -> str:
@@ -47,6 +59,7 @@ def as_csv(overview: Overview) -> str:
         "channels": "; ".join(overview.channels),
         "parts": "; ".join(f"{one.part.id} {one.part.title}".rstrip() for one in overview.parts),
         "flights": "; ".join(map(_flight, overview.flights)),
+        "health": "; ".join(f"{what} {value}" for what, value, *_ in _health(overview)),
         "notes": "; ".join(overview.notes),
     }
     return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
@@ -64,7 +77,8 @@ def as_json(overview: Overview, command: Sequence[str]) -> str:
         }
         for f in overview.flights
     ]
-    front = {"schema": SCHEMA, "tool_version": __version__, "command": list(command), "warnings": []}
+    front: dict[str, Any] = {"schema": SCHEMA, "tool_version": __version__, "command": list(command)}
+    front["warnings"] = [asdict(caution) for caution in cautions(overview)]
     return tables.as_json({**front, **facts})
 
 
@@ -85,7 +99,16 @@ def _rows(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("complete", overview.complete),
         ("channels", ", ".join(overview.channels) or None),
     ]
-    return rows + [("flight", _flight(flight)) for flight in overview.flights]
+    rows += [("flight", _flight(flight)) for flight in overview.flights]
+    return rows
+
+
+def _health(overview: Overview) -> list[list[tables.Cell]]:
+    """Measures that the files hold, with what practice allows."""
+    if overview.health is None:
+        return []
+    verdicts = {True: "kept", False: "exceeded", None: None}
+    return [[one.what, one.value, one.limit, verdicts[one.good]] for one in measures_of(overview.health) if one.value]
 
 
 def _parts(overview: Overview) -> list[list[tables.Cell]]:

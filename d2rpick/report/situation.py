@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
+from d2rpick.modes import Modes
 from d2rpick.report.tables import measure
 
 if TYPE_CHECKING:
@@ -21,20 +22,12 @@ def heading(situation: Situation) -> list[str]:
     history, flight = situation.history, situation.flight
     unit = f" {history.time_unit}" if history.time_unit else ""
     what = f"{', '.join(history.source)}: {history.format}, {history.channel}"
-    share = measure(situation.kinetic_share)
+    share = measure(situation.kinetic_share) + (" (estimate)" if situation.kinetic_share_estimated else "")
     lines = [
         f"history  {what}, {history.time.size} states, {history.time[0]:.6g} to {history.time[-1]:.6g}{unit}",
         f"td       {situation.td:.6g}: energy {situation.energy_td:.6g}, kinetic share {share}",
+        f"basis    {_basis(situation)}",
     ]
-    fit, mode = situation.fit, situation.mode
-    if mode and fit:
-        parts = [f"omega {mode.omega:.6g}", f"alpha {mode.alpha:.4g}"]
-        parts += [f"{name} {value:.4g}" for name, value in _offsets(situation) if value]
-        misfit = "misfit below 1e-9" if fit.misfit is None or fit.misfit < 1e-9 else f"misfit {fit.misfit:.1e}"
-        source = "given" if situation.settings.oscillator else "identified"
-        lines.append(f"basis    oscillator, {source}: {', '.join(parts)}, {misfit}; tr and energies are its")
-    else:
-        lines.append("basis    energy")
     if flight.start is None:
         lines.append("flight   unknown")
     else:
@@ -42,6 +35,29 @@ def heading(situation: Situation) -> list[str]:
         who = f" of {', '.join(part.title or str(part.id) for part in flight.parts)}" if flight.parts else ""
         lines.append(f"flight   from {flight.start:.6g} ({flight.source}{who}), {end}")
     return lines
+
+
+def _basis(situation: Situation) -> str:
+    """What the choice rests on, and the oscillator behind it."""
+    fit, mode = situation.fit, situation.mode
+    if not (mode and fit):
+        whole = "; vibration energy estimated by the envelope of the energy"
+        return _parts(situation) + whole if situation.part_vibration else situation.basis
+    rates = ", ".join(f"{one.omega:.6g}" for one in mode.modes)
+    facts = [f"omega {rates}", f"alpha {mode.alpha:.4g}"]
+    offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
+    facts += [f"{name} {value:.4g}" for name, value in offsets.items() if value]
+    facts.append("misfit below 1e-9" if fit.misfit is None or fit.misfit < 1e-9 else f"misfit {fit.misfit:.1e}")
+    source = "given" if situation.settings.oscillator else "identified"
+    count = len(mode.modes)
+    oscillator = f"oscillator, {source}" if count == 1 else f"oscillator of {count} modes, {source}"
+    front = f"{_parts(situation)}; " if situation.part_vibration else ""
+    return f"{front}{oscillator}: {', '.join(facts)}; tr and energies are its"
+
+
+def _parts(situation: Situation) -> str:
+    assert situation.part_vibration is not None
+    return f"parts, signs of {', '.join(situation.part_vibration.parts.names)}"
 
 
 def frame(situation: Situation, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
@@ -76,29 +92,43 @@ def parts_of(parts: Sequence[Part] | None) -> list[dict[str, Any]] | None:
 
 def mechanics(situation: Situation) -> dict[str, Any]:
     """Keys of JSON results that describe the situation at td."""
-    flight, fit = situation.flight, situation.fit
-    mode = fit.mode if fit else None
-    oscillator = None
-    if fit:
-        oscillator = {
-            "omega": mode.omega if mode else None,
-            "alpha": mode.alpha if mode else None,
-            "energy_plastic": mode.energy_plastic if mode else None,
-            "preload": mode.preload if mode else None,
-            "misfit": fit.misfit,
-            "source": "given" if situation.settings.oscillator else "identified",
-            "describes_record": fit.describes_record,
-            "reason": fit.reason,
-        }
+    flight = situation.flight
     return {
         "energy_td": situation.energy_td,
         "kinetic_share": situation.kinetic_share,
+        "kinetic_share_estimated": situation.kinetic_share_estimated,
         "basis": situation.basis,
         "flight": {"start": flight.start, "end": flight.end, "source": flight.source, "parts": parts_of(flight.parts)},
-        "oscillator": oscillator,
+        "oscillator": _oscillator(situation),
+        "modes": _modes(situation),
+        "unsigned_parts": [part._asdict() for part in situation.parts.unsigned] if situation.parts else None,
     }
 
 
-def _offsets(situation: Situation) -> list[tuple[str, float]]:
-    assert situation.mode is not None
-    return [("energy_plastic", situation.mode.energy_plastic), ("preload", situation.mode.preload)]
+def _oscillator(situation: Situation) -> dict[str, Any] | None:
+    """Give the one oscillator that was fitted, or null; where several describe the record, that one does not."""
+    fit = situation.fit
+    if fit is None:
+        return None
+    several = isinstance(fit.mode, Modes)
+    mode = None if several else fit.mode
+    return {
+        "omega": mode.omega if mode else None,
+        "alpha": mode.alpha if mode else None,
+        "energy_plastic": mode.energy_plastic if mode else None,
+        "preload": mode.preload if mode else None,
+        "misfit": fit.misfit,
+        "source": "given" if situation.settings.oscillator else "identified",
+        "describes_record": fit.describes_record and not several,
+        "reason": "the sum of several modes describes the record" if several else fit.reason,
+    }
+
+
+def _modes(situation: Situation) -> list[dict[str, float]] | None:
+    """Give the modes whose sum describes the record, or null where one or none does."""
+    if not isinstance(situation.mode, Modes):
+        return None
+    return [
+        {"omega": one.omega, "alpha": one.alpha, "vibration_energy_td": float(one.vibration_energy(situation.td))}
+        for one in situation.mode.modes
+    ]

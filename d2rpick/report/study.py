@@ -12,7 +12,7 @@ from d2rpick.report import tables
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.study import Row, Study
+    from d2rpick.study import Study
 
 SCHEMA = "d2rpick/study/1"
 HEAD = ("run", "tr", "+-", "E(td)", "R", "basis", "status", "message")

@@ -15,31 +15,33 @@ if TYPE_CHECKING:
     from d2rpick.choice import Pair, Suggestion
 
 SCHEMA = "d2rpick/suggest/1"
-_HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")
+HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")
 
 
 def as_table(answer: Suggestion, limit: int) -> str:
     """Heading, the first ``limit`` candidates, the recommended and the better pair; the recommended row has a star."""
-    table = tables.as_text(_HEAD, _rows(answer, limit)) if answer.candidates else "no candidates"
+    table = tables.as_text(HEAD, rows(answer, limit)) if answer.candidates else "no candidates"
     lines = [*heading(answer.situation), "", table]
     left = len(answer.candidates) - limit
     if left > 0:
         lines.append(f"... and {left} more (--limit)")
     lines += ["", f"recommended  {_pair(answer.recommended)}", f"better pair  {_pair(answer.better_td)}"]
+    lines += [f"{name.ljust(11)}  {text}" for name, text in outlook(answer)]
     return "\n".join(lines)
 
 
 def as_markdown(answer: Suggestion, limit: int) -> str:
     """The candidates as a Markdown table, and the two pairs below it."""
-    table = tables.as_markdown(_HEAD, _rows(answer, limit))
-    return f"{table}\n\nrecommended: {_pair(answer.recommended)}\n\nbetter pair: {_pair(answer.better_td)}"
+    table = tables.as_markdown(HEAD, rows(answer, limit))
+    lines = [("recommended", _pair(answer.recommended)), ("better pair", _pair(answer.better_td)), *outlook(answer)]
+    return "\n\n".join([table, *(f"{name}: {text}" for name, text in lines)])
 
 
 def as_csv(answer: Suggestion) -> str:
-    """All candidates, a column for each key of the JSON output."""
-    names = [field.name for field in fields(Candidate)]
-    rows = ([getattr(c, n) for n in names[:-1]] + ["; ".join(c.notes)] for c in answer.candidates)
-    return tables.as_csv(names, rows).rstrip("\n")
+    """All candidates, a column for each key of the JSON output but ``parts``."""
+    names = [field.name for field in fields(Candidate) if field.name not in ("parts", "notes")]
+    cells = ([getattr(c, n) for n in names] + ["; ".join(c.notes)] for c in answer.candidates)
+    return tables.as_csv([*names, "notes"], cells).rstrip("\n")
 
 
 def as_json(answer: Suggestion, command: Sequence[str]) -> str:
@@ -49,20 +51,46 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
         {
             **frame(answer.situation, SCHEMA, command, answer.cautions),
             "td": answer.situation.td,
+            "td_window": list(answer.td_window) if answer.td_window else None,
             **mechanics(answer.situation),
             "candidates": [asdict(candidate) for candidate in answer.candidates],
             "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
+            "health": asdict(answer.health) if answer.health else None,
+            "expected": asdict(answer.expected) if answer.expected else None,
             "better_td": {"td": better.td, "tr": better.tr, "residual": better.residual} if better else None,
         }
     )
 
 
+def outlook(answer: Suggestion) -> list[tuple[str, str]]:
+    """What can be expected of the recommended pair, a name and a sentence each."""
+    lines = []
+    best = next((c for c in answer.candidates if c.recommended), None)
+    if best and best.run_time_share is not None:
+        rigid = f"rigid for {best.rigid_fraction:.0%} of the record"
+        lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's, {rigid}"))
+    expected = answer.expected
+    if expected:
+        at_level = f"{expected.ratio_at_level:.0%} with the energy of td"
+        own = (
+            ""
+            if expected.ratio is None
+            else f"{expected.ratio:.0%} of the reference's ({expected.ratio_low:.0%} if all of it vibrates), "
+        )
+        lines.append(("mean after", f"about {own}{at_level}; mean in flight {expected.mean_energy:.6g}"))
+    return lines
+
+
 def as_value(answer: Suggestion) -> str:
-    """The recommended tr in the shortest digits that read back to it; empty when there is none."""
-    return repr(answer.recommended.tr) if answer.recommended else ""
+    """The recommended tr, and td where it was chosen too, in the shortest digits that read back; empty without one."""
+    pair = answer.recommended
+    if pair is None:
+        return ""
+    return f"{pair.tr!r} {pair.td!r}" if answer.td_window else repr(pair.tr)
 
 
-def _rows(answer: Suggestion, limit: int) -> list[list[tables.Cell]]:
+def rows(answer: Suggestion, limit: int) -> list[list[tables.Cell]]:
+    """Cells of the first ``limit`` candidates, below ``HEAD``."""
     return [
         [
             "*" if c.recommended else " ",

@@ -51,6 +51,7 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
             **frame(situation, SCHEMA, command, answer.cautions),
             **mechanics(situation),
             **_measures(answer),
+            "parts": [asdict(part) for part in answer.candidate.parts],
             "reasons": list(answer.reasons),
             "switched": asdict(answer.switched) if answer.switched else None,
         }
@@ -97,6 +98,7 @@ def _measures(answer: Verdict) -> dict[str, Any]:
         "timing_tolerance": c.timing_tolerance,
         "rigid_time": c.rigid_time,
         "rigid_fraction": c.rigid_fraction,
+        "run_time_share": c.run_time_share,
         "tr_ok": answer.tr_ok,
         "td_ok": answer.td_ok,
         "verified": answer.verified,

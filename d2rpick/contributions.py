@@ -1,0 +1,58 @@
+"""What each part has of the mismatch between tr and td."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from d2rpick import measures
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.situation import Situation
+
+# The parts that are named together make up this much of the mismatch.
+_MOST = 0.8
+
+
+@dataclass(frozen=True)
+class PartMatch:
+    """One part: whether its deformation has the same sign at tr and td, and its share in the square of D.
+
+    Both None where the part has no sign; ``reason`` says why.
+    """
+
+    name: str
+    sign_match: bool | None
+    share: float | None
+    reason: str | None = None
+
+
+def contributions(situation: Situation, tr: float) -> tuple[PartMatch, ...]:
+    """Give the match of each part, that with the largest share first; nothing where single parts are not known."""
+    vibration, td = situation.part_vibration, situation.td
+    if vibration is None:
+        return ()
+    shares = measures.mismatch_shares(vibration, tr, td).tolist()
+    same = (vibration.amplitudes(tr) * vibration.amplitudes(td) >= 0).tolist()
+    matches = [PartMatch(*row) for row in zip(vibration.parts.names, same, shares, strict=True)]
+    matches.sort(key=lambda one: -(one.share or 0.0))
+    return (*matches, *(PartMatch(part.name, None, None, part.reason) for part in vibration.parts.unsigned))
+
+
+def main_contributors(matches: Sequence[PartMatch]) -> str:
+    """Name the parts that contribute most.
+
+    Examples
+    --------
+    >>> main_contributors([PartMatch("roof", False, 0.7), PartMatch("door", True, 0.25), PartMatch("seat", True, 0.05)])
+    'roof 70 % (opposite sign), door 25 %'
+    """
+    named, sum_of_shares = [], 0.0
+    for match in matches:
+        if match.share is None or sum_of_shares >= _MOST:
+            break
+        named.append(f"{match.name} {match.share * 100:.0f} %{'' if match.sign_match else ' (opposite sign)'}")
+        sum_of_shares += match.share
+    return ", ".join(named)

@@ -1,0 +1,103 @@
+"""What the energy alone lets expect after td, where no deformation and so no residual is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from d2rpick.history import Samples
+    from d2rpick.situation import Situation
+
+
+@dataclass(frozen=True)
+class Expectation:
+    r"""Estimates for a vibration of many modes; fields are the keys of the JSON output.
+
+    Such a vibration shares its energy equally between internal and kinetic energy, and what is locked in above the
+    energy at rest :math:`E_s` comes back as vibration that is shared in the same way:
+
+    .. math:: \frac{E_s + (E(t_r) - E_s)/2}{E_s + (\langle E \rangle - E_s)\,
+        e^{-\alpha t_d}/\langle e^{-\alpha t} \rangle}
+
+    Below the line, what the reference keeps until td: its mean over the flight, less what damping takes.  Of the
+    energy at rest only an upper bound is known, so a lower bound of the ratio is given too.
+
+    Parameters
+    ----------
+    mean_energy : float
+        Mean of E in the flight, <E> [energy].
+    resting_energy : float
+        Lowest E in the flight, taken for E_s: plastic work and residual stress do not vibrate [energy].
+    kinetic_share : float
+        1 - E(td)/(2 <E>), of the vibration energy at td [-].
+    ratio : float or None
+        Mean of E after td over that of the reference when E(tr) is locked in; None without a tr [-].
+    ratio_low : float or None
+        E(tr)/(2 <E>), what is left if all of it vibrates, undamped [-].
+    ratio_at_level : float
+        As ``ratio``, when E(td) is locked in [-].
+    """
+
+    mean_energy: float
+    resting_energy: float
+    kinetic_share: float
+    ratio: float | None
+    ratio_low: float | None
+    ratio_at_level: float
+
+
+def expectation(situation: Situation, energy_tr: float | None) -> Expectation | None:
+    """Estimate from the energies of the flight; None on another basis than "energy", without a flight or energy.
+
+    ``energy_tr`` is what the recommended tr locks in [energy], None where nothing is recommended.
+    """
+    mean, energy_td = mean_in_flight(situation), situation.energy_td
+    if situation.basis != "energy" or mean is None or not energy_td > 0:
+        return None
+    time, energy = _flight(situation)
+    resting = max(0.0, float(energy.min()))
+    left = float(1 / np.exp(-situation.flight.damping * (time - situation.td)).mean())
+
+    def ratio(locked: float) -> float:
+        return (resting + (locked - resting) / 2) / (resting + (mean - resting) * left)
+
+    return Expectation(
+        mean_energy=mean,
+        resting_energy=resting,
+        kinetic_share=max(0.0, 1 - energy_td / (2 * mean)),
+        ratio=None if energy_tr is None else ratio(energy_tr),
+        ratio_low=None if energy_tr is None else energy_tr / (2 * mean),
+        ratio_at_level=ratio(energy_td),
+    )
+
+
+def mean_in_flight(situation: Situation) -> float | None:
+    """Mean energy of the flight, up to td where its end is not known [energy]; None unless it is positive."""
+    energy = _flight(situation)[1]
+    mean = float(energy.mean()) if energy.size else 0.0
+    return mean if mean > 0 else None
+
+
+def _flight(situation: Situation) -> tuple[Samples, Samples]:
+    """Times and energies of the flight, up to td where its end is not known; empty where its start is not."""
+    history, (start, end) = situation.history, (situation.flight.start, situation.flight.end)
+    window = [np.inf if start is None else start, np.nextafter(situation.td if end is None else end, np.inf)]
+    inside = slice(*np.searchsorted(history.time, window))
+    return history.time[inside], history.energy[inside]
+
+
+def shortfall(energy: float, mean: float) -> float:
+    """How far a locked-in amplitude stays below that of all vibration energy, 1 - sqrt(E/(2 <E>)) [-].
+
+    Infinite above it: more than there is must not be locked in.
+
+    Examples
+    --------
+    >>> shortfall(0.5, 1.0), shortfall(2.0, 1.0), shortfall(3.0, 1.0)
+    (0.5, 0.0, inf)
+    """
+    return 1 - sqrt(max(energy, 0.0) / (2 * mean)) if energy <= 2 * mean else float("inf")

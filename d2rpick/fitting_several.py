@@ -1,0 +1,70 @@
+"""Fit the energy of two or three vibration modes to samples by least squares, without being given a first guess.
+
+Everything here is scaled as in `fitting`; a parameter vector is that of `Modes.of`: alpha and, for each mode, omega,
+cosine and sine.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.fitting import CERTAIN, COARSE, STARTS, minimise, rates
+from d2rpick.modes import sum_and_jacobian
+
+if TYPE_CHECKING:
+    from d2rpick.history import Samples
+
+# Least difference of two rates over the record to start from [rad]: below a quarter of a beat two modes act as one.
+_APART: Final = np.pi / 4
+# Of the variance: rates that leave more of it unexplained are none of the record's, and refining them is no use.
+_HOPELESS: Final = 0.5
+
+
+def fit_several(s: Samples, e: Samples, count: int) -> Samples | None:
+    """Return the least-squares parameters of ``count`` modes; None where E does not show so many rates.
+
+    Each mode makes exp(-alpha s) times a constant and a vibration at twice its rate, so the constants add up and
+    3 count exponentials leave room for what is none.  For known rates E is linear in the rest, which ranks the
+    rates and gives the parameters.
+    """
+    stride = -(-s.size // COARSE)
+    coarse_s, coarse_e = s[::stride], e[::stride]
+    enough = CERTAIN * float(np.sum((coarse_e - np.mean(coarse_e)) ** 2))
+    best, least = None, np.inf
+    for start in _starts(s, e, coarse_s, coarse_e, count):
+        found, cost = minimise(start, lambda p: sum_and_jacobian(p, coarse_s), coarse_e)
+        if cost < least:
+            best, least = found, cost
+        if least < enough:
+            break
+    if best is not None and stride > 1:
+        best = minimise(best, lambda p: sum_and_jacobian(p, s), e)[0]
+    return best
+
+
+def _starts(s: Samples, e: Samples, coarse_s: Samples, coarse_e: Samples, count: int) -> list[Samples]:
+    """Return the best parameter vectors to start from."""
+    poles = rates(s, e, (3 * count,))
+    hopeless = _HOPELESS * float(np.sum((coarse_e - np.mean(coarse_e)) ** 2))
+    omega, alpha = poles.imag / 2, np.maximum(-poles.real, -1.0)  # growth is refused anyway
+    found = []
+    for chosen in combinations(range(poles.size), count):
+        members = list(chosen)
+        if np.diff(np.sort(omega[members])).min() >= _APART:
+            found.append(_linear(omega[members], float(np.median(alpha[members])), coarse_s, coarse_e))
+    return [start for misfit, start in sorted(found, key=lambda one: one[0])[:STARTS] if misfit < hopeless]
+
+
+def _linear(omega: Samples, alpha: float, s: Samples, e: Samples) -> tuple[float, Samples]:
+    """Fit the amplitudes for known rates; return the sum of squares and the parameters."""
+    angle = 2 * omega[:, np.newaxis] * s
+    basis = np.exp(-alpha * s) * np.concatenate([np.ones((1, s.size)), np.cos(angle), np.sin(angle)])
+    linear = np.linalg.lstsq(basis.T, e, rcond=None)[0]
+    misfit = float(np.sum((e - linear @ basis) ** 2))
+    cosine, sine = np.split(linear[1:], 2)
+    phasor = np.sqrt(2 * (cosine + 1j * sine))  # (cosine + i sine)**2 / 2 of each mode
+    table = np.stack([omega, phasor.real, phasor.imag], axis=1)
+    return misfit, np.array([alpha, *table.ravel()])

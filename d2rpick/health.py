@@ -1,0 +1,241 @@
+"""Health of a reference run: whether its energies can be trusted, and whether anything but gravity acts in the window.
+
+A term that the files do not have gives None, never 0.  Shares are of the peak of the internal energy, as practice
+takes them, and left out where that is tiny.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from d2rpick.cautions import Caution
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.balance import Balance
+    from d2rpick.history import Part, Samples
+
+# Hourglass energy is to stay below a tenth of the peak internal energy, of the model and of each part: rule of thumb of
+# DYNAmore (dynasupport.com/howtos/element/hourglass); the same tenth in NCHRP Web-Only Document 179 (2010), table E-1.
+MOST_HOURGLASS = 0.10
+# The total energy must not vary by more than a tenth: NCHRP Web-Only Document 179 (2010), table E-1.
+MOST_IMBALANCE = 0.10
+# Without friction contacts should hold less than a tenth of the peak internal energy
+# (dynasupport.com/howtos/general/contact-energy).  Negative energy has no physical cause but comes from penetrations;
+# a twentieth is what Oasys' energy check allows of either sign.
+MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
+# In free flight neither contacts nor loads work.  An energy that is off by 4 % is a deformation that is off by 0.02,
+# within which two candidates count as equally good.  For the same reason deleted elements may not hold more: LS-DYNA
+# keeps their energy in the internal energy of the model (ftp.lstc.com, FAQ energy_balance).
+MOST_WORK = 0.04
+
+# Below a millionth of the largest energy of the run, internal energy is rounding: single precision and glstat print
+# six to seven digits of the sum.  LS-DYNA's internal energy begins at a floor of 2e-20 per process.
+_TINY_SHARE, _FLOOR = 1e-6, 1e-15
+# A part whose internal energy is below a hundredth of that of another one does not matter for their sum.
+_SMALL_PART = 0.01
+# Where the run has hardly any energy yet, a small error is a large ratio (Altair, Radioss FAQ on the energy error): the
+# ratio counts where its reference exceeds a tenth of its peak, so that the tenth allowed is 1 % of that peak or more.
+_COUNTING_REFERENCE = 0.1
+# States that the five unknowns of the work of gravity and damping need, twice over.
+_FEWEST_STATES = 10
+
+
+@dataclass(frozen=True)
+class Health:
+    """How a run stands; fields are the keys of the JSON output, None for what the files do not have.
+
+    Shares are of the peak internal energy of the model (``part_hourglass_share``: of ``part``, the worst of those
+    chosen); the ratio is the total energy over the initial energy and the external work.  The last three are over
+    ``window`` [time]: how much the energy of the contacts changes, what the external work holds beyond gravity and
+    damping, how much the eroded energy grows, as shares of the mean energy of the chosen parts there.  ``reason`` says
+    why shares are None although there are energies.
+    """
+
+    hourglass_share: float | None = None
+    part_hourglass_share: float | None = None
+    part: Part | None = None
+    energy_ratio_min: float | None = None
+    energy_ratio_max: float | None = None
+    sliding_share: float | None = None
+    negative_sliding_share: float | None = None
+    eroded_share: float | None = None
+    window: tuple[float, float] | None = None
+    window_sliding: float | None = None
+    window_work: float | None = None
+    window_eroded: float | None = None
+    reason: str | None = None
+
+
+def assess(balance: Balance, window: tuple[float, float] | None = None, locked: float | None = None) -> Health:
+    """Judge the balance of a run.
+
+    Parameters
+    ----------
+    balance : Balance
+    window : (float, float), optional
+        Free flight, or the rigid window [time].
+    locked : float, optional
+        Mean energy of the chosen parts in the window; without it that of the model [energy].
+    """
+    peak = _peak(balance)
+    if balance.internal is not None and peak is None:
+        reason = "the internal energy never exceeds a millionth of the energy of the run: its shares mean nothing"
+        return Health(**_ratio(balance), window=window, reason=reason)
+    return Health(
+        hourglass_share=_share(balance.hourglass, peak),
+        **_worst_part(balance),
+        **_ratio(balance),
+        sliding_share=_share(_without_friction(balance), peak),
+        negative_sliding_share=None if balance.sliding is None else _share(-balance.sliding, peak),
+        eroded_share=_share(balance.eroded, peak),
+        window=window,
+        **(_in_window(balance, *window, locked) if window else {}),
+    )
+
+
+def cautions_of_health(health: Health) -> Iterator[Caution]:
+    """What of the health of a run should be known, with stable codes."""
+    rest = "its internal energy is not to be relied on"
+    if _above(health.hourglass_share, MOST_HOURGLASS):
+        share = f"{health.hourglass_share:.0%}"
+        yield Caution("hourglass", f"hourglass energy reaches {share} of the internal energy; {rest}")
+    if health.part and _above(health.part_hourglass_share, MOST_HOURGLASS):
+        who = health.part.title or f"part {health.part.id}"
+        share = f"{health.part_hourglass_share:.0%}"
+        yield Caution("part-hourglass", f"hourglass energy of {who} reaches {share} of its internal energy; {rest}")
+    low, high = health.energy_ratio_min, health.energy_ratio_max
+    if low is not None and high is not None and (low < 1 - MOST_IMBALANCE or high > 1 + MOST_IMBALANCE):
+        found = f"total energy over initial energy and external work ranges from {low:.3g} to {high:.3g}"
+        yield Caution("energy-ratio", f"{found}: the run gains or loses energy")
+    if _above(health.negative_sliding_share, MOST_NEGATIVE_SLIDING):
+        share = f"{health.negative_sliding_share:.0%}"
+        yield Caution("negative-sliding", f"contact energy falls to -{share} of the internal energy: penetrations")
+    if _above(health.sliding_share, MOST_SLIDING):
+        found = f"contact energy reaches {health.sliding_share:.0%} of the internal energy"
+        yield Caution("sliding", f"{found}; only friction can explain that")
+    if _above(health.eroded_share, MOST_WORK):
+        found = f"deleted elements hold {health.eroded_share:.0%} of the internal energy"
+        yield Caution("eroded-energy", f"{found}: it is counted in that of the model but does not spring back")
+    yield from _of_window(health)
+
+
+def _of_window(health: Health) -> Iterator[Caution]:
+    if not health.window:
+        return
+    where = "from {:.6g} to {:.6g}".format(*health.window)
+    if _above(health.window_sliding, MOST_WORK):
+        found = f"contact energy of the model changes by {health.window_sliding:.0%} of the energy {where}"
+        yield Caution("contact-in-window", f"{found}: where the parts touch something, they do not fly freely")
+    if _above(health.window_work, MOST_WORK):
+        found = f"external work beyond gravity and damping is {health.window_work:.0%} of the energy {where}"
+        yield Caution("work-in-window", f"{found}: where it acts on the parts, they do not fly freely")
+    if _above(health.window_eroded, 0.0):
+        yield Caution("erosion", f"elements erode {where}; those of rigid parts would not")
+
+
+def _above(value: float | None, limit: float) -> bool:
+    return value is not None and value > limit
+
+
+def _peak(balance: Balance) -> float | None:
+    """Peak of the internal energy; None where it is unknown or tiny."""
+    if balance.internal is None:
+        return None
+    terms = (balance.internal, balance.kinetic, balance.total, balance.external_work)
+    largest = max(float(np.abs(term).max()) for term in terms if term is not None)
+    peak = float(balance.internal.max())
+    return peak if peak > max(_FLOOR, _TINY_SHARE * largest) else None
+
+
+def _share(energy: Samples | None, peak: float | None) -> float | None:
+    """Highest value over the peak of the internal energy, 0 where it is never positive."""
+    return None if energy is None or peak is None else max(0.0, float(energy.max())) / peak
+
+
+def _without_friction(balance: Balance) -> Samples | None:
+    if balance.sliding is None or balance.friction is None:
+        return balance.sliding
+    return balance.sliding - balance.friction
+
+
+def _worst_part(balance: Balance) -> dict[str, Any]:
+    largest = max((e for _, _, e in balance.hourglass_of_parts), default=0.0)
+    least = max(_FLOOR, _SMALL_PART * largest)
+    shares = [(h / e, part) for part, h, e in balance.hourglass_of_parts if e > least]
+    if not shares:
+        return {}
+    share, part = max(shares, key=lambda one: one[0])
+    return {"part_hourglass_share": share, "part": part}
+
+
+def _ratio(balance: Balance) -> dict[str, Any]:
+    """Range of the energy ratio, the solver's own or that of its terms, where its reference counts."""
+    ratio, total, reference = balance.ratio, balance.total, None
+    if ratio is not None and total is not None:
+        reference = np.divide(total, ratio, out=np.zeros_like(total), where=ratio != 0)
+    elif ratio is None and balance.external_work is not None:
+        terms = (balance.internal, balance.kinetic, balance.hourglass, balance.sliding)
+        if balance.internal is not None and balance.kinetic is not None:
+            total = np.sum([term for term in terms if term is not None], axis=0)
+            reference = total[0] + balance.external_work - balance.external_work[0]
+            ratio = np.divide(total, reference, out=np.ones_like(total), where=reference != 0)
+    if ratio is None:
+        return {}
+    if reference is not None:
+        ratio = ratio[np.abs(reference) >= _COUNTING_REFERENCE * float(np.abs(reference).max())]
+    return {"energy_ratio_min": float(ratio.min()), "energy_ratio_max": float(ratio.max())}
+
+
+def _in_window(balance: Balance, start: float, end: float, locked: float | None) -> dict[str, Any]:
+    """What should not happen in free flight, as shares of the energy there."""
+    inside = slice(*np.searchsorted(balance.time, [start, np.nextafter(end, np.inf)]))
+    if locked is None and balance.internal is not None:
+        locked = float(np.mean(balance.internal[inside])) if balance.time[inside].size else None
+    if locked is None or locked <= _FLOOR:
+        return {}
+    found = {}
+    for name, energy in (("window_sliding", balance.sliding), ("window_eroded", balance.eroded)):
+        if energy is not None and energy[inside].size:
+            found[name] = _beyond_print(balance, energy[inside], float(np.ptp(energy[inside]))) / locked
+    work = balance.external_work
+    if work is not None and work[inside].size >= _FEWEST_STATES:
+        rest = float(np.abs(_beyond_gravity(balance, inside)).max())
+        found["window_work"] = _beyond_print(balance, work[inside], rest) / locked
+    return found
+
+
+def _beyond_gravity(balance: Balance, inside: slice) -> Samples:
+    """External work in a window without what gravity and damping proportional to mass explain [energy].
+
+    Gravity works by m g s with the way s of the centre of mass, such damping by -2 alpha times the integral of the
+    kinetic energy (Radioss counts it as external work).  Both are linear in integrals that are known but for
+    factors; where no velocity is written, s is taken as a parabola of time.
+    """
+    assert balance.external_work is not None
+    time, work = balance.time[inside], balance.external_work[inside]
+    elapsed = time - time[0]
+    if balance.velocity is None:
+        columns = [elapsed, elapsed**2]
+    else:
+        columns = [_integral(time, component) for component in balance.velocity[inside].T]
+    if balance.kinetic is not None:
+        columns.append(_integral(time, balance.kinetic[inside]))
+    scaled = [column / np.abs(column).max() for column in columns if column.any()]
+    table = np.stack([np.ones_like(time), *scaled], axis=1)
+    factors, *_ = np.linalg.lstsq(table, work, rcond=None)
+    return np.asarray(work - table @ factors)
+
+
+def _integral(time: Samples, values: Samples) -> Samples:
+    """Integral from the first time on, by trapezia; shape of ``time``."""
+    return np.append(0.0, np.cumsum(np.diff(time) * (values[1:] + values[:-1]) / 2))
+
+
+def _beyond_print(balance: Balance, energy: Samples, change: float) -> float:
+    """Give a change of an energy less what its printed digits leave open [energy]."""
+    return max(0.0, change - balance.precision.quantum(float(np.abs(energy).max())))

@@ -1,0 +1,116 @@
+"""The energy balance of a run under the names that each solver gives its terms."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.balance import Balance
+from d2rpick.errors import FormatError
+from d2rpick.readers.names import is_internal_energy, normalised
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from d2rpick.history import Part, Samples
+    from d2rpick.readers.database import Legs
+    from d2rpick.readers.run import Run
+
+# Normalised names, see `d2rpick.readers.names`: glstat and binout, Radioss, Abaqus (ALLAE is its hourglass energy),
+# tables.  Names are taken whole: "eroded hourglass energy" is another quantity.
+_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
+    "kinetic": ("kineticenergy", "allke", "ketotal", "ke"),
+    "rotation": ("rotationenergy",),  # Radioss keeps it apart from the kinetic energy
+    "hourglass": ("hourglassenergy", "hourglasse", "hourglass", "hgeng", "allae"),
+    "sliding": ("slidinginterfaceenergy", "slidingenergy", "contactenergy", "contacte"),
+    "friction": ("frictionalcontactenergy",),  # Radioss tells it apart
+    "external_work": ("externalwork", "extwork", "allwk"),
+    "total": ("totalenergy", "etotal"),
+    "ratio": ("totalenergyinitialenergy", "energyratio"),
+    "eroded": ("erodedinternalenergy",),
+}
+_TOTAL_INTERNAL: Final = ("ietotal", "totalinternalenergy")
+_VELOCITIES: Final = (
+    ("globalxvelocity", "globalyvelocity", "globalzvelocity"),
+    ("xmomentum", "ymomentum", "zmomentum"),
+)
+
+
+def balance_of(run: Run, parts: Sequence[Part] | None, until: float = np.inf) -> Balance | None:
+    """Read the balance of the whole model, and the hourglass energy of ``parts``, up to a time [time].
+
+    None where the files have neither, or leave open which columns are meant.
+    """
+    whole = next((database for database in run.databases if database.channels), None)
+    of_parts = _hourglass_of(run, parts, until) if parts else ()
+    if whole is None:
+        return Balance(run.databases[0].part_time, hourglass_of_parts=of_parts) if of_parts else None
+    try:
+        columns = _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
+    except FormatError:
+        return None
+    found = {name: columns.first(*names) for name, names in _NAMES.items()}
+    rotation = found.pop("rotation")
+    if rotation is not None and found["kinetic"] is not None:
+        found["kinetic"] = found["kinetic"] + rotation
+    return Balance(
+        time=whole.time[: columns.states],
+        internal=columns.internal(),
+        velocity=next(filter(lambda v: v is not None, map(columns.all, _VELOCITIES)), None),
+        hourglass_of_parts=of_parts,
+        precision=whole.precisions(columns.used)[1],
+        **found,
+    )
+
+
+class _Columns:
+    """Columns of a database by what they mean, the first ``states`` of them.
+
+    One that is absent, or not in every state, is None.
+    """
+
+    def __init__(self, database: Legs, states: int) -> None:
+        self._database = database
+        self.states = states
+        self._names = {normalised(name): name for name in reversed(database.channels)}
+        self.used: list[str] = []
+
+    def first(self, *names: str) -> Samples | None:
+        """Give the first of these columns that is there."""
+        name = next((self._names[name] for name in names if name in self._names), None)
+        return None if name is None else self._values(name)
+
+    def all(self, names: Sequence[str]) -> Samples | None:
+        """Give these columns side by side if all are there."""
+        columns = [column for column in map(self.first, names) if column is not None]
+        return np.stack(columns, axis=1) if len(columns) == len(names) else None
+
+    def internal(self) -> Samples | None:
+        """Give the internal energy of the whole model."""
+        plain = [name for name in self._names.values() if is_internal_energy(name)]
+        return self._values(plain[0]) if plain else self.first(*_TOTAL_INTERNAL)
+
+    def _values(self, name: str) -> Samples | None:
+        try:
+            values = self._database.channel(name)[: self.states]
+        except FormatError:
+            return None
+        if not np.isfinite(values).all():
+            return None
+        self.used.append(name)
+        return values
+
+
+def _hourglass_of(run: Run, parts: Sequence[Part], until: float) -> tuple[tuple[Part, float, float], ...]:
+    """Highest hourglass and internal energy of each part, where they are written."""
+    ids = [part.id for part in parts]
+    for database in run.databases:
+        try:
+            hourglass, internal = (database.part_channel(name, ids) for name in ("hourglass_energy", "internal_energy"))
+        except FormatError:
+            continue
+        before = database.part_time <= until
+        highest = (energy[before].max(axis=0, initial=0.0).tolist() for energy in (hourglass, internal))
+        return tuple(zip(parts, *highest, strict=True))
+    return ()

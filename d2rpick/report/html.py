@@ -1,0 +1,115 @@
+"""HTML from nested calls: everything that is not HTML already is escaped."""
+
+from __future__ import annotations
+
+from html import escape
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from d2rpick import __version__
+from d2rpick.report.tables import short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from d2rpick.cautions import Caution
+    from d2rpick.report.tables import Cell
+
+# Nothing is ever fetched, and nothing runs, whatever the files that were read may hold.
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+_VOID = frozenset({"meta", "link", "br", "hr"})
+
+
+class Markup(str):
+    """Text that is HTML already."""
+
+    __slots__ = ()
+
+
+def tag(name: str, /, *children: str, **attributes: str) -> Markup:
+    """Give an element; attributes that are Python's words end in an underscore, blanks in names are written so too.
+
+    Examples
+    --------
+    >>> tag("p", "a < b, ", tag("b", "bold"), class_="note")
+    '<p class="note">a &lt; b, <b>bold</b></p>'
+    >>> tag("meta", charset="utf-8")
+    '<meta charset="utf-8">'
+    """
+    given = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(text)}"' for key, text in attributes.items())
+    return Markup(f"<{name}{given}>" if name in _VOID else f"<{name}{given}>{join(children)}</{name}>")
+
+
+def join(children: Iterable[str], between: str = "") -> Markup:
+    """Put elements and texts one after the other."""
+    return Markup(
+        between.join(child if isinstance(child, Markup) else escape(child, quote=False) for child in children)
+    )
+
+
+def document(title: str, *content: str, signed: Sequence[str]) -> str:
+    """Give a whole page that needs nothing but itself, with lines to be filled in by hand at its end."""
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("title", title),
+        tag("style", resource("style.css")),
+    )
+    body = tag(
+        "body",
+        tag("header", tag("h1", title), tag("p", f"d2rpick {__version__}", class_="soft")),
+        tag("main", *content),
+        tag("p", *(tag("span", line) for line in signed), class_="sign"),
+    )
+    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+
+
+def section(title: str, *content: str) -> Markup:
+    """Give a part of a page under a heading."""
+    return tag("section", tag("h2", title), *content)
+
+
+def figure(caption: str, wide: str, narrow: str) -> Markup:
+    """Give a drawing, SVG, of which a page shows one form or the other by its width."""
+    drawings = (tag("div", Markup(svg), class_=name) for svg, name in ((wide, "wide"), (narrow, "narrow")))
+    return tag("figure", *drawings, tag("figcaption", caption))
+
+
+def cautions(found: Iterable[Caution]) -> Markup:
+    """List what to be aware of; nothing where there is nothing."""
+    warnings = [tag("li", tag("b", caution.code), f": {caution.message}") for caution in found]
+    return tag("ul", *warnings, class_="warnings") if warnings else Markup()
+
+
+def resource(name: str) -> Markup:
+    """Read a text that is part of the package."""
+    return Markup(files("d2rpick.report").joinpath(name).read_text("utf-8"))
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None) -> Markup:
+    """Give a table in a box that scrolls sideways where it is too wide; the row ``marked`` stands out.
+
+    Columns of numbers, and of what is not known, are set to the right.
+    """
+    body = [list(row) for row in rows]
+    right = [all(row[i] is None or isinstance(row[i], (int, float)) for row in body) for i in range(len(head))]
+    classes = [{"class_": "number"} if one else {} for one in right]
+
+    def line(cell: str, texts: Iterable[str], **attributes: str) -> Markup:
+        return tag("tr", *(tag(cell, text, **own) for text, own in zip(texts, classes, strict=True)), **attributes)
+
+    lines = [line("td", map(_text, row), **({"class_": "marked"} if i == marked else {})) for i, row in enumerate(body)]
+    content = tag("table", tag("thead", line("th", head)), tag("tbody", *lines))
+    return tag("div", content, class_="scroll", tabindex="0")
+
+
+def pairs(rows: Iterable[tuple[str, str]]) -> Markup:
+    """Give a list of names, each with what it stands for; nothing where there are none."""
+    listed = [tag("div", tag("dt", name), tag("dd", text)) for name, text in rows]
+    return tag("dl", *listed) if listed else Markup()
+
+
+def _text(cell: Cell) -> str:
+    return cell if isinstance(cell, Markup) else short(cell)

@@ -1,0 +1,221 @@
+"""The deformation of each part, with its sign, read from the zeros of the part's own energy.
+
+The root of a part's energy is proportional to its deformation but for the sign, and the sign turns where the energy
+passes through zero.  In a record no energy is zero exactly.  But the deformation is smooth: through a zero the root
+bends sharply unless the sign is turned there, at any other minimum it bends sharply if it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from d2rpick.envelope import Envelope
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.history import Samples
+    from d2rpick.mode import Mode
+    from d2rpick.modes import Modes
+
+# One way must be this many times smoother than the other to be believed.  At 24 samples per period of a chain of two
+# springs the least clear of 35 minima has 2.5, the usual ones have 5 to 60.
+_CLEARLY = 2.0
+# A deformation that swings about zero is zero on average; beyond this share of its mean size it swings about
+# something else, a preload or plastic work, and its sign at a zero of the energy means nothing.
+_MOST_OFF_CENTRE = 0.5
+# Every other sample is left out again and again while minima are unclear: in fine output a zero drowns in the error
+# of the solver, 1e-5 of the highest energy, and the root is round there.  But minima stay this many samples apart.
+_LEAST_APART = 8
+# Parts without a sign are left out where they hold no more than this share of the energy: D changes by 0.2 at most,
+# the default tolerance.
+MOST_UNSIGNED = 0.01
+
+
+class Unsigned(NamedTuple):
+    """A part whose deformation has no sign, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Signed deformations of parts over ``time`` (n,).
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the k parts that have a sign.
+    deformation : array of shape (k, n)
+        Root of the energy with the sign; of one part the sign as a whole is arbitrary [sqrt(energy)].
+    unclear : array
+        Times at which the sign of some part may turn or not: no two times on different sides can be compared.
+    unsigned : tuple of Unsigned
+        Parts that were left out.
+    unsigned_share : float
+        What they hold of the energy, on average [-].
+    """
+
+    names: tuple[str, ...]
+    time: Samples
+    deformation: Samples
+    unclear: Samples
+    unsigned: tuple[Unsigned, ...]
+    unsigned_share: float
+
+    @property
+    def signed(self) -> bool:
+        """Whether enough of the energy lies in parts that have a sign."""
+        return bool(self.names) and self.unsigned_share <= MOST_UNSIGNED
+
+    def amplitudes(self, t: Samples | float) -> Samples:
+        """Signed deformations, of the shape of ``t`` with an axis for the parts before it [sqrt(energy)]."""
+        return np.stack([np.interp(t, self.time, column) for column in self.deformation])
+
+    def comparable_since(self, td: float) -> float:
+        """Earliest time whose signs can be compared with those at ``td`` [time]."""
+        before = self.unclear[self.unclear < td]
+        return float(before[-1] if before.size else self.time[0])
+
+
+def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Parts:
+    """Read the signed deformation of each part.
+
+    Parameters
+    ----------
+    time : array of shape (n,)
+        Of free flight [time].
+    energies : array of shape (n, k)
+        Internal energies of the parts [energy].
+    names : sequence of str
+        Of the k parts.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 2.0, 201)
+    >>> one, other = np.sin(5 * t) + np.sin(8 * t), np.cos(5 * t) - 0.5 * np.cos(8 * t)
+    >>> found = read_parts(t, np.stack([one**2, other**2, other**2 + 1], axis=1), ["one", "other", "third"])
+    >>> found.names, [part.name for part in found.unsigned]
+    (('one', 'other'), ['third'])
+    >>> bool(np.abs(np.abs(found.deformation[0] @ one) - one @ one) < 1e-9)
+    True
+    """
+    signed: list[tuple[str, Samples]] = []
+    unsigned: list[Unsigned] = []
+    unclear: list[Samples] = []
+    roots = np.sqrt(np.maximum(energies, 0.0)).T
+    for name, root in zip(names, roots, strict=True):
+        zeros = _zeros(time, root)
+        deformation = np.where(np.searchsorted(zeros.sure, time) % 2, -root, root)
+        reason = _no_sign(time, deformation, zeros.sure)
+        if reason:
+            unsigned.append(Unsigned(name, reason))
+        else:
+            signed.append((name, deformation))
+            unclear += [zeros.doubtful, zeros.unseen]
+    total = float(np.sum(roots**2))
+    held = sum(float(np.sum(column**2)) for _, column in signed)
+    return Parts(
+        names=tuple(name for name, _ in signed),
+        time=time,
+        deformation=np.array([column for _, column in signed]),
+        unclear=np.sort(np.concatenate(unclear)) if unclear else np.zeros(0),
+        unsigned=tuple(unsigned),
+        unsigned_share=1 - held / total if total > 0 else 1.0,
+    )
+
+
+def _no_sign(time: Samples, deformation: Samples, zeros: Samples) -> str | None:
+    """Say why a deformation is none that swings about zero."""
+    if zeros.size < 2:
+        return "its energy does not come back to zero: it is preloaded, has yielded or vibrates in many modes"
+    lasting = np.gradient(time)
+    off, size = abs(float(lasting @ deformation)), float(lasting @ np.abs(deformation))
+    if off > _MOST_OFF_CENTRE * size:
+        return f"its deformation would swing about {off / size:.2g} of its mean size: it is preloaded or has yielded"
+    return None
+
+
+class _Zeros(NamedTuple):
+    """Times at which a deformation passes zero, at which it may or may not, and, near the ends, cannot be seen to."""
+
+    sure: Samples
+    doubtful: Samples
+    unseen: Samples
+
+
+def _zeros(time: Samples, root: Samples) -> _Zeros:
+    """Find the zeros from every sample, or every other, and so on: what leaves the fewest doubts."""
+    best, stride = _zeros_of(time, root), 2
+    while best.doubtful.size and _spacing(root[::stride]) >= _LEAST_APART:
+        coarser = _zeros_of(time[::stride], root[::stride])
+        best, stride = min(best, coarser, key=lambda found: found.doubtful.size), 2 * stride
+    return best
+
+
+def _zeros_of(time: Samples, root: Samples) -> _Zeros:
+    """Zeros from just these samples."""
+    at = _minima(root)
+    # two samples to either side tell how the root bends; of a minimum nearer to an end nothing is known
+    early, late = at < 2, at >= root.size - 2
+    inner = at[~early & ~late]
+    around = inner[:, np.newaxis] + np.arange(-2, 3)
+    times, roots = time[around], root[around]
+    plain = _bend(times, roots)
+    before = _bend(times, roots * np.array([-1, -1, 1, 1, 1]))
+    after = _bend(times, roots * np.array([-1, -1, -1, 1, 1]))
+    turned = np.minimum(before, after)
+    zero = plain > _CLEARLY * turned
+    doubt = ~zero & (turned <= _CLEARLY * plain)
+    left = np.where(before < after, inner - 1, inner)[zero]
+    weight = root[left] + root[left + 1]
+    share = np.divide(root[left], weight, out=np.full(left.shape, 0.5), where=weight > 0)
+    # a zero beside a minimum near an end may lie one sample further inwards
+    unseen = np.concatenate([time[at[early] + 1], time[at[late] - 1]])
+    return _Zeros(time[left] + share * (time[left + 1] - time[left]), time[inner[doubt]], unseen)
+
+
+def _minima(values: Samples) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Indices of local minima, of a flat one the first; an end below its neighbour counts."""
+    around = np.concatenate([[np.inf], values, [np.inf]])
+    return np.flatnonzero((values < around[:-2]) & (values <= around[2:]))
+
+
+def _spacing(values: Samples) -> float:
+    """Mean number of samples from one minimum to the next."""
+    return values.size / max(1, _minima(values).size)
+
+
+def _bend(times: Samples, values: Samples) -> Samples:
+    """Largest second divided difference of each row of five samples."""
+    slopes = np.diff(values) / np.diff(times)
+    return np.asarray(np.abs(np.diff(slopes)).max(axis=1, initial=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class PartVibration:
+    """Vibration of signed parts: ``whole`` knows its energy, a model of all parts together or an estimate."""
+
+    parts: Parts
+    whole: Mode | Modes | Envelope
+
+    def amplitudes(self, t: Samples | float) -> Samples:
+        """Signed deformations of the parts, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
+        return self.parts.amplitudes(t)
+
+    def kinetic_energy(self, t: Samples | float) -> Samples:
+        """Kinetic energy of the vibration, T: of the model, or what the estimate leaves beside E [energy]."""
+        if isinstance(self.whole, Envelope):
+            return np.maximum(self.whole.vibration_energy(t) - self._energy(t), 0.0)
+        return self.whole.kinetic_energy(t)
+
+    def vibration_energy(self, t: Samples | float) -> Samples:
+        """Energy of the vibration, V = E + T [energy]."""
+        return self._energy(t) + self.kinetic_energy(t)
+
+    def _energy(self, t: Samples | float) -> Samples:
+        return np.asarray(np.sum(self.amplitudes(t) ** 2, axis=0))

@@ -1,0 +1,110 @@
+"""Choosing both times: td in a window, and tr for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from d2rpick.candidates import find_candidates
+from d2rpick.choice import EQUALLY_GOOD, Pair, Suggestion, best_of, rank, suggest
+from d2rpick.expectation import expectation, mean_in_flight, shortfall
+from d2rpick.momentum import all_flights, to_be_asked
+from d2rpick.situation import examine
+
+if TYPE_CHECKING:
+    from d2rpick.candidates import Candidate
+    from d2rpick.history import History
+    from d2rpick.situation import Settings, Situation
+
+# Peaks of a window that are tried, the highest first: the higher a peak of several modes, the less energy is kinetic.
+_MOST_PEAKS = 12
+# Where a flight may be known from, best first.
+_SOURCES = ("given", "momentum", "oscillator", "energy", None)
+
+
+def suggest_in_window(history: History, window: tuple[float, float], settings: Settings) -> Suggestion:
+    """Choose td in ``window`` and tr for it; RangeError when the window lies outside the record.
+
+    Where deformations are known: of the best pairs of each peak of the energy those with a residual within 0.02 of
+    the smallest, and of these the one with the longest rigid window.  Where no peak has an acceptable tr, the ends of
+    the window are tried.  On the energy alone: the highest acceptable peaks up to twice the mean energy.
+    """
+    for time in window:
+        history.energy_at(time)
+    situation = _flying(history, window, settings)
+    window_in_flight = window[0], min(window[1], situation.latest_td)
+    if situation.vibration is None:
+        found = _highest(situation, window_in_flight)
+    else:
+        peaks = situation.peaks(*window_in_flight)
+        td = _best_td(situation, peaks) or _best_td(situation, window_in_flight) or window[1]
+        found = suggest(history, td, settings)
+    return replace(found, td_window=window)
+
+
+def advice(history: History, settings: Settings) -> str:
+    """Tell where td should lie when none was given: before the end of the flight, on the last peak before it."""
+    time = history.time
+    flights = next(filter(None, (all_flights(momenta) for momenta in to_be_asked(history.momenta))), ())
+    if flights:
+        longest = max(flights, key=lambda flight: flight.end - flight.start)
+        start, end, seen = longest.start, longest.end, longest.end_seen
+    else:
+        middle = examine(history, float(time[0] + time[-1]) / 2, settings)
+        start, seen = middle.flight.start or float(time[0]), middle.flight.end is not None
+        end = float(time[-1]) if middle.flight.end is None else middle.flight.end
+    peaks = [t for t in examine(history, (start + end) / 2, settings).peaks(start, end) if t < end]
+    where = f"the flight ends at {end:.6g}" if seen else f"no next contact was seen up to the end at {end:.6g}"
+    last = f"the last peak of the energy before it is at {peaks[-1]:.6g}" if peaks else "the energy has no peak there"
+    return f"{', '.join(history.source)}: {where}, {last}; give --td or --td-window"
+
+
+def _flying(history: History, window: tuple[float, float], settings: Settings) -> Situation:
+    """Situation at the start, middle or end of the window: in the flight that is known best, the first of these."""
+    low, high = window
+    situations = [examine(history, td, settings) for td in (low, (low + high) / 2, high)]
+    return min(situations, key=lambda one: (not one.in_flight, _SOURCES.index(one.flight.source)))
+
+
+def _best_td(situation: Situation, times: tuple[float, ...]) -> float | None:
+    """Td of the best pair, of the highest of these times; None where none has an acceptable tr."""
+    highest = sorted(times, key=lambda t: -situation.energy_at(t))[:_MOST_PEAKS]
+    pairs: list[tuple[Situation, Candidate]] = []
+    for td in highest:
+        there = examine(situation.history, td, situation.settings)
+        best = best_of(there, rank(find_candidates(there)))
+        if best and not best.same_swing:
+            pairs.append((there, best))
+    limit = min((best.error for _, best in pairs), default=0.0) + EQUALLY_GOOD
+    good = [(best.rigid_time, there.td) for there, best in pairs if best.error <= limit]
+    return max(good)[1] if good else None
+
+
+def _highest(situation: Situation, window: tuple[float, float]) -> Suggestion:
+    """Choose the highest peaks up to twice the mean energy; without them what is best at the end of the window."""
+    history, settings, mean = situation.history, situation.settings, mean_in_flight(situation)
+    if mean is not None:
+        peaks = [t for t in situation.peaks(*window) if shortfall(history.energy_at(t), mean) < 1]
+        peaks_before = set(situation.peaks(float(history.time[0]), window[1]))
+        for td in sorted(peaks, key=lambda t: shortfall(history.energy_at(t), mean)):
+            found = suggest(history, td, settings)
+            errors = [
+                (shortfall(c.energy, mean), c)
+                for c in found.candidates
+                if c.acceptable and not c.same_swing and c.tr in peaks_before
+            ]
+            limit = min((error for error, _ in errors), default=0.0) + EQUALLY_GOOD
+            good = [c for error, c in errors if error <= limit < float("inf")]
+            if good:
+                return _recommending(found, min(good, key=lambda c: c.tr))
+    return suggest(history, window[1], settings)
+
+
+def _recommending(found: Suggestion, best: Candidate) -> Suggestion:
+    """Give the suggestion with another candidate recommended."""
+    return replace(
+        found,
+        candidates=tuple(replace(c, recommended=c is best) for c in found.candidates),
+        recommended=Pair(best.tr, found.situation.td, best.residual),
+        expected=expectation(found.situation, best.energy),
+    )

@@ -1,0 +1,30 @@
+"""A chain of three masses and two springs, run by a real solver with and without switching."""
+
+from __future__ import annotations
+
+import csv
+from functools import cache
+from typing import TYPE_CHECKING
+
+from d2rpick.readers import Selection, read_history
+from tests.shared import shared
+
+if TYPE_CHECKING:
+    from d2rpick.history import History
+
+TD_PEAK, TD_LATE = 0.13505, 0.238
+
+
+@cache
+def history(*energies: str) -> History:
+    """Record of the run without switching, by default with the energies of both springs."""
+    energies = energies or ("IE_spring1_J", "IE_spring2_J")
+    return read_history([str(shared("openradioss/chain_ref.csv"))], Selection(energy=energies))
+
+
+@cache
+def scan() -> tuple[dict[str, float], ...]:
+    """Switched runs: times, true signs of both springs, and the computed residual."""
+    names = ("tr_s", "td_s", "sign1", "sign2", "R_sim")
+    with shared("openradioss/chain_scan.csv").open(encoding="ascii") as lines:
+        return tuple({name: float(row[name]) for name in names} for row in csv.DictReader(lines))

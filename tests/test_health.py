@@ -1,0 +1,193 @@
+"""Health of a reference run: every threshold from both sides, every missing term, and what real runs show."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.balance import Balance
+from d2rpick.health import Health, assess, cautions_of_health
+from d2rpick.history import Part, Precision
+from d2rpick.readers import open_run
+from d2rpick.readers.balance import balance_of
+from d2rpick.report.health import measures_of
+from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run
+from tests.shared import shared
+
+if TYPE_CHECKING:
+    from d2rpick.history import Samples
+
+ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
+TIME: Samples = np.linspace(0.0, 1.0, 201)
+ONES = np.ones_like(TIME)
+# A body that is thrown up and vibrates: internal energy 2 J, the work of gravity a parabola.
+INTERNAL = 2.0 + np.sin(60 * TIME)
+WORK = -100.0 * TIME * (1.0 - TIME)
+KINETIC = 50 + WORK - np.sin(60 * TIME)
+HEALTHY = Balance(
+    TIME, internal=INTERNAL, kinetic=KINETIC, hourglass=0.0 * ONES, sliding=0.0 * ONES,
+    external_work=WORK, eroded=0.0 * ONES,
+)  # fmt: skip
+PART = Part(7, "floor")
+WINDOW = (0.2, 0.8)
+
+
+def warned(balance: Balance, window: tuple[float, float] | None = WINDOW) -> list[str]:
+    return [caution.code for caution in cautions_of_health(assess(balance, window))]
+
+
+def test_a_healthy_run_gets_no_warning_and_keeps_all_limits() -> None:
+    health = assess(HEALTHY, WINDOW)
+    assert not list(cautions_of_health(health))
+    assert health.window_work == pytest.approx(0.0, abs=1e-3)
+    assert all(one.good for one in measures_of(health) if one.value)
+
+
+@pytest.mark.parametrize(
+    ("code", "terms", "more"),
+    [
+        ("hourglass", {"hourglass": 0.29 * TIME}, {"hourglass": 0.31 * TIME}),
+        ("part-hourglass", {"hourglass_of_parts": ((PART, 0.09, 1.0),)}, {"hourglass_of_parts": ((PART, 0.11, 1.0),)}),
+        ("energy-ratio", {"kinetic": KINETIC + 4 * TIME}, {"kinetic": KINETIC + 6 * TIME}),
+        ("energy-ratio", {"ratio": ONES - 0.09 * TIME}, {"ratio": ONES - 0.11 * TIME}),
+        ("sliding", {"sliding": 0.29 * (TIME < 0.1)}, {"sliding": 0.31 * (TIME < 0.1)}),
+        ("negative-sliding", {"sliding": -0.14 * (TIME < 0.1)}, {"sliding": -0.16 * (TIME < 0.1)}),
+        ("contact-in-window", {"sliding": 0.1 * (TIME > 0.9)}, {"sliding": 0.1 * (TIME > 0.5)}),
+        ("work-in-window", {"external_work": WORK + 0.1 * TIME}, {"external_work": WORK + 0.5 * (TIME > 0.5)}),
+        ("erosion", {"eroded": 0.01 * (TIME > 0.1)}, {"eroded": 0.01 * (TIME > 0.5)}),
+        ("eroded-energy", {"eroded": 0.1 * (TIME > 0.1)}, {"eroded": 0.2 * (TIME > 0.1)}),
+    ],
+)  # fmt: skip
+def test_a_warning_comes_beyond_its_threshold_only(
+    code: str, terms: dict[str, Samples], more: dict[str, Samples]
+) -> None:
+    assert code not in warned(replace(HEALTHY, **terms))  # type: ignore[arg-type]
+    assert code in warned(replace(HEALTHY, **more))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("term", "measures"),
+    [
+        ("internal", ["hourglass_share", "energy_ratio_min", "sliding_share", "eroded_share"]),
+        ("hourglass", ["hourglass_share"]),
+        ("sliding", ["sliding_share", "negative_sliding_share", "window_sliding"]),
+        ("external_work", ["energy_ratio_min", "energy_ratio_max", "window_work"]),
+        ("eroded", ["eroded_share", "window_eroded"]),
+    ],
+)
+def test_what_the_files_do_not_have_is_unknown_and_not_zero(term: str, measures: list[str]) -> None:
+    health = assess(replace(HEALTHY, **{term: None}), WINDOW)  # type: ignore[arg-type]
+    assert [getattr(health, name) for name in measures] == [None] * len(measures)
+    assert [getattr(assess(HEALTHY, WINDOW), name) for name in measures].count(None) == 0
+
+
+def test_nothing_known_is_nothing_said() -> None:
+    assert assess(Balance(TIME)) == Health()
+
+
+@pytest.mark.parametrize("internal", [2e-20 * ONES, 1e-5 * INTERNAL])
+def test_shares_of_a_tiny_internal_energy_are_left_out_with_the_reason(internal: Samples) -> None:
+    health = assess(replace(HEALTHY, internal=internal, hourglass=ONES), WINDOW)
+    assert health.hourglass_share is None
+    assert health.sliding_share is None
+    assert health.reason
+    assert not [code for code in warned(replace(HEALTHY, internal=internal, hourglass=ONES)) if code != "energy-ratio"]
+
+
+def test_a_part_without_energy_of_its_own_is_not_the_worst_part() -> None:
+    parts = ((PART, 0.05, 1.0), (Part(8, "trim"), 0.005, 0.008))
+    assert assess(replace(HEALTHY, hourglass_of_parts=parts)).part == PART
+
+
+def test_friction_that_is_told_apart_is_no_penetration() -> None:
+    touching = np.where(TIME < 0.1, 1.0, 0.0)
+    rubbing = replace(HEALTHY, sliding=touching, friction=0.9 * touching)
+    assert "sliding" not in warned(rubbing)
+    assert "sliding" in warned(replace(rubbing, friction=None))
+
+
+def test_a_ratio_is_not_judged_where_the_run_has_hardly_any_energy_yet() -> None:
+    total = 10 * TIME + 1e-3
+    ratio = np.where(TIME < 0.05, 30.0, 1.0)
+    assert "energy-ratio" not in warned(replace(HEALTHY, total=total, ratio=ratio))
+
+
+def test_damping_that_counts_as_external_work_is_no_load() -> None:
+    decaying = 50 * np.exp(-3 * TIME) * (1.2 + np.cos(60 * TIME))
+    spent = -3 * np.append(0, np.cumsum((decaying[1:] + decaying[:-1]) / 2 * np.diff(TIME)))
+    velocity = np.stack([np.exp(-3 * TIME), ONES, 1 - 2 * TIME], axis=1)
+    damped = replace(HEALTHY, kinetic=decaying, external_work=WORK + spent, velocity=velocity)
+    assert "work-in-window" not in warned(damped)
+    assert "work-in-window" in warned(replace(damped, kinetic=None))
+
+
+def test_what_printed_digits_leave_open_is_no_work() -> None:
+    printed = np.round(2e6 + 3 * WORK, -1)
+    assert "work-in-window" in warned(replace(HEALTHY, external_work=printed))
+    assert "work-in-window" not in warned(replace(HEALTHY, external_work=printed, precision=Precision(digits=6)))
+
+
+def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> None:
+    run_of = open_run([ROLLOVER_T01])
+    box = [part for part in run_of.parts if part.title == "box"]
+    flight = (0.0886, 0.37)
+    before = assess(balance_of(run_of, box, until=0.37) or Balance(TIME), flight, locked=1.75)
+    assert not list(cautions_of_health(before))
+    assert before.energy_ratio_min == pytest.approx(1.0, abs=1e-3)
+    for window, code in (((0.06, 0.37), "work-in-window"), ((0.0886, 0.4), "contact-in-window")):
+        whole = assess(balance_of(run_of, box) or Balance(TIME), window, locked=1.75)
+        assert code in {caution.code for caution in cautions_of_health(whole)}
+
+
+@pytest.mark.parametrize("name", ["oscillator_referenceT01.gz", "chain_referenceT01.gz"])
+def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
+    run_of = open_run([str(shared(f"openradioss/{name}"))])
+    health = assess(balance_of(run_of, run_of.parts) or Balance(TIME), (0.013, 0.064))
+    assert health.window_work is not None
+    assert health.window_work < 1e-3
+    assert not list(cautions_of_health(health))
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "expected"),
+    [
+        ("PILLARS-LSDyna__Bolt_B_Explicit-glstat", {"hourglass_share": 0.0}, {"energy-ratio", "sliding"}),
+        ("Crimping__results-glstat.head16000", {"hourglass_share": 0.0082211}, {"sliding"}),
+        ("Masters-Project__Steel_Explicit-glstat.head16000", {"hourglass_share": None, "sliding_share": 0.0}, set()),
+        ("lasso-python__sph_models-R12_2_1-binout", {"energy_ratio_min": 0.950303}, set()),
+        ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01", {"part_hourglass_share": 0.0574625}, set()),
+        # of its names only two are sure
+        ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01.csv", {"hourglass_share": None}, set()),
+        ("OpenRadioss__miniqa-onefile_rad-reference-CRA2AV4T01", {}, {"hourglass", "part-hourglass"}),
+    ],
+)
+def test_each_solver_s_names_are_found(name: str, known: dict[str, float | None], expected: set[str]) -> None:
+    run_of = open_run([str(shared(f"real/histories/{name}"))])
+    health = assess(balance_of(run_of, run_of.parts) or Balance(TIME))
+    for key, value in known.items():
+        assert getattr(health, key) == (value and pytest.approx(value, rel=1e-4))
+    assert {caution.code for caution in cautions_of_health(health)} == expected
+
+
+def test_suggest_and_info_tell_the_health() -> None:
+    found = answer("suggest", "--td", "0.37", "--part", "box", ROLLOVER_T01)
+    assert found["health"]["part"] == {"id": 1, "title": "box"}
+    assert found["health"]["window"] == [found["recommended"]["tr"], 0.37]
+    assert not codes(found) & {"hourglass", "energy-ratio", "sliding", "work-in-window"}
+    about = answer("info", ROLLOVER_T01)
+    assert about["health"]["sliding_share"] == pytest.approx(0.0523, abs=1e-3)
+    assert "hourglass energy of box" in run("info", ROLLOVER_T01).stdout
+
+
+def test_a_window_that_reaches_into_the_next_contact_is_warned_of() -> None:
+    found = answer("suggest", "--td", "0.39", "--part", "box", "--after", "0.1", ROLLOVER_T01)
+    assert "contact-in-window" in codes(found)
+
+
+@pytest.mark.parametrize("source", [ENERGY, GLSTAT])
+def test_files_without_a_balance_leave_it_unknown(source: str) -> None:
+    found = answer("suggest", "--td", "0.064", source)
+    assert {value for key, value in found["health"].items() if key != "window"} == {None}

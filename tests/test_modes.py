@@ -1,0 +1,170 @@
+"""Several modes: their energies add up, they are found from the sum, and refused where there are more of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import approx_fprime
+
+from d2rpick.choice import suggest
+from d2rpick.history import History
+from d2rpick.identify import identify, identify_several
+from d2rpick.measures import kinetic_share, lock_in_error, residual
+from d2rpick.mode import Mode
+from d2rpick.modes import Modes, sum_and_jacobian
+from d2rpick.replay import replayed_residual
+from d2rpick.situation import Settings, examine
+from tests import chain
+from tests.records import noisy, printed
+from tests.shared import columns
+
+TIME = np.linspace(0, 6, 1200)
+
+
+def random_modes(rng: np.random.Generator, count: int) -> Modes:
+    """Modes of one damping, the slowest with period 1, the others up to four times as fast."""
+    rates = 2 * np.pi * np.sort(1 + np.append(0.0, rng.uniform(0.2, 3, count - 1)))
+    alpha = rng.uniform(0, 0.5)
+    return Modes(tuple(Mode(float(w), float(alpha), rng.normal(), rng.normal(), 0.0) for w in rates))
+
+
+TWO = random_modes(np.random.default_rng(5), 2)
+
+
+def of(modes: Modes) -> History:
+    return History(TIME, modes.energy(TIME), source=("test",), format="csv", channel="E")
+
+
+# ---- closed form
+
+
+def test_energies_add_up_and_decay_by_the_damping() -> None:
+    np.testing.assert_allclose(TWO.energy(TIME), np.sum(TWO.amplitudes(TIME) ** 2, axis=0), rtol=1e-13)
+    np.testing.assert_allclose(TWO.vibration_energy(TIME), TWO.energy(TIME) + TWO.kinetic_energy(TIME), rtol=1e-12)
+    h = 1e-5
+    slope = (TWO.vibration_energy(TIME + h) - TWO.vibration_energy(TIME - h)) / (2 * h)
+    np.testing.assert_allclose(slope, -2 * TWO.alpha * TWO.kinetic_energy(TIME), atol=1e-6)
+
+
+def test_slopes_are_those_of_the_energy() -> None:
+    first, second = TWO.energy_slopes(TIME)
+    h = 1e-5
+    np.testing.assert_allclose((TWO.energy(TIME + h) - TWO.energy(TIME - h)) / (2 * h), first, atol=1e-5)
+    before, after = TWO.energy_slopes(TIME - h)[0], TWO.energy_slopes(TIME + h)[0]
+    np.testing.assert_allclose((after - before) / (2 * h), second, atol=1e-3)
+
+
+def test_crossings_and_extrema_are_where_the_energy_says() -> None:
+    td = 4.321
+    crossings, turns = np.array(TWO.level_crossings(td, 0.0)), np.array(TWO.extrema(0.0, td))
+    np.testing.assert_allclose(TWO.energy(crossings), TWO.energy(td), rtol=1e-9)
+    np.testing.assert_allclose(TWO.energy_slopes(turns)[0], 0, atol=1e-9)
+    side = TWO.energy(TIME[td > TIME]) > TWO.energy(td)
+    assert crossings.size >= np.count_nonzero(side[1:] != side[:-1])
+    assert set(TWO.peaks(0.0, td)) < set(turns)
+
+
+def test_the_jacobian_is_that_of_the_energy() -> None:
+    parameters = np.array([0.3, 5.0, 1.0, -0.4, 8.0, 0.2, 0.7])
+    for at in (0.0, 0.4, 1.0):
+        s = np.array([at])
+        found = sum_and_jacobian(parameters, s)[1][:, 0]
+        expected = approx_fprime(parameters, lambda p, s=s: float(sum_and_jacobian(p, s)[0][0]), 1e-7)
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_the_residual_of_the_sum_is_that_of_its_measures() -> None:
+    tr, td = np.array([0.4, 1.3, 2.2]), 4.1
+    kinetic = kinetic_share(TWO, td)
+    expected = [residual(float(error), kinetic) for error in lock_in_error(TWO, tr, td)]
+    np.testing.assert_allclose(replayed_residual(TWO, tr, td), expected, rtol=1e-10)
+
+
+# ---- identification
+
+
+@pytest.mark.parametrize("count", [2, 3])
+@pytest.mark.parametrize(("noise", "median", "worst"), [(0.0, 1e-6, 1e-5), (0.01, 3e-3, 0.07)])
+def test_the_residual_is_predicted_from_the_total_energy(count: int, noise: float, median: float, worst: float) -> None:
+    rng = np.random.default_rng(20261)
+    errors: list[float] = []
+    tried, tr, td = 0, np.array([1.3]), 4.0
+    while tried < 25:
+        modes = random_modes(rng, count)
+        amplitudes = [float(mode.vibration_energy(0.0)) for mode in modes.modes]
+        if min(amplitudes) < 0.05 * max(amplitudes) or modes.apart * TIME[-1] < np.pi:
+            continue  # a mode that is hardly there, or beside another, is neither found nor missed
+        found = identify_several(TIME, noisy(printed(modes.energy(TIME)), noise, seed=tried))
+        tried += 1
+        assert found.mode is not None
+        if found.describes_record:
+            errors.append(abs(float((replayed_residual(found.mode, tr, td) - replayed_residual(modes, tr, td))[0])))
+    assert len(errors) >= 24
+    assert np.median(errors) <= median
+    assert max(errors) <= worst
+
+
+@pytest.mark.parametrize("count", [5, 12])
+def test_more_modes_are_refused(count: int) -> None:
+    rng = np.random.default_rng(count)
+    for _ in range(25):
+        energy = random_modes(rng, count).energy(TIME)
+        for found in (identify(TIME, energy), identify_several(TIME, energy)):
+            assert not found.describes_record
+            assert found.reason
+
+
+def test_the_rollover_is_refused() -> None:
+    time, energy = columns("openradioss/rollover_ref.csv", "boxIE_J")
+    for start, end in ((0.0, 0.45), (0.0884, 0.37), (0.25, 0.37)):
+        inside = (time >= start) & (time <= end)
+        assert not identify_several(time[inside], energy[inside]).describes_record
+
+
+def test_energy_of_one_part_in_which_modes_mix_is_refused() -> None:
+    one, other = (mode.deformation(TIME) for mode in TWO.modes)
+    assert not identify_several(TIME, (one + other) ** 2).describes_record
+
+
+@pytest.mark.parametrize(
+    ("time", "energy", "reason"),
+    [
+        (TIME[:20], TWO.energy(TIME[:20]), "20 samples"),
+        (TIME, np.ones(TIME.size), "constant"),
+        (TIME, np.exp(-TIME), ""),
+    ],
+)
+def test_records_without_several_modes_say_so(time: np.ndarray, energy: np.ndarray, reason: str) -> None:
+    found = identify_several(time, energy)
+    assert not found.describes_record
+    assert reason in (found.reason or "")
+
+
+# ---- the choice
+
+
+def test_several_modes_are_chosen_by_and_replayed() -> None:
+    answer = suggest(of(TWO), TWO.peaks(4.0, 5.0)[0], Settings(tolerance=0.5))
+    situation = answer.situation
+    assert (situation.basis, situation.fit and situation.fit.describes_record) == ("oscillator", True)
+    assert isinstance(situation.mode, Modes)
+    assert {c.kind for c in answer.candidates} == {"crossing", "extremum", "match"}
+    tr = np.array([c.tr for c in answer.candidates])
+    expected = replayed_residual(TWO, tr, situation.td)
+    assert [c.residual for c in answer.candidates] == pytest.approx(expected.tolist(), abs=1e-6)
+    assert all(c.rigid_time > 0 for c in answer.candidates)
+
+
+def test_the_total_energy_of_the_chain_tells_its_two_modes() -> None:
+    situation = examine(chain.history("IE_total_J"), chain.TD_PEAK, Settings())
+    assert isinstance(situation.mode, Modes)
+    periods = sorted(2 * np.pi / mode.omega for mode in situation.mode.modes)
+    assert periods == pytest.approx([0.0285, 0.0491], abs=1e-4)
+    assert situation.mode.alpha == pytest.approx(5, rel=1e-3)
+    assert situation.kinetic_share == pytest.approx(0.00065, abs=1e-4)
+    errors = []
+    for run in chain.scan():
+        there = situation.at(run["td_s"])
+        assert there.mode is not None
+        errors.append(abs(float(replayed_residual(there.mode, np.array([run["tr_s"]]), there.td)[0]) - run["R_sim"]))
+    assert max(errors) < 0.025

@@ -1,0 +1,47 @@
+"""How the lock-in error runs before td: its minima, and how far a tr may be off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from d2rpick import measures
+from d2rpick.mode import Mode
+from d2rpick.profile import Profile
+
+MODE = Mode(omega=2 * np.pi, alpha=0.2, cosine=0.0, sine=1.0, origin=0.0)
+TD = 5.1
+PROFILE = Profile.of(MODE, np.arange(0, 6, 1 / 64), TD)
+
+
+def test_it_ends_before_td() -> None:
+    assert PROFILE.time[-1] < TD
+    np.testing.assert_allclose(PROFILE.error, measures.lock_in_error(MODE, PROFILE.time, TD))
+
+
+def test_minima_are_where_the_deformation_is_that_at_td() -> None:
+    crossings = np.array(MODE.crossings(float(MODE.deformation(TD)), 0.0, TD - 0.1))
+    found = np.array(PROFILE.minima())
+    assert max(np.abs(found - t).min() for t in crossings) < 2e-3
+
+
+def test_three_times_are_needed_for_a_minimum() -> None:
+    assert Profile(np.array([0.0, 1.0]), np.array([1.0, 0.0])).minima() == ()
+
+
+@pytest.mark.parametrize("tr", [0.3, 1.11, 2.75, 4.0])
+def test_the_tolerance_is_that_of_the_closed_form(tr: float) -> None:
+    error = float(measures.lock_in_error(MODE, tr, TD))
+    expected = float(measures.timing_tolerance(MODE, np.array([tr]), TD)[0])
+    assert PROFILE.tolerance(tr, error) == pytest.approx(expected, abs=1e-3)
+
+
+def test_the_tolerance_is_all_of_the_time_where_the_error_never_grows() -> None:
+    flat = Profile(np.linspace(0, 2, 5), np.full(5, 0.1))
+    assert flat.tolerance(1.0, 0.1) == 2.0
+
+
+def test_an_error_that_grows_at_once_leaves_the_way_to_the_next_time() -> None:
+    steep = Profile(np.linspace(0, 4, 5), np.array([1.0, 1.0, 0.0, 1.0, 1.0]))
+    assert steep.tolerance(2.0, 0.0) == pytest.approx(0.05)
+    assert steep.tolerance(0.5, 0.2) == pytest.approx(0.5)

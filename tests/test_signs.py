@@ -1,0 +1,212 @@
+"""Deformations of single parts: their signs, what they say of a pair, and where they say nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from d2rpick.candidates import Found, judge
+from d2rpick.choice import suggest
+from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threads
+from d2rpick.envelope import upper_envelope
+from d2rpick.history import History
+from d2rpick.readers import Selection, open_run
+from d2rpick.signs import MOST_UNSIGNED, read_parts
+from d2rpick.situation import Settings, Situation, examine
+from tests import chain
+from tests.records import printed
+from tests.shared import shared
+
+PLAIN = Settings()
+NAMES = ("IE_spring1_J", "IE_spring2_J")
+
+
+def two_springs(time: np.ndarray) -> np.ndarray:
+    """Signed deformations of two parts in which two modes mix, shape (n, 2)."""
+    slow, fast = np.exp(-0.1 * time) * np.sin(5 * time), np.exp(-0.1 * time) * np.cos(8.3 * time)
+    return np.stack([slow + 0.7 * fast, 0.8 * slow - 0.9 * fast], axis=1)
+
+
+def of(deformation: np.ndarray, time: np.ndarray) -> History:
+    energies = deformation**2
+    names = tuple(f"part {i}" for i in range(1, energies.shape[1] + 1))
+    return History(
+        time, energies.sum(axis=1), source=("test",), format="csv", channel="sum", part_names=names,
+        part_energies=energies,
+    )  # fmt: skip
+
+
+# ---- signs
+
+
+@pytest.mark.parametrize("samples_per_period", [20, 50, 150, 1000])
+def test_signs_are_followed_through_every_zero(samples_per_period: int) -> None:
+    time = np.arange(0, 12, 2 * np.pi / 8.3 / samples_per_period)
+    true = two_springs(time)
+    found = read_parts(time, printed(true.ravel() ** 2).reshape(true.shape), NAMES)
+    assert found.names == NAMES
+    known = (time > found.comparable_since(10.8)) & (time < 10.8)
+    for own, expected in zip(found.deformation[:, known], true.T[:, known], strict=True):
+        wrong = np.sign(own) != np.sign(expected) * np.sign(own @ expected)
+        # a sample next to a zero may be taken for one on its other side
+        assert np.all(np.abs(expected[wrong]) < 0.1)
+    assert np.mean(known) > 0.85
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.3, 3), st.floats(0, 3), st.floats(0, 0.3), st.sampled_from([20, 60]), st.floats(0, 6))
+def test_one_spring_is_compared_as_its_oscillator_tells(
+    rate: float, phase: float, damping: float, per_period: int, tr: float
+) -> None:
+    time = np.arange(0, 8 * np.pi / rate, 2 * np.pi / rate / per_period)
+    tr = tr / 6 * time[-1]
+    td = 0.9 * time[-1]
+    deformation = np.exp(-damping * rate * time) * np.sin(rate * time + phase)
+    found = read_parts(time, deformation[:, np.newaxis] ** 2, ["one"])
+    assert found.signed
+    assume(found.comparable_since(td) <= tr)
+    true = np.interp([tr, td], time, deformation)
+    assume(np.all(np.abs(true) > 0.1 * np.exp(-damping * rate * np.array([tr, td]))))
+    own = found.amplitudes(np.array([tr, td]))[0]
+    assert (own[0] * own[1] > 0) == (true[0] * true[1] > 0)
+
+
+@pytest.mark.parametrize(
+    ("make", "reason"),
+    [
+        (lambda t: np.sin(5 * t) ** 2 + 0.2, "does not come back to zero"),
+        (lambda t: (1.5 + np.sin(5 * t)) ** 2, "does not come back to zero"),
+        (lambda t: (0.8 + np.sin(5 * t)) ** 2, "swing about"),
+        (np.ones_like, "does not come back to zero"),
+    ],
+    ids=["plastic work", "preload", "half a preload", "constant"],
+)
+def test_a_part_that_does_not_swing_about_zero_has_no_sign(make: object, reason: str) -> None:
+    time = np.arange(0, 12, 0.02)
+    found = read_parts(time, np.stack([two_springs(time)[:, 0] ** 2, make(time)], axis=1), ["good", "bad"])  # type: ignore[operator]
+    assert found.names == ("good",)
+    assert [(part.name, reason in part.reason) for part in found.unsigned] == [("bad", True)]
+    assert not found.signed
+
+
+def test_a_part_without_sign_and_almost_no_energy_is_left_out_and_named() -> None:
+    time = np.arange(0, 12, 0.02)
+    small = np.full(time.shape, 0.1 * np.sqrt(MOST_UNSIGNED))
+    answer = suggest(of(np.column_stack([two_springs(time), small]), time), 10.0, PLAIN)
+    assert answer.situation.basis == "parts"
+    assert "part-without-sign" in {caution.code for caution in answer.cautions}
+    best = answer.candidates[0]
+    assert [(one.name, one.sign_match, one.share) for one in best.parts][-1] == ("part 3", None, None)
+
+
+def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
+    time = np.arange(0, 12, 0.02)
+    deformation = two_springs(time)
+    noise = np.random.default_rng(3).normal(size=(40, 2))
+    deformation[300:340] = 0.02 * noise  # the signal is lost for a while
+    situation = examine(of(deformation, time), 10.0, replace(PLAIN, after=0.0))
+    early, late = judge(situation, [Found(2.0, "given", None), Found(8.0, "given", None)])
+    assert (early.sign_match, early.residual) == (None, None)
+    assert any("cannot be followed" in note for note in early.notes)
+    assert late.sign_match is not None
+
+
+# ---- the chain of a real solver
+
+
+def predicted(situation: Situation, tr: float) -> float:
+    (candidate,) = judge(situation, [Found(tr, "given", None)])
+    assert candidate.residual is not None
+    return candidate.residual
+
+
+@pytest.mark.parametrize("estimated", [False, True], ids=["modes", "envelope"])
+def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
+    errors = []
+    for td in (chain.TD_PEAK, chain.TD_LATE):
+        situation = examine(chain.history(), td, PLAIN)
+        assert situation.basis == "parts"
+        if estimated:
+            assert situation.part_vibration is not None
+            whole = upper_envelope(situation.history.time, situation.history.energy)
+            assert whole is not None
+            vibration = replace(situation.part_vibration, whole=whole)
+            situation = replace(situation, fit=None, span=None, part_vibration=vibration)
+            assert situation.kinetic_share_estimated
+        runs = [run for run in chain.scan() if abs(run["td_s"] - td) < 1e-3]  # a step of the solver late
+        errors += [abs(predicted(situation.at(run["td_s"]), run["tr_s"]) - run["R_sim"]) for run in runs]
+    assert len(errors) == len(chain.scan())
+    assert np.quantile(errors, 0.95) < 0.05
+    assert max(errors) < 0.025  # what is reached
+
+
+def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
+    parts = examine(chain.history(), chain.TD_LATE, PLAIN).parts
+    assert parts is not None
+    for run in chain.scan():
+        product = parts.amplitudes(run["tr_s"]) * parts.amplitudes(run["td_s"])
+        assert (product > 0).tolist() == [run["sign1"] > 0, run["sign2"] > 0]
+
+
+def read_t01() -> History:
+    selection = Selection(parts=("spring1,spring2",))
+    return open_run([str(shared("openradioss/chain_referenceT01.gz"))], selection).history(selection, with_momenta=True)
+
+
+@pytest.mark.parametrize("source", ["csv", "T01"])
+def test_the_closest_match_is_recommended_although_the_total_energy_is_off(source: str) -> None:
+    answer = suggest(chain.history() if source == "csv" else read_t01(), chain.TD_PEAK, PLAIN)
+    assert answer.recommended is not None
+    assert answer.recommended.tr == pytest.approx(0.08084, abs=1e-4)
+    best = answer.candidates[0]
+    assert (best.kind, best.sign_match, best.recommended) == ("match", True, True)
+    assert best.residual == pytest.approx(0.065, abs=0.005)
+    assert best.level_error == pytest.approx(0.055, abs=0.01)
+    # on the peak itself the energy is right as well, and nothing would be saved
+    assert [c.same_swing for c in answer.candidates if c.tr > 0.13] == [True, True]
+
+
+@pytest.mark.parametrize("source", ["csv", "T01"])
+def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
+    answer = suggest(chain.history() if source == "csv" else read_t01(), chain.TD_LATE, PLAIN)
+    assert answer.recommended is not None
+    tr = answer.recommended.tr
+    runs = [run for run in chain.scan() if run["td_s"] > 0.2]
+    nearest = min(runs, key=lambda run: abs(run["tr_s"] - tr))
+    assert nearest["R_sim"] <= min(run["R_sim"] for run in runs) + 0.05
+
+
+def test_the_parts_that_contribute_most_are_named() -> None:
+    situation = examine(chain.history(), chain.TD_PEAK, PLAIN)
+    (candidate,) = judge(situation, [Found(0.1, "given", None)])
+    assert candidate.part_mismatch is not None
+    shares = [part.share for part in candidate.parts]
+    assert sum(share or 0 for share in shares) == pytest.approx(1)
+    assert shares == sorted(shares, key=lambda share: -(share or 0))
+    assert any(note.startswith(f"mismatch of {candidate.parts[0].name}") for note in candidate.notes)
+    assert situation.kinetic_share is not None
+    assert candidate.lock_in_error == pytest.approx(np.sqrt(1 - situation.kinetic_share) * candidate.part_mismatch)
+
+
+def test_the_rollover_has_no_signs_and_says_why() -> None:
+    selection = Selection(parts=("box,step",))
+    run = open_run([str(shared("openradioss/rollover_referenceT01.gz"))], selection)
+    answer = suggest(run.history(selection, with_momenta=True), 0.37, PLAIN)
+    assert answer.situation.basis == "energy"
+    best = answer.candidates[0]
+    assert (best.sign_match, best.residual, best.part_mismatch, best.parts) == (None, None, None, ())
+    assert any("box: its energy does not come back to zero" in note for note in best.notes)
+
+
+def test_several_energies_are_carried_but_for_those_that_are_always_zero() -> None:
+    assert chain.history().part_names == NAMES
+    assert chain.history("IE_total_J").part_energies is None
+    selection = Selection(energy=(*NAMES, "x3_m"))
+    assert chain.history(*selection.energy).part_names == selection.energy
+    table = chain.history()
+    assert table.part_energies is not None
+    np.testing.assert_array_equal(table.part_energies.sum(axis=1), table.energy)

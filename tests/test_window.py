@@ -1,0 +1,213 @@
+"""Choosing both times, on every basis, and what is said when td is missing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.choice import EQUALLY_GOOD, suggest
+from d2rpick.errors import RangeError
+from d2rpick.expectation import expectation, shortfall
+from d2rpick.history import EXACT, History, Momenta, Part
+from d2rpick.readers import Selection, open_run
+from d2rpick.situation import Settings
+from d2rpick.window import suggest_in_window
+from tests import chain, paper
+from tests.command import ENERGY, ROLLOVER, answer, run
+from tests.shared import shared
+
+if TYPE_CHECKING:
+    from d2rpick.history import Samples
+
+PLAIN = Settings()
+T01 = str(ROLLOVER).replace(".csv", "T01.gz")
+
+
+def rollover() -> History:
+    selection = Selection(parts=("box",))
+    return open_run([T01], selection).history(selection, with_momenta=True)
+
+
+def test_both_times_of_the_published_oscillator() -> None:
+    found = suggest_in_window(paper.history(), (0.06, 0.07), PLAIN)
+    assert found.recommended is not None
+    assert found.recommended.td == pytest.approx(paper.BETTER_TD, abs=1e-8)
+    assert found.recommended.tr == pytest.approx(paper.BETTER_TR, abs=1e-8)
+    assert found.recommended.residual is not None
+    assert found.recommended.residual < 1e-3
+    assert found.td_window == (0.06, 0.07)
+    assert all(candidate.rigid_time > 1e-4 for candidate in found.candidates)  # td itself is none
+
+
+def test_of_equally_good_peaks_the_longest_rigid_window_wins() -> None:
+    time = np.arange(0, 4, 0.01)
+    history = History(time, np.sin(2 * np.pi * time) ** 2, source=("test",), format="csv", channel="E")
+    found = suggest_in_window(history, (2.1, 3.6), PLAIN)
+    assert found.recommended is not None
+    # peaks at 2.25, 2.75, 3.25; the first with the sign of each at 0.25, 0.75, 0.25
+    assert (found.recommended.tr, found.recommended.td) == pytest.approx((0.25, 3.25), abs=1e-6)
+
+
+def test_without_a_peak_in_the_window_one_of_its_ends_is_taken() -> None:
+    found = suggest_in_window(paper.history(), (0.0635, 0.066), PLAIN)
+    ends = [suggest(paper.history(), td, PLAIN).recommended for td in (0.0635, 0.066)]
+    assert found.recommended is not None
+    assert found.recommended.td == 0.066
+    assert found.recommended.residual == min(end.residual or 1 for end in ends if end)
+
+
+def test_several_parts_choose_the_peak_by_their_residual() -> None:
+    found = suggest_in_window(chain.history(), (0.12, 0.14), PLAIN)
+    assert found.situation.basis == "parts"
+    assert found.recommended is not None
+    assert (found.recommended.tr, found.recommended.td) == pytest.approx((0.08084, 0.13505), abs=1e-4)
+
+
+def test_on_energy_alone_the_highest_peaks_up_to_twice_the_mean() -> None:
+    history = rollover()
+    found = suggest_in_window(history, (0.35, 0.38), PLAIN)
+    assert found.recommended is not None
+    assert found.expected is not None
+    assert found.recommended.td == pytest.approx(0.3577, abs=3e-4)
+    mean = found.expected.mean_energy
+    assert mean == pytest.approx(1.885, abs=0.005)
+    peaks = found.situation.peaks(0.0885, found.recommended.td)
+    assert found.recommended.tr in peaks
+    own = shortfall(history.energy_at(found.recommended.tr), mean)
+    allowed = [c for c in found.candidates if c.acceptable and c.tr in peaks]
+    assert own <= min(shortfall(c.energy, mean) for c in allowed) + EQUALLY_GOOD
+    assert found.expected.ratio_low == pytest.approx(history.energy_at(found.recommended.tr) / (2 * mean))
+    assert found.expected.kinetic_share == pytest.approx(1 - found.situation.energy_td / (2 * mean))
+
+
+def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:
+    time = np.arange(0, 10, 0.02)
+    rng = np.random.default_rng(2)
+    energy = sum(np.sin(w * time + rng.uniform(0, 6)) ** 2 for w in rng.uniform(4, 20, 15))
+    energy = np.asarray(energy) + 30 * np.exp(-(((time - 8.5) / 0.1) ** 2))  # a burst that is no vibration
+    history = History(time, energy, source=("test",), format="csv", channel="E")
+    found = suggest_in_window(history, (8.0, 9.0), Settings(after=0.5))
+    assert found.recommended is not None
+    assert found.expected is not None
+    for t in (found.recommended.tr, found.recommended.td):
+        assert history.energy_at(t) <= 2 * found.expected.mean_energy
+
+
+def test_a_known_oscillator_expects_nothing_of_the_energy_alone() -> None:
+    assert suggest(paper.history(), paper.TD, PLAIN).expected is None
+
+
+@pytest.mark.parametrize("window", [(0.06, 0.2), (-1.0, 0.07)])
+def test_a_window_outside_the_record_is_refused(window: tuple[float, float]) -> None:
+    with pytest.raises(RangeError, match="outside the record"):
+        suggest_in_window(paper.history(), window, PLAIN)
+
+
+def test_a_window_that_reaches_over_the_next_contact_ends_there() -> None:
+    found = suggest_in_window(rollover(), (0.36, 0.43), PLAIN)
+    assert found.recommended is not None
+    assert found.situation.flight.end == pytest.approx(0.3819, abs=1e-3)
+    assert found.recommended.td < 0.3819
+
+
+def test_the_record_ends_before_the_flight_of_an_oscillator_is_left() -> None:
+    time = np.arange(0, 3, 0.01)
+    energy = np.sin(2 * np.pi * time) ** 2 + np.where(time > 2.5, 40 * (time - 2.5), 0)
+    history = History(time, energy, source=("test",), format="csv", channel="E")
+    found = suggest_in_window(history, (2.0, 2.9), PLAIN)
+    assert found.recommended is not None
+    assert found.recommended.td == pytest.approx(2.25, abs=1e-3)
+
+
+# ---- the computed rollover
+
+
+def test_the_means_of_the_computed_rollover_lie_between_the_expected_ones() -> None:
+    """Between what comes back if all of the energy vibrates, and if the lowest of the flight does not."""
+    history = rollover()
+    table = np.genfromtxt(shared("openradioss/rollover_scan.csv"), delimiter=",", names=True, dtype=None, encoding=None)
+    situation = suggest(history, 0.37, PLAIN).situation
+    flying = table[table["tr_s"] > 0.0885]
+    computed = flying["IEmean_td_to_380ms_J"] / flying["IEmean_ref_J"]
+    found = [expectation(situation, history.energy_at(float(tr))) for tr in flying["tr_s"]]
+    low = np.array([one.ratio_low for one in found if one])
+    high = np.array([one.ratio for one in found if one])
+    assert np.all((low < computed) & (computed < high + 0.02))
+    assert np.abs(high - computed).max() < 0.2
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1.0])
+def test_what_many_modes_give_back_is_expected(alpha: float) -> None:
+    """Forty modes over an energy at rest, damped or not: the mean over a while after td lies in between."""
+    generator = np.random.default_rng(3)
+    time = np.arange(0.0, 2.0, 2e-4)
+    rates, phases, amplitudes = (
+        generator.uniform(60, 400, 40),
+        generator.uniform(0, 6.3, 40),
+        generator.uniform(0, 1, 40),
+    )
+    rest, td, tr = 4.0, 0.8, 0.4
+
+    def deformations(t: Samples) -> Samples:
+        decay = amplitudes[:, None] * np.exp(-alpha * t / 2)
+        return np.asarray(decay * np.sin(rates[:, None] * t + phases[:, None]))
+
+    energy = rest + np.sum(deformations(time) ** 2, axis=0)
+    locked = rest + np.sum(deformations(np.array([tr])) ** 2)
+    momentum = np.exp(-alpha * time)[:, None, None] * np.array([700.0, 0.0, 0.0])
+    flying = Momenta(time, momentum, (Part(1, "box"),), EXACT, chosen=(0,))
+    history = History(time, energy, source=("made",), format="made", channel="energy", momenta=(flying,))
+    after = (time > td) & (time < td + 0.2)
+    released = deformations(np.array([tr])) * np.cos(rates[:, None] * (time[after] - td))
+    switched = rest + np.mean(np.sum(released**2, axis=0) * np.exp(-alpha * (time[after] - td)))
+    expected = expectation(suggest(history, td, PLAIN).situation, float(locked))
+    assert expected is not None
+    assert expected.ratio_low is not None
+    assert expected.ratio is not None
+    assert expected.ratio_low < switched / energy[after].mean() < expected.ratio
+    assert expected.resting_energy == pytest.approx(energy[time <= td].min())
+
+
+# ---- the command line
+
+
+def test_value_prints_both_times_with_one_blank() -> None:
+    result = run("suggest", "--td-window", "0.06", "0.07", "-f", "value", ENERGY)
+    tr, td = result.stdout.removesuffix("\n").split(" ")
+    found = answer("suggest", "--td-window", "0.06", "0.07", ENERGY)
+    assert {"tr": float(tr), "td": float(td)} == found["recommended"]
+    assert (result.exit_code, found["td"], found["td_window"]) == (0, float(td), [0.06, 0.07])
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (
+            [ENERGY],
+            "no next contact was seen up to the end at 0.15, the last peak of the energy before it is at 0.144",
+        ),
+        (["--part", "box", T01], "the flight ends at 0.381505, the last peak of the energy before it is at 0.378"),
+        (["--td", "0.06", "--td-window", "0.06", "0.07", ENERGY], "--td and --td-window exclude each other"),
+        (["--td-window", "0.07", "0.06", ENERGY], "--td-window 0.07 0.06 is empty"),
+        (["--td", "0.06", "--step-ratio", "2", ENERGY], "--step-ratio needs --cost-share"),
+        (["--td", "0.06", "--cost-share", "2", ENERGY], "at most 1"),
+    ],
+)
+def test_a_td_that_is_missing_or_given_twice_is_explained(args: list[str], message: str) -> None:
+    result = run("suggest", *args)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_the_expected_run_time_is_told_by_suggest_and_verify() -> None:
+    saving = ("--cost-share", "0.8", "--step-ratio", "2")
+    found = answer("suggest", "--td", "0.064", *saving, ENERGY)
+    best = found["candidates"][0]
+    assert best["run_time_share"] == pytest.approx(1 - best["rigid_fraction"] * (1 - 0.2 / 2))
+    judged = answer("verify", "--td", "0.064", "--tr", repr(best["tr"]), *saving, ENERGY)
+    assert judged["run_time_share"] == pytest.approx(best["run_time_share"])
+    assert "rigid for 34% of the record" in run("suggest", "--td", "0.064", *saving, ENERGY).stdout
+    assert answer("suggest", "--td", "0.064", ENERGY)["candidates"][0]["run_time_share"] is None
