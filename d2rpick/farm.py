@@ -7,12 +7,15 @@ import signal
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
+from multiprocessing import Pipe, get_all_start_methods, get_context, set_forkserver_preload
+from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar
 
 from d2rpick.errors import D2RPickError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+    from multiprocessing.connection import Connection
     from types import TracebackType
 
 Item = TypeVar("Item")
@@ -128,13 +131,15 @@ class Cores:
         # read when a process imports numpy: with several of them, threads would only fight over the cores
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         self.processes, self.room = processes, (1 + _WAITING) * processes
-        self._pool = _pool(processes)
+        self._held, self._leash = Pipe(duplex=False)  # the processes see when this end of it is closed
+        self._pool = self._new(processes)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._pool.shutdown(wait=False, cancel_futures=True)
+        self._leash.close()
 
     def submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
         """Hand the call to the pool; to a new one when the last is broken."""
@@ -142,36 +147,27 @@ class Cores:
             return self._pool.submit(function, item)
         except BrokenProcessPool:
             self._pool.shutdown(wait=False)
-            self._pool = _pool(self.processes)
+            self._pool = self._new(self.processes)
             return self._pool.submit(function, item)
 
     def alone(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
         """Compute the call in a process of its own."""
-        with _pool(1) as pool:
+        with self._new(1) as pool:
             return pool.submit(function, item)
 
-
-def _pool(processes: int) -> ProcessPoolExecutor:
-    from multiprocessing import get_all_start_methods, get_context, set_forkserver_preload
-
-    # plain forks copy locks that threads hold; one process that forks from a clean state is nearly as quick
-    method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-    set_forkserver_preload(["d2rpick.study"])
-    return ProcessPoolExecutor(processes, get_context(method), _begin_work)
+    def _new(self, processes: int) -> ProcessPoolExecutor:
+        # plain forks copy locks that threads hold; one process that forks from a clean state is nearly as quick
+        method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
+        set_forkserver_preload(["d2rpick.study"])
+        return ProcessPoolExecutor(processes, get_context(method), _begin_work, (self._held,))
 
 
-def _begin_work() -> None:
-    """End this process with its parent, however that ends, and without a word when the user interrupts."""
-    from multiprocessing import parent_process
-    from multiprocessing.connection import wait as wait_for
-    from threading import Thread
-
+def _begin_work(held: Connection) -> None:
+    """End this process, whatever it does, when the other end of ``held`` is closed; without a word on interrupts."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    parent = parent_process()
-    assert parent is not None
 
     def follow() -> None:
-        wait_for([parent.sentinel])
+        held.poll(None)  # nothing is ever sent
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()

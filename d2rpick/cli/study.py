@@ -174,7 +174,7 @@ def _rows(question: Question, sources: Sequence[str], options: dict[str, Any], *
     ledger = Ledger(options["resume"], question) if options["resume"] is not None else None
     known = {number: row for number, source in enumerate(sources) if ledger and (row := ledger.find(source))}
     new = [number for number in range(len(sources)) if number not in known]
-    if ledger and not options["quiet"]:
+    if ledger and (ledger.taken or ledger.outdated) and not options["quiet"]:
         click.echo(f"note: {ledger.told(len(sources))}", err=True)
     # the processes of a cluster work in other folders
     names = [os.path.abspath(sources[n]) if options["scheduler"] else sources[n] for n in new]  # noqa: PTH100
