@@ -13,8 +13,10 @@ from d2rpick.acceptable import acceptable_windows, common_windows, coverage, tol
 from d2rpick.choice import Suggestion, suggest, verify
 from d2rpick.history import History
 from d2rpick.mode import Mode
+from d2rpick.modes import Modes
 from d2rpick.readers import Selection, read_history
 from d2rpick.situation import Settings
+from tests import chain
 from tests.command import ROLLOVER
 from tests.paper import OMEGA_2
 from tests.records import ENERGY, MODE, TIME, noisy
@@ -93,6 +95,19 @@ def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tol
             answer = suggest(history, td, Settings(tolerance=tolerance, replay=replay))
             assert len(acceptable_windows(answer)[0])
             check(answer, 1)
+
+
+@pytest.mark.parametrize("td", [chain.TD_PEAK, chain.TD_LATE])
+def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> None:
+    two = Modes((Mode(100.0, 4.0, 2.0, 3.0, 0.0), Mode(261.0, 4.0, -1.5, 1.0, 0.0)))
+    time = np.linspace(0.0, 0.3, 3001)
+    modes = suggest(History(time, two.energy(time), ("made",), "made", "energy"), td, Settings(tolerance=0.4))
+    assert isinstance(modes.situation.mode, Modes)
+    check(modes, 1)
+    parts = suggest(chain.history(), td, Settings())
+    assert parts.situation.basis == "parts"
+    check(parts, 1)
+    assert len(acceptable_windows(parts)[0])
 
 
 def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_sign() -> None:

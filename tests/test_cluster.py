@@ -70,19 +70,21 @@ def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> 
     expected = json.loads(run(*studies.STUDY, "-f", "json", *sources, sources[0]).stdout)
     slow, ledger = tmp_path / "slow.csv", tmp_path / "ledger.ndjson"
     os.mkfifo(slow)  # whoever reads it waits
-    with cluster(tmp_path, ("one", "two")) as (address, workers):
-        with distributed.Client(address, set_as_default=False) as client:
-            client.wait_for_workers(2, timeout=PATIENCE)
-            args = ("study", "--td", str(studies.TD), "--scheduler", address, "-f", "json", "--resume", str(ledger))
-            names = [os.path.relpath(name, ROOT) for name in (*sources, str(slow))]
-            with process("-m", "d2rpick", *args, *names, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as study:
-                until(lambda: ledger.exists() and ledger.read_bytes().count(b"\n") == len(sources))
-                (busy,) = until(lambda: [address for address, calls in client.processing().items() if calls])
-                victim = client.scheduler_info(n_workers=-1)["workers"][busy]["id"]
-                slow.unlink()
-                slow.write_bytes(Path(sources[0]).read_bytes())
-                workers[victim].kill()
-                text, said = study.communicate(timeout=PATIENCE)
+    with (
+        cluster(tmp_path, ("one", "two")) as (address, workers),
+        distributed.Client(address, set_as_default=False) as client,
+    ):
+        client.wait_for_workers(2, timeout=PATIENCE)
+        args = ("study", "--td", str(studies.TD), "--scheduler", address, "-f", "json", "--resume", str(ledger))
+        names = [os.path.relpath(name, ROOT) for name in (*sources, str(slow))]
+        with process("-m", "d2rpick", *args, *names, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as study:
+            until(lambda: ledger.exists() and ledger.read_bytes().count(b"\n") == len(sources))
+            (busy,) = until(lambda: [address for address, calls in client.processing().items() if calls])
+            victim = client.scheduler_info(n_workers=-1)["workers"][busy]["id"]
+            slow.unlink()
+            slow.write_bytes(Path(sources[0]).read_bytes())
+            workers[victim].kill()
+            text, said = study.communicate(timeout=PATIENCE)
     assert study.returncode == 0, said
     found = json.loads(text)
     assert [row["source"] for row in found["runs"]] == names
