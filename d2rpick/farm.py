@@ -187,7 +187,7 @@ class Cluster:
             from distributed import Client
         except ImportError:
             raise D2RPickError(
-                "a Dask cluster needs the package 'distributed'; install it with: pip install 'd2rpick[dask]'"
+                "a Dask cluster needs the extra 'dask' of d2rpick; install it with: pip install distributed"
             ) from None
         try:
             self._client = Client(address, timeout=_PATIENCE, set_as_default=False)

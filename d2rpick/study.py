@@ -249,7 +249,7 @@ def shortest(low: float, high: float) -> float:
     Examples
     --------
     >>> shortest(0.0128717, 0.0128989)
-    0.01288
+    0.01289
     """
     middle = (low + high) / 2
     rounded = (float(f"{middle:.{digits}g}") for digits in range(1, 18))
@@ -260,11 +260,11 @@ def _why_none(judged: Sequence[Row]) -> str:
     """Say which tr suits most runs, and which runs it does not suit."""
     stretches, counts = coverage([row.acceptable[0] for row in judged])
     if not counts.size:
-        return f"no tr is acceptable in any of {_runs(len(judged))}"
+        return f"no tr is acceptable in any of {runs_of(len(judged))}"
     tr = shortest(*stretches[np.argmax(counts)])
     left = [row.source for row in judged if not _holds(row.acceptable[0], tr)]
     return (
-        f"no tr is acceptable in all of {_runs(len(judged))}; tr = {tr:.6g} is in {len(judged) - len(left)}, "
+        f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {len(judged) - len(left)}, "
         f"not in {listing(left, most=_NAMED)}"
     )
 
@@ -278,7 +278,7 @@ def _cautions(rows: Sequence[Row]) -> Iterator[Caution]:
     judged = [row for row in rows if row.judged]
     left = [row.source for row in rows if not row.judged]
     if left and judged:
-        found = f"{len(left)} of {_runs(len(rows))} could not be judged"
+        found = f"{len(left)} of {runs_of(len(rows))} could not be judged"
         yield Caution("runs-left-out", f"{found}, these are left out: {listing(left, most=_NAMED)}")
     for code, what, kinds in (
         ("mixed-units", "times are in different units, td in only one of them", [row.time_unit for row in judged]),
@@ -286,11 +286,12 @@ def _cautions(rows: Sequence[Row]) -> Iterator[Caution]:
     ):
         counted = Counter(kind or "not named" for kind in kinds)
         if len(counted) > 1:
-            yield Caution(code, f"{what}: {', '.join(f'{kind} in {_runs(n)}' for kind, n in counted.most_common())}")
+            yield Caution(code, f"{what}: {', '.join(f'{kind} in {runs_of(n)}' for kind, n in counted.most_common())}")
     for code in dict.fromkeys(code for row in judged for code in row.warnings):
         named = [row.source for row in judged if code in row.warnings]
-        yield Caution(code, f"in {len(named)} of {_runs(len(judged))}: {listing(named, most=_NAMED)}")
+        yield Caution(code, f"in {len(named)} of {runs_of(len(judged))}: {listing(named, most=_NAMED)}")
 
 
-def _runs(number: int) -> str:
+def runs_of(number: int) -> str:
+    """Write a number of runs."""
     return "1 run" if number == 1 else f"{number} runs"

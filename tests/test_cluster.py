@@ -115,4 +115,4 @@ def test_without_the_package_its_name_is_told(monkeypatch: pytest.MonkeyPatch, t
     monkeypatch.setitem(sys.modules, "distributed", None)
     result = run("study", "--td", "0.064", studies.write(tmp_path / "run.csv"), "--scheduler", "tcp://127.0.0.1:9")
     assert (result.exit_code, result.stdout) == (2, "")
-    assert "pip install 'd2rpick[dask]'" in result.stderr
+    assert "pip install distributed" in result.stderr

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 EXAMPLES = """\b
 Examples:
   d2rpick study --td 0.064 sample_data/energy.csv sample_data/energy.glstat
-  d2rpick study --td 0.064 --plot runs.png 'runs/*/glstat'
-  d2rpick study --td 0.37 --part box --from runs.txt --resume runs.ndjson -f json
-  d2rpick study --td 0.37 --from runs.txt --scheduler tcp://head:8786 -f ndjson
+  d2rpick study --td 0.064 --plot runs.png 'sample_data/energy.*'
+  d2rpick study --td 0.37 --part box --resume runs.ndjson -f json sample_data/rolloverT01.gz
+  d2rpick study --td 0.064 --tolerance 0.1 -f ndjson sample_data/energy.csv sample_data/energy.glstat
 """
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from d2rpick import __version__
 from d2rpick.ledger import PLAIN, plain
 from d2rpick.report import tables
+from d2rpick.study import runs_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -73,17 +74,14 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
         found += "the intervals have a time in common" if answer.agree else "the intervals have no time in common"
     shared = f"none: {common.reason}"
     if common.tr is not None and common.window:
-        shared = f"{common.tr:g}, acceptable in all of {answer.judged} from {short_range(common.window)}"
+        low, high = common.window
+        shared = f"{common.tr:g}, acceptable in {answer.judged} of {runs_of(answer.judged)}; "
+        shared += f"so is every tr from {low:.6g} to {high:.6g}"
     return [
-        ("td", f"{answer.td:.6g}, {answer.judged} of {len(answer.rows)} runs judged"),
+        ("td", f"{answer.td:.6g}, {answer.judged} of {runs_of(len(answer.rows))} judged"),
         ("tr", found),
         ("common tr", shared),
     ]
-
-
-def short_range(window: tuple[float, float]) -> str:
-    """Write a window for people."""
-    return f"{window[0]:.6g} to {window[1]:.6g}"
 
 
 def _front(answer: Study, command: Sequence[str]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.report.html import Markup, cautions, document, figure, pairs, resource, section, table, tag
 from d2rpick.report.study import HEAD, outcome, rows
+from d2rpick.study import runs_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -25,7 +26,7 @@ def as_page(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> 
     drawing : (str, str)
         SVG element for a wide and for a narrow page, with ids of their own.
     """
-    title = f"Switch times of {len(answer.rows)} runs" if len(answer.rows) > 1 else "Switch times of 1 run"
+    title = f"Switch times of {runs_of(len(answer.rows))}"
     sections = _sections(answer, command, drawing)
     return document(title, *sections, signed=("checked by", "date", "signature"))
 
@@ -46,7 +47,8 @@ def _common(answer: Study) -> Markup:
         return tag("div", tag("div", tag("h3", "One tr for all runs"), text, class_="card"), class_="choice")
     times = (tag("span", tag("i", name), f"{time:.6g}") for name, time in (("tr", tr), ("td", answer.td)))
     exact = f"in full: tr = {tr!r}, td = {answer.td!r}"
-    lines = (tag("div", *times, class_="times"), tag("p", exact, class_="soft"))
+    rule = "Acceptable in every run that was judged, by the rule of d2rpick verify."
+    lines = (tag("div", *times, class_="times"), tag("p", rule), tag("p", exact, class_="soft"))
     return tag("div", tag("div", tag("h3", "One tr for all runs"), *lines, class_="card chosen"), class_="choice")
 
 
