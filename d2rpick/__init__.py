@@ -1,3 +1,3 @@
 """d2rpick: choose the times of deformable-to-rigid switching from the energy history of one reference run."""
 
-__version__ = "0.5.0"
+__version__ = "0.6.0"

@@ -110,6 +110,12 @@ def verify(history: History, tr: float, td: float, settings: Settings) -> Verdic
     )
 
 
+def approve(situation: Situation, times: Iterable[float]) -> list[bool]:
+    """Tell for each of ``times`` before td whether ``verify`` would verify it as tr."""
+    judged = judge(situation, [Found(tr, "given", None) for tr in times])
+    return [candidate.acceptable and not _over_limits(situation, candidate) for candidate in judged]
+
+
 def with_health(answer: _Answer, balance: Balance) -> _Answer:
     """Add how far the reference run can be trusted, above all in the rigid window, else in the flight up to td.
 

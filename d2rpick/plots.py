@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from d2rpick.errors import FormatError
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from d2rpick.rollover.run import Window
     from d2rpick.rollover.scan import Outcome
     from d2rpick.situation import Situation
+    from d2rpick.study import Study
 
 FORMATS = ("png", "svg", "pdf")
 # Okabe and Ito's palette: told apart with any colour vision.
@@ -47,6 +49,8 @@ _DECADES_BELOW_LEVEL = 2.0
 _LONGEST_NAME = 28
 # Up to so many candidates their marks leave the curve visible.
 _FEW = 40
+# Many curves over each other are together as dark as so many, and none is fainter than this.
+_DARK, _FAINTEST = 10, 0.02
 # Width of a figure, and the height of one panel and of two [inch]; on a narrow page letters keep their size.
 _SIZES = {False: (10.0, 4.0, 6.5), True: (4.2, 3.9, 6.6)}
 # Share of the axes that the label of a switch time takes up, at most.
@@ -84,7 +88,7 @@ def svg_element(figure: Figure, prefix: str) -> str:
     return re.sub(r'(?<= id=")|(?<=href="#)|(?<=url\(#)', prefix, element)
 
 
-def both_widths(draw: Callable[..., Figure], answer: Suggestion | Verdict, name: str) -> tuple[str, str]:
+def both_widths(draw: Callable[..., Figure], answer: Suggestion | Verdict | Study, name: str) -> tuple[str, str]:
     """Give what ``draw`` draws of an answer as SVG elements for a wide and a narrow page; ``name`` tells them apart."""
     return (
         svg_element(draw(answer), f"{name}-wide-"),
@@ -132,6 +136,47 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
             axes.axvspan(switched.tr, switched.td, color=_FLIGHT, alpha=0.2, label="rigid", linewidth=0)
         _finish(axes)
     return figure
+
+
+def draw_study(answer: Study, *, narrow: bool = False) -> Figure:
+    """Energies of all runs over each other, the tr of each, the common one and td."""
+    width, height, _ = _SIZES[narrow]
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = figure.subplots()
+    curves = [row.curve for row in answer.rows if row.curve is not None]
+    many = len(curves) > _FEW
+    # taken together they stay as dark as ten lines
+    lines = LineCollection(
+        [curve.T for curve in curves], colors=_REFERENCE, linewidths=0.6 if many else 1, rasterized=many,
+        alpha=max(_FAINTEST, min(1.0, _DARK / max(1, len(curves)))),
+        label="internal energy" if len(curves) == 1 else f"internal energy of {len(curves)} runs",
+    )  # fmt: skip
+    axes.add_collection(lines)
+    axes.autoscale_view()
+    if answer.common.window:
+        axes.axvspan(*answer.common.window, color=_GOOD, alpha=0.2, linewidth=0, label="acceptable in all runs")
+    points = np.array([(row.tr, row.energy_td) for row in answer.rows if row.tr is not None])
+    if points.size:
+        axes.scatter(
+            points[:, 0], points[:, 1], s=8 if many else 28, linewidths=0.7, facecolors=_GOOD, edgecolors="white",
+            zorder=3, label="tr of each run", rasterized=many,
+        )  # fmt: skip
+        _scale(axes, points[:, 1], max(float(curve[1].max()) for curve in curves))
+    units = {row.time_unit for row in answer.rows if row.judged}
+    unit = units.pop() if len(units) == 1 else ""
+    axes.set(xlabel=f"time [{unit}]" if unit else "time", ylabel="internal energy")
+    _finish(axes, legend=not narrow)
+    if narrow:
+        figure.legend(loc="outside lower left", ncols=1, fontsize="small", frameon=False)
+    _mark(axes, answer.common.tr, answer.td, _LABEL[narrow])
+    return figure
+
+
+def _scale(axes: Axes, levels: Samples, highest: float) -> None:
+    """Make the axis logarithmic where the levels would vanish on a linear one; the lowest stays in sight."""
+    if levels.min() > 0 and highest > _LOGARITHMIC * levels.max():
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=min(float(levels.min()) / 2, float(np.median(levels)) / 10**_DECADES_BELOW_LEVEL))
 
 
 def draw_exhibit(exhibit: Exhibit) -> Figure:

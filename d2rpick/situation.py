@@ -195,12 +195,18 @@ class Situation:
     def _in_span(self, time: float) -> bool:
         return self.span is not None and self.span.start <= time <= self.span.end
 
-    def measured(self, time: float) -> bool:
-        """Whether the deformation at ``time`` can be compared with that at td."""
+    @property
+    def measured_span(self) -> tuple[float, float]:
+        """First and last time whose deformation can be compared with that at td; nothing is between them without."""
         if self.part_vibration:
             parts = self.part_vibration.parts
-            return parts.comparable_since(self.td) <= time <= float(parts.time[-1])
-        return self.described(time)
+            return parts.comparable_since(self.td), float(parts.time[-1])
+        return self.span if self.mode and self.span else (np.inf, -np.inf)
+
+    def measured(self, time: float) -> bool:
+        """Whether the deformation at ``time`` can be compared with that at td."""
+        first, last = self.measured_span
+        return first <= time <= last
 
     @cached_property
     def profile(self) -> Profile | None:

@@ -95,3 +95,19 @@ def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
     assert rest.endswith(b" \r")
     assert process.returncode == 0
     assert result.startswith(b"source,format,")
+
+
+def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "PERIOD", PERIOD)
+    with progress.counting(9, quiet=False) as count:
+        count.done = count.taken = 3
+        time.sleep(5 * PERIOD)
+        count.done = 5
+        time.sleep(5 * PERIOD)
+    assert "\r3 of 9 runs\r" in stream.getvalue()
+    assert "\r5 of 9 runs, 0:00 left\r" in stream.getvalue()
+    assert stream.getvalue().endswith(" \r")
+    # two runs took 60 s, so do the next two
+    assert progress.Count(total=9, done=5, taken=3).told(60) == "5 of 9 runs, 2:00 left"

@@ -37,15 +37,17 @@ ORDER = (
     "momentum", "crossings", "oscillator", "mode", "modes", "fitting", "fitting_several", "identify",
     "flight", "envelope", "signs", "measures", "profile", "replay", "situation",
     "cautions", "uncertainty", "contributions", "candidates", "expectation", "switched", "health", "choice", "window",
-    "overview", "rules.judgement", "judged_card", "integration", "reproduction", "exhibits",
+    "overview", "rules.judgement", "judged_card", "acceptable", "study", "ledger", "farm",
+    "integration", "reproduction", "exhibits",
     "rollover", "rollover.model", "rollover.bars", "rollover.contact", "rollover.rigid", "rollover.motion",
     "rollover.record", "rollover.run", "rollover.scan", "rehearsal",
     "report", "report.findings", "report.rules", "report.tables", "report.situation", "report.suggestion",
     "report.verdict", "report.health", "report.overview", "report.html", "report.page",
-    "report.suggestion_page", "report.verdict_page", "report.reproduction", "report.rollover",
+    "report.study", "report.study_page", "report.suggestion_page", "report.verdict_page",
+    "report.reproduction", "report.rollover",
     "writers", "plots",
     "cli", "cli.options", "cli.output", "cli.progress", "cli.check", "cli.rule", "cli.card",
-    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract", "cli.reproduce", "cli.rollover",
+    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract", "cli.study", "cli.reproduce", "cli.rollover",
     "__main__",
 )  # fmt: skip
 # The only modules that may import these.
@@ -154,7 +156,9 @@ def test_the_command_line_offers_the_formats_there_are() -> None:
     assert tuple(TRAJECTORY_WRITERS) == replay.FORMATS
 
 
-SCHEMAS = [f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check", "reproduce", "rollover")]
+SCHEMAS = [
+    f"schemas/{name}-1.json" for name in ("suggest", "verify", "info", "check", "study", "reproduce", "rollover")
+]
 
 
 @pytest.mark.parametrize("name", ["py.typed", *SCHEMAS])

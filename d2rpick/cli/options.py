@@ -113,8 +113,13 @@ _JUDGING = ("input_format", "time", "energy", "flying", "after", "margin", "tole
 
 def history_options(function: Decorated) -> Decorated:
     """HISTORY... and how to read it; collected by ``selection`` and ``open_run``."""
+    argument = click.argument("history", metavar="HISTORY...", nargs=-1, required=True, type=FILE)
+    return _stack(argument, reading_options)(function)
+
+
+def reading_options(function: Decorated) -> Decorated:
+    """How to read a history; collected by ``selection``."""
     return _stack(
-        click.argument("history", metavar="HISTORY...", nargs=-1, required=True, type=FILE),
         _FORMAT, _TIME, _ENERGY,
         click.option(
             "--part", metavar="IDS", multiple=True, type=NAMES,
@@ -183,6 +188,24 @@ def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
 def choosing_options(function: Decorated) -> Decorated:
     """Options of ``suggest`` and ``verify``; collected by ``settings``."""
     return _stack(
+        judging_options,
+        click.option(
+            "--cost-share", type=FRACTION, metavar="C",
+            help="Share of the cost of a step that the switched parts' elements take; tells the run time.",
+        ),
+        click.option(
+            "--step-ratio", type=POSITIVE, metavar="N", help="Time step while rigid over that before.  [default: 1]",
+        ),
+        click.option("--plot", metavar="FILE", type=FILE, help="Draw energy and motion to FILE (png, svg, pdf)."),
+        click.option(
+            "--report", metavar="FILE", type=FILE, help="Write all of it to one HTML page to read, print and sign."
+        ),
+    )(function)  # fmt: skip
+
+
+def judging_options(function: Decorated) -> Decorated:
+    """How to judge a tr; collected by ``settings``."""
+    return _stack(
         _AFTER,
         _MARGIN,
         _TOLERANCE,
@@ -192,18 +215,7 @@ def choosing_options(function: Decorated) -> Decorated:
         click.option("--max-residual", type=NOT_NEGATIVE, metavar="R", help="Object to a pair with a larger residual."),
         oscillator_options(required=False),
         click.option("--fit-window", type=(TIME, TIME), metavar="LO HI", help="Identify the oscillator here only."),
-        click.option(
-            "--cost-share", type=FRACTION, metavar="C",
-            help="Share of the cost of a step that the switched parts' elements take; tells the run time.",
-        ),
-        click.option(
-            "--step-ratio", type=POSITIVE, metavar="N", help="Time step while rigid over that before.  [default: 1]",
-        ),
         click.option("--no-verify", is_flag=True, help="Judge by the energy level alone, without an oscillator."),
-        click.option("--plot", metavar="FILE", type=FILE, help="Draw energy and motion to FILE (png, svg, pdf)."),
-        click.option(
-            "--report", metavar="FILE", type=FILE, help="Write all of it to one HTML page to read, print and sign."
-        ),
     )(function)  # fmt: skip
 
 
@@ -287,7 +299,8 @@ def settings(options: dict[str, Any]) -> Settings:
     chosen = [name for name, value in ways.items() if value]
     if len(chosen) > 1:
         raise click.UsageError(f"{chosen[0]} and {chosen[1]} exclude each other")
-    if options["step_ratio"] is not None and options["cost_share"] is None:
+    cost_share, step_ratio = options.get("cost_share"), options.get("step_ratio")
+    if step_ratio is not None and cost_share is None:
         raise click.UsageError("--step-ratio needs --cost-share too: together they tell the run time")
     if window and not window[0] < window[1]:
         raise click.UsageError(f"--fit-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
@@ -300,8 +313,8 @@ def settings(options: dict[str, Any]) -> Settings:
         oscillator=to_mode(given, options["v0"]) if given else None,
         fit_window=window,
         replay=not options["no_verify"],
-        cost_share=options["cost_share"],
-        step_ratio=options["step_ratio"] or 1.0,
+        cost_share=cost_share,
+        step_ratio=step_ratio or 1.0,
     )
 
 

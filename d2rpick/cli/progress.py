@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sys
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from threading import Event
 
 PERIOD: Final = 1.0  # [s] before the first line, and between two
@@ -19,13 +20,58 @@ def reading(names: Sequence[str], *, quiet: bool) -> Iterator[None]:
 
     Nobody knows how long it will take: how much of a file has to be read depends on what is asked of it.
     """
+    what = "standard input" if names[0] == "-" else names[0]
+    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    with _telling(lambda seconds: f"reading {what}{more} ... {seconds:.0f} s", quiet=quiet):
+        yield
+
+
+@dataclass
+class Count:
+    """How many of ``total`` runs are done; ``taken`` of them cost nothing."""
+
+    total: int
+    done: int = 0
+    taken: int = 0
+
+    def told(self, seconds: float) -> str:
+        """Say how far it is after so many seconds, and how long the rest will take at this pace."""
+        computed = self.done - self.taken
+        left = f", {_clock(seconds / computed * (self.total - self.done))} left" if computed else ""
+        return f"{self.done} of {self.total} runs{left}"
+
+
+@contextmanager
+def counting(total: int, *, quiet: bool) -> Iterator[Count]:
+    """Tell on stderr how many runs are done and how long the rest will take; the caller counts."""
+    count = Count(total)
+    with _telling(count.told, quiet=quiet):
+        yield count
+
+
+def _clock(seconds: float) -> str:
+    """Write a duration as people read it.
+
+    Examples
+    --------
+    >>> _clock(7), _clock(3725)
+    ('0:07', '1:02:05')
+    """
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+@contextmanager
+def _telling(say: Callable[[float], str], *, quiet: bool) -> Iterator[None]:
+    """Show what ``say`` gives for the seconds that have gone by, unless ``quiet`` or where no terminal is."""
     if quiet or not sys.stderr.isatty():
         yield
         return
     from threading import Event, Thread  # --help does without
 
     done = Event()
-    thread = Thread(target=_tell, args=(names, done), daemon=True)
+    thread = Thread(target=_tell, args=(say, done), daemon=True)
     thread.start()
     try:
         yield
@@ -34,17 +80,15 @@ def reading(names: Sequence[str], *, quiet: bool) -> Iterator[None]:
         thread.join()
 
 
-def _tell(names: Sequence[str], done: Event) -> None:
+def _tell(say: Callable[[float], str], done: Event) -> None:
     import shutil
 
-    what = "standard input" if names[0] == "-" else names[0]
-    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     line, seconds = "", 0.0
     while not done.wait(PERIOD):
         seconds += PERIOD
         room = shutil.get_terminal_size().columns - 1  # a line that wraps could not be erased
-        line = f"reading {what}{more} ... {seconds:.0f} s"[-room:]
-        sys.stderr.write(f"\r{line}")
+        before, line = line, say(seconds)[-room:]
+        sys.stderr.write(f"\r{line.ljust(len(before))}")
         sys.stderr.flush()
     if line:
         sys.stderr.write(f"\r{' ' * len(line)}\r")

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from html import escape
+from importlib.resources import files
 from typing import TYPE_CHECKING
 
+from d2rpick import __version__
 from d2rpick.report.tables import short
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
+    from d2rpick.cautions import Caution
     from d2rpick.report.tables import Cell
 
+# Nothing is ever fetched, and nothing runs, whatever the files that were read may hold.
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 _VOID = frozenset({"meta", "link", "br", "hr"})
 # Characters that no page may hold.
 _CONTROLS = dict.fromkeys({*range(32), *range(127, 160)} - {*map(ord, "\t\n")}, "\ufffd")
@@ -42,6 +47,44 @@ def join(children: Iterable[str], between: str = "") -> Markup:
     return Markup(
         between.join(child if isinstance(child, Markup) else _escape(child, quote=False) for child in children)
     )
+
+
+def document(title: str, *content: str, signed: Sequence[str]) -> str:
+    """Give a whole page that needs nothing but itself, with lines ``signed`` to be filled in by hand in print."""
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("title", title),
+        tag("style", resource("style.css")),
+    )
+    # on top, beside the times: behind a card of any length it may stand on a sheet of its own
+    sign = tag("p", *(tag("span", line) for line in signed), class_="sign")
+    header = tag("header", tag("h1", title), tag("p", f"d2rpick {__version__}", class_="soft"), sign)
+    return f"<!DOCTYPE html>\n{tag('html', head, tag('body', header, tag('main', *content)), lang='en')}\n"
+
+
+def section(title: str, *content: str) -> Markup:
+    """Give a section under its title."""
+    return tag("section", tag("h2", title), *content)
+
+
+def drawings(figures: Mapping[str, tuple[str, str]]) -> Markup:
+    """Show SVG elements, each for a wide and a narrow page, with their captions."""
+    return join(_figure(caption, *svg) for caption, svg in figures.items())
+
+
+def remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
+    """List reasons and warnings; nothing where there are none."""
+    lines = [tag("li", reason) for reason in reasons]
+    lines += [tag("li", tag("b", caution.code), f": {caution.message}") for caution in cautions]
+    return tag("ul", *lines, class_="warnings") if lines else Markup()
+
+
+def resource(name: str) -> Markup:
+    """Read a text that is part of the package."""
+    return Markup(files("d2rpick.report").joinpath(name).read_text("utf-8"))
 
 
 def table(title: str, head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None) -> Markup:
@@ -78,3 +121,11 @@ def _escape(text: str, *, quote: bool = True) -> str:
 
 def _text(cell: Cell) -> str:
     return cell if isinstance(cell, Markup) else short(cell)
+
+
+def _figure(caption: str, wide: str, narrow: str) -> Markup:
+    drawn = (
+        tag("div", Markup(svg), class_=name, role="img", aria_label=caption)
+        for svg, name in ((wide, "wide"), (narrow, "narrow"))
+    )
+    return tag("figure", *drawn, tag("figcaption", caption))

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from d2rpick import __version__
 from d2rpick.errors import D2RPickError
 from d2rpick.judged_card import of_parts
 from d2rpick.report.health import measures_of
-from d2rpick.report.html import Markup, join, pairs, table, tag
+from d2rpick.report.html import Markup, document, pairs, resource, section, table, tag
 from d2rpick.report.situation import heading
 from d2rpick.report.tables import measure, short
 
@@ -19,14 +17,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from d2rpick.candidates import Candidate
-    from d2rpick.cautions import Caution
     from d2rpick.health import Health
     from d2rpick.history import History
     from d2rpick.readers import Run
     from d2rpick.situation import Situation
-
-# Nothing is ever fetched, and nothing runs, whatever the files that were read may hold.
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
 @dataclass(frozen=True)
@@ -43,27 +37,10 @@ class Record:
     figures: Mapping[str, tuple[str, str]]
 
 
-def document(run: Run, sections: Iterable[Markup]) -> str:
-    """Write a page about a run, with a line to sign on when it is printed."""
+def run_page(run: Run, sections: Iterable[Markup]) -> str:
+    """Write a page about one run."""
     name = next((database.title for database in run.databases if database.title), "") or run.name
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        tag("title", f"Switch times: {name}"),
-        tag("style", _resource("style.css")),
-    )
-    # on top, beside the times: behind a card of any length it may stand on a sheet of its own
-    sign = tag("p", *(tag("span", line) for line in ("chosen by", "date", "signature")), class_="sign")
-    made_by = tag("p", f"d2rpick {__version__}", class_="soft")
-    body = tag("body", tag("header", tag("h1", f"Switch times: {name}"), made_by, sign), tag("main", *sections))
-    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
-
-
-def section(title: str, *content: str) -> Markup:
-    """Give a section under its title."""
-    return tag("section", tag("h2", title), *content)
+    return document(f"Switch times: {name}", *sections, signed=("chosen by", "date", "signature"))
 
 
 def pair(title: str, times: tuple[float, float], residual: float | None, history: History, class_: str) -> Markup:
@@ -78,23 +55,11 @@ def pair(title: str, times: tuple[float, float], residual: float | None, history
     return tag("div", tag("h2", title), tag("div", *shown, class_="times"), *lines, class_=class_)
 
 
-def remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
-    """List reasons and warnings; nothing where there are none."""
-    lines = [tag("li", reason) for reason in reasons]
-    lines += [tag("li", tag("b", caution.code), f": {caution.message}") for caution in cautions]
-    return tag("ul", *lines, class_="warnings") if lines else Markup()
-
-
 def digests(sources: Iterable[str]) -> list[tuple[str, str]]:
     """Name each file with its SHA-256."""
     from d2rpick.readers.source import sha256
 
     return [("SHA-256", f"{name}: {sha256(name)}") for name in sources]
-
-
-def drawings(figures: Mapping[str, tuple[str, str]]) -> Markup:
-    """Show each figure with its caption, as wide as the page."""
-    return join(_figure(caption, *svg) for caption, svg in figures.items())
 
 
 def parts(candidate: Candidate | None) -> Markup:
@@ -114,7 +79,7 @@ def evidence(situation: Situation, health: Health | None, record: Record) -> Ite
     """Tell what was read, how healthy it is, by what method it was judged, and how to repeat that."""
     yield section("What was read", _read(situation, record.run))
     yield section("Health of the reference run", *_health(health))
-    yield section("Method and limits", _resource("method.html"))
+    yield section("Method and limits", resource("method.html"))
     stdin = [tag("p", "with the same history on standard input:")] if "-" in record.run.sources else []
     yield section("To repeat this", *stdin, tag("pre", shlex.join(record.command), class_="wrap"))
 
@@ -134,14 +99,6 @@ def solver_input(situation: Situation, times: tuple[float, float], record: Recor
     except D2RPickError as error:
         return section(title, tag("p", f"There is no card for these times: {error}"))
     return section(title, tag("pre", found[0].text)) if found else section(title, *printed)
-
-
-def _figure(caption: str, wide: str, narrow: str) -> Markup:
-    drawn = (
-        tag("div", Markup(svg), class_=name, role="img", aria_label=caption)
-        for svg, name in ((wide, "wide"), (narrow, "narrow"))
-    )
-    return tag("figure", *drawn, tag("figcaption", caption))
 
 
 def _read(situation: Situation, run: Run) -> Markup:
@@ -165,8 +122,3 @@ def _health(health: Health | None) -> Iterator[Markup]:
     yield tag("p", f"Up to td; shares are of the peak of the internal energy.{where}", class_="soft")
     if health.reason:
         yield tag("p", health.reason)
-
-
-def _resource(name: str) -> Markup:
-    """Read a text that is part of the package."""
-    return Markup(files("d2rpick.report").joinpath(name).read_text("utf-8"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from d2rpick.report import page
-from d2rpick.report.html import Markup, pairs, table, tag
+from d2rpick.report.html import Markup, drawings, pairs, remarks, section, table, tag
 from d2rpick.report.suggestion import HEAD, outlook, rows
 from d2rpick.report.tables import measure, short
 
@@ -20,7 +20,7 @@ _MOST_ROWS = 20
 
 def as_page(answer: Suggestion, record: page.Record) -> str:
     """Write the page."""
-    return page.document(record.run, _sections(answer, record))
+    return page.run_page(record.run, _sections(answer, record))
 
 
 def better_pair(answer: Suggestion) -> Pair | None:
@@ -35,8 +35,8 @@ def better_pair(answer: Suggestion) -> Pair | None:
 
 def _sections(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
     yield _choice(answer)
-    yield page.drawings(record.figures)
-    yield page.section("Candidates", *_candidates(answer))
+    yield drawings(record.figures)
+    yield section("Candidates", *_candidates(answer))
     yield page.parts(next((candidate for candidate in answer.candidates if candidate.recommended), None))
     yield from page.evidence(answer.situation, answer.health, record)
     if answer.recommended:
@@ -52,7 +52,7 @@ def _choice(answer: Suggestion) -> Markup:
         cards = [tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")]
     if better:
         cards.append(_pair(answer, "Better pair: td at the nearest peak", better, class_="card"))
-    return tag("section", tag("div", *cards, class_="choice"), page.remarks(answer.cautions), pairs(outlook(answer)))
+    return tag("section", tag("div", *cards, class_="choice"), remarks(answer.cautions), pairs(outlook(answer)))
 
 
 def _pair(answer: Suggestion, title: str, pair: Pair, class_: str) -> Markup:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from d2rpick.report import page
-from d2rpick.report.html import pairs, table, tag
+from d2rpick.report.html import drawings, pairs, remarks, section, table, tag
 from d2rpick.report.tables import short
 from d2rpick.report.verdict import COMPARED, comparison, deviations, measures, word
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def as_page(answer: Verdict, record: page.Record) -> str:
     """Write the page."""
-    return page.document(record.run, _sections(answer, record))
+    return page.run_page(record.run, _sections(answer, record))
 
 
 def _sections(answer: Verdict, record: page.Record) -> Iterator[Markup]:
@@ -27,11 +27,9 @@ def _sections(answer: Verdict, record: page.Record) -> Iterator[Markup]:
     times = candidate.tr, situation.td
     class_ = "card chosen" if answer.verified else "card refused"
     shown = page.pair(word(answer).capitalize(), times, candidate.residual, situation.history, class_)
-    yield tag("section", tag("div", shown, class_="choice"), page.remarks(answer.cautions, answer.reasons))
-    yield page.drawings(record.figures)
-    yield page.section(
-        "Measures", pairs((name.replace("_", " "), short(one)) for name, one in measures(answer).items())
-    )
+    yield tag("section", tag("div", shown, class_="choice"), remarks(answer.cautions, answer.reasons))
+    yield drawings(record.figures)
+    yield section("Measures", pairs((name.replace("_", " "), short(one)) for name, one in measures(answer).items()))
     yield page.parts(candidate)
     if answer.switched:
         yield _switched(answer.switched)
@@ -45,4 +43,4 @@ def _switched(found: Comparison) -> Markup:
     title = "The switched run"
     listed = [("after td", f"means to {found.end:.6g}"), *deviations(found), *page.digests(found.source)]
     listed += [("note", note) for note in found.notes]
-    return page.section(title, table(title, ("quantity", *COMPARED[1:]), comparison(found)), pairs(listed))
+    return section(title, table(title, ("quantity", *COMPARED[1:]), comparison(found)), pairs(listed))

@@ -1,0 +1,171 @@
+"""Windows of time in which a tr is acceptable, of one run and of many together.
+
+Candidates are single times, and no two runs share one; what they can share is a window around them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick import measures
+from d2rpick.choice import EQUALLY_GOOD, approve
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.choice import Suggestion
+    from d2rpick.history import Samples
+    from d2rpick.situation import Situation
+
+# Each level of tolerance is this part of the one before.
+_FINER = 0.25
+# Halvings of the sampling interval at an end of a window: to a millionth of it.
+_HALVINGS = 20
+
+
+def tolerance_levels(tolerance: float) -> tuple[float, ...]:
+    """The tolerance, a quarter of it, and so on, down to the first below which errors count as equal [-].
+
+    Examples
+    --------
+    >>> tolerance_levels(0.2)
+    (0.2, 0.05, 0.0125)
+    """
+    levels = [tolerance]
+    while levels[-1] > EQUALLY_GOOD:
+        levels.append(levels[-1] * _FINER)
+    return tuple(levels)
+
+
+def acceptable_windows(answer: Suggestion) -> tuple[Samples, ...]:
+    """Find the windows in which a tr is acceptable, at the tolerance and at each finer level.
+
+    Every end and middle at the full tolerance was judged by the rule of ``verify``; ends lie inside.  In between the
+    rule cannot change: between neighbouring points of the grid the energy is linear, or the deformation monotone.
+
+    Parameters
+    ----------
+    answer : Suggestion
+        For the run.  From some time on the error stays within the tolerance up to td: the same swing, where hardly
+        anything is saved.  That window counts only where the recommended tr lies in it.
+
+    Returns
+    -------
+    tuple of array, each of shape (n, 2)
+        For each of ``tolerance_levels``: first and last time of each window, ascending [time].
+    """
+    situation, own = answer.situation, answer.recommended
+    levels = tolerance_levels(situation.settings.tolerance)
+    grid = _grid(answer)
+    widest, *finer = _windows_below(situation, grid, np.minimum(levels, _residual_left(situation)))
+    judged = approve(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
+    kept = widest[np.reshape(judged, (-1, 3)).all(axis=1)]
+    if kept.size and kept[-1, 1] >= grid[-1] and not (own and kept[-1, 0] <= own.tr):
+        kept = kept[:-1]
+    return (kept, *(_within(windows, kept) for windows in finer))
+
+
+def coverage(runs: Sequence[Samples]) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
+    """Count in how many runs times lie in a window.
+
+    Parameters
+    ----------
+    runs : sequence of array of shape (n, 2)
+        Windows of each run, ends included, ascending and disjoint [time].
+
+    Returns
+    -------
+    stretches : array of shape (k, 2)
+        Stretches on which the count is the same and above zero, ascending; a single time where windows only touch.
+    counts : array of shape (k,)
+
+    Examples
+    --------
+    >>> stretches, counts = coverage([np.array([[0.0, 2.0]]), np.array([[1.0, 3.0]])])
+    >>> stretches.tolist(), counts.tolist()
+    ([[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]], [1, 2, 1])
+    """
+    ends = np.concatenate([np.zeros((0, 2)), *runs])
+    times = ends.T.ravel()
+    steps = np.repeat([1, -1], len(ends))
+    order = np.lexsort((-steps, times))  # at one time windows begin before others end: ends are included
+    counts = np.cumsum(steps[order])[:-1]
+    stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
+    # between two windows that begin, or end, at the same time lies nothing that one would miss
+    lasting = (stretches[:, 0] < stretches[:, 1]) | ((steps[order][:-1] > 0) & (steps[order][1:] < 0))
+    seen = lasting & (counts > 0)
+    return stretches[seen], counts[seen]
+
+
+def common_windows(runs: Sequence[Samples]) -> Samples:
+    """Give the windows that all runs share, shape (k, 2) [time].
+
+    Examples
+    --------
+    >>> common_windows([np.array([[0.0, 2.0], [4.0, 5.0]]), np.array([[1.0, 4.5]])]).tolist()
+    [[1.0, 2.0], [4.0, 4.5]]
+    """
+    stretches, counts = coverage(runs)
+    return np.asarray(stretches[counts == len(runs)])
+
+
+def _grid(answer: Suggestion) -> Samples:
+    """Times in the flight before td between which the rule changes once at most."""
+    situation = answer.situation
+    history, td = situation.history, situation.td
+    start = situation.earliest_tr
+    if start is None or start >= td:
+        return np.zeros(0)
+    turns = situation.fitted.extrema(float(history.time[0]), td) if situation.fitted else ()
+    known = situation.profile.time if situation.profile else ()
+    found = [candidate.tr for candidate in answer.candidates]
+    ends = [start, *(situation.span or ()), np.nextafter(td, -np.inf)]
+    times = np.concatenate([history.time, found, turns, known, ends])
+    return np.unique(times[(times >= max(start, history.time[0])) & (times < td)])
+
+
+def _errors(situation: Situation, times: Samples) -> Samples:
+    """What the tolerance is held against, of the shape of ``times``; infinite where no tolerance would help [-]."""
+    td, vibration = situation.td, situation.vibration
+    if vibration:
+        first, last = situation.measured_span
+        comparable = (times >= first) & (times <= last) & measures.sign_match(vibration, times, td)
+        return np.where(comparable, measures.lock_in_error(vibration, times, td), np.inf)
+    energy, level = np.interp(times, situation.history.time, situation.history.energy), situation.energy_td
+    if not level > 0:
+        return np.full(times.shape, np.inf)
+    return np.where(energy >= 0, np.abs(np.sqrt(np.maximum(energy, 0.0) / level) - 1), np.inf)
+
+
+def _residual_left(situation: Situation) -> float:
+    """Lock-in error that --max-residual leaves beside the kinetic share, R^2 = L^2 + K [-]."""
+    limit, share = situation.settings.max_residual, situation.kinetic_share
+    if limit is None:
+        return np.inf
+    return -1.0 if share is None or share > limit**2 else float(np.sqrt(limit**2 - share))
+
+
+def _windows_below(situation: Situation, grid: Samples, levels: Samples) -> list[Samples]:
+    """Windows in which the error stays at or below each level, each of shape (n, 2)."""
+    inside = np.pad(_errors(situation, grid) <= levels[:, np.newaxis], ((0, 0), (1, 1)))
+    inner = inside[:, 1:-1]
+    level, first = np.nonzero(inner & ~inside[:, :-2])
+    last = np.nonzero(inner & ~inside[:, 2:])[1]
+    around = np.clip([first - 1, last + 1], 0, grid.size - 1)
+    within, beyond = grid[np.stack([first, last], axis=1)], grid[around.T]
+    for _ in range(_HALVINGS if level.size else 0):
+        middle = (within + beyond) / 2
+        good = _errors(situation, middle.ravel()).reshape(middle.shape) <= levels[level, np.newaxis]
+        within, beyond = np.where(good, middle, within), np.where(good, beyond, middle)
+    return [within[level == i] for i in range(levels.size)]
+
+
+def _within(finer: Samples, kept: Samples) -> Samples:
+    """Windows of a finer level that lie in windows of the full tolerance."""
+    holder = np.searchsorted(kept[:, 0], finer[:, 0], side="right") - 1
+    inside = (
+        (holder >= 0) & (finer[:, 1] <= kept[np.maximum(holder, 0), 1]) if kept.size else np.zeros(len(finer), bool)
+    )
+    return np.asarray(finer[inside])

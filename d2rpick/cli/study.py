@@ -1,0 +1,206 @@
+"""The command ``study``."""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import replace
+from functools import partial
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from d2rpick.cli import options as shared
+from d2rpick.cli.output import Output, finish
+from d2rpick.cli.progress import counting
+from d2rpick.errors import D2RPickError, FormatError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.farm import Farm
+    from d2rpick.study import Question, Row, Study
+
+EXAMPLES = """\b
+Examples:
+  d2rpick study --td 0.064 sample_data/energy.csv sample_data/energy.glstat
+  d2rpick study --td 0.064 --plot runs.png 'sample_data/energy.*'
+  d2rpick study --td 0.37 --part box --resume runs.ndjson -f json sample_data/rolloverT01.gz
+  d2rpick study --td 0.064 --tolerance 0.1 -f ndjson sample_data/energy.csv sample_data/energy.glstat
+"""
+
+
+@click.command("study", epilog=EXAMPLES)
+@click.argument("run", metavar="RUN...", nargs=-1, type=shared.FILE)
+@click.option("--td", type=shared.TIME, required=True, metavar="T", help="Switch back to deformable at this time.")
+@click.option(
+    "--from", "listed", envvar="D2RPICK_STUDY_FROM", metavar="LIST", type=shared.FILE,
+    help="Names of runs too, one a line, from a file or stdin (-).",
+)  # fmt: skip
+@click.option(
+    "--resume", metavar="FILE", type=shared.FILE,
+    help="Keep finished runs in FILE; those that are in it already and unchanged are not computed again.",
+)  # fmt: skip
+@click.option(
+    "--jobs", type=click.IntRange(min=1), metavar="N", help="Processes at work.  [default: one for each core]",
+)  # fmt: skip
+@click.option("--scheduler", metavar="ADDRESS", help="Let a running Dask cluster do the work; it sees the same files.")
+@shared.reading_options
+@shared.judging_options
+@click.option("--plot", metavar="FILE", type=shared.FILE, help="Draw the energies of all runs to FILE (png, svg, pdf).")
+@click.option(
+    "--report", metavar="FILE", type=shared.FILE, help="Write all of it to one HTML page to read, print and sign."
+)
+@shared.output_options("table", "json", "csv", "markdown", "ndjson")
+@click.pass_context
+def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exit_zero: bool, **options: Any) -> None:
+    """Ask for tr in many runs: how far they agree, and one tr for all of them.
+
+    Each RUN is a file, a folder with the files of one run, or a pattern whose matches are runs.  One that cannot be
+    read is told in its row and does not stop the others.
+    """
+    from d2rpick.ledger import fingerprint, line
+    from d2rpick.study import Question, summarise
+
+    if options["scheduler"] and options["jobs"]:
+        raise click.UsageError("--scheduler and --jobs exclude each other: the cluster has its own processes")
+    sources = _sources(run, options["listed"])
+    output = Output.of(options, *sources)
+    _check_ledger(options)
+    question = Question(
+        options["td"], shared.settings(options), shared.selection(options), options["input_format"],
+        curve=bool(options["plot"] or options["report"]),
+    )  # fmt: skip
+    asked, rows = fingerprint(question), []
+    streaming = output_format == "ndjson" and output.file is None
+    for row in _rows(question, sources, options, quiet=output.quiet or (streaming and sys.stdout.isatty())):
+        rows.append(row)
+        if streaming:
+            output.result(line(row, asked))
+    answer = summarise(question.td, rows)
+    output.notes((), answer.cautions)
+    _write_files(answer, options, output._replace(inputs=_files_of(rows)))
+    before = [] if streaming else [line(row, asked) for row in rows]
+    output.result(_text(answer, output_format, ctx.meta["d2rpick.command"], before))
+    if not answer.judged:
+        click.echo(f"d2rpick: no run could be judged; the first: {rows[0].message}", err=True)
+        ctx.exit(2)
+    finish(ctx, objection=answer.objection, exit_zero=exit_zero)
+
+
+def _text(answer: Study, output_format: str, command_line: Sequence[str], lines: Sequence[str]) -> str:
+    """Result in its format; ``lines`` are those of newline-delimited JSON that were not given out yet."""
+    from d2rpick.report import study as report
+
+    texts = {
+        "table": lambda: report.as_table(answer),
+        "markdown": lambda: report.as_markdown(answer),
+        "csv": lambda: report.as_csv(answer),
+        "json": lambda: report.as_json(answer, command_line),
+        "ndjson": lambda: "\n".join([*lines, report.as_last_line(answer, command_line)]),
+    }
+    return texts[output_format]()
+
+
+def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
+    """Names of all runs, given and listed, patterns replaced by what they match."""
+    from d2rpick.study import find_runs
+
+    sources = find_runs([*names, *(_listed(listed) if listed is not None else ())])
+    if not sources:
+        where = "" if listed is None else f"{'standard input' if listed == '-' else listed} names none; "
+        raise click.UsageError(f"no runs; {where}name them, or a list of them with --from")
+    if "-" in sources:
+        raise click.UsageError("- is no run: a history from standard input cannot be handed to other processes")
+    return sources
+
+
+def _listed(name: str) -> Iterator[str]:
+    """Names in a list, one a line; blank lines and comments are skipped."""
+    from pathlib import Path
+
+    try:
+        content = sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
+    except OSError as error:
+        raise FormatError(f"{name}: cannot be read ({error.strerror}); name a file with one run a line") from None
+    for text in os.fsdecode(content).removeprefix("\ufeff").splitlines():
+        if (text := text.strip()) and not text.startswith("#"):
+            yield text
+
+
+def _check_ledger(options: dict[str, Any]) -> None:
+    """Raise D2RPickError when what ``--resume`` keeps would be overwritten by a result."""
+    name = options["resume"]
+    if name is None:
+        return
+    for option in ("output_file", "plot", "report"):
+        if options[option] is not None and os.path.realpath(options[option]) == os.path.realpath(name):
+            raise D2RPickError(f"{name}: --resume and --{option.replace('_', '-')} name the same file; name two")
+    if os.path.exists(name) and os.path.samestat(os.stat(name), os.fstat(1)):  # noqa: PTH110, PTH116
+        raise D2RPickError(f"{name}: --resume and standard output are the same file; send one elsewhere")
+
+
+def _files_of(rows: Sequence[Row]) -> tuple[str, ...]:
+    """Files that were read, those in folders too."""
+    return tuple(dict.fromkeys(stamp.name for row in rows for stamp in row.files))
+
+
+def _write_files(answer: Study, options: dict[str, Any], output: Output) -> None:
+    """Write figure and page where they are asked for; D2RPickError when one would replace a file that was read."""
+    for name in (output.file, options["plot"], options["report"]):
+        if name is not None:
+            output.claim(name)
+    if options["plot"] is None and options["report"] is None:
+        return
+    from d2rpick import plots
+
+    if options["plot"] is not None:
+        output.write(options["plot"], plots.render(plots.draw_study(answer), options["plot"]))
+    if options["report"] is not None:
+        from d2rpick.report.study_page import as_page
+
+        drawing = plots.both_widths(plots.draw_study, answer, "runs")
+        output.write(options["report"], as_page(answer, shared.repeat(), drawing).encode())
+
+
+def _rows(question: Question, sources: Sequence[str], options: dict[str, Any], *, quiet: bool) -> Iterator[Row]:
+    """Rows in the order of the runs, each as soon as those before it are there."""
+    from d2rpick.farm import answers
+    from d2rpick.ledger import Ledger
+    from d2rpick.study import ask, failed
+
+    ledger = Ledger(options["resume"], question) if options["resume"] is not None else None
+    known = {number: row for number, source in enumerate(sources) if ledger and (row := ledger.find(source))}
+    new = [number for number in range(len(sources)) if number not in known]
+    if ledger and (ledger.taken or ledger.outdated) and not options["quiet"]:
+        click.echo(f"note: {ledger.told(len(sources))}", err=True)
+    # the processes of a cluster work in other folders
+    names = [os.path.abspath(sources[n]) if options["scheduler"] else sources[n] for n in new]  # noqa: PTH100
+    following = 0
+    with _farm(options, len(new)) as farm, counting(len(sources), quiet=quiet) as count:
+        count.done = count.taken = len(known)
+        for answer in chain((None,), answers(farm, partial(ask, question), names)):
+            if answer:
+                number = new[answer.number]
+                row = failed(sources[number], answer.error) if answer.error else answer.result
+                known[number] = replace(row, source=sources[number])
+                count.done += 1
+                if ledger:
+                    ledger.add(known[number])
+            while following in known:
+                yield known.pop(following)
+                following += 1
+
+
+def _farm(options: dict[str, Any], calls: int) -> Farm:
+    """Choose where to compute so many calls; a single one needs no other process."""
+    from d2rpick import farm
+
+    if options["scheduler"] and calls:
+        cluster = farm.Cluster(options["scheduler"])
+        if not cluster.threads and not options["quiet"]:
+            click.echo(f"note: {options['scheduler']}: no workers yet, waiting for some", err=True)
+        return cluster
+    processes = min(options["jobs"] or farm.cores(), calls)
+    return farm.Cores(processes) if processes > 1 else farm.Here()

@@ -1,0 +1,212 @@
+"""Where many calls are computed: in this process, by a pool of processes, or on a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
+from multiprocessing import Pipe, get_all_start_methods, get_context, set_forkserver_preload
+from threading import Thread
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar
+
+from d2rpick.errors import D2RPickError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from multiprocessing.connection import Connection
+    from types import TracebackType
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+# Calls that wait for each process beside the one it works on: enough to keep it busy, too few to fill memory.
+_WAITING = 2
+# On a cluster, whose workers may come and go.
+_LEAST_ON_CLUSTER = 64
+# [s] until a scheduler has to answer.
+_PATIENCE = 10
+
+
+class Farm(Protocol):
+    """What computes calls: up to ``room`` at a time."""
+
+    room: int
+
+    def submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
+        """Begin a call."""
+
+    def alone(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
+        """Repeat a call that may have ended the process it ran in, where it harms no other."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Give up what has not begun."""
+
+
+def cores() -> int:
+    """Count the cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on every system
+        return os.cpu_count() or 1
+
+
+class Answer(NamedTuple):
+    """Result of the call for the item of this number, or the error that it ended with."""
+
+    number: int
+    result: Any
+    error: BaseException | None
+
+
+def answers(farm: Farm, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Answer]:
+    """Compute ``function`` for all items; answers come as they are finished, whatever their order.
+
+    A call whose process died is repeated once, alone: the death breaks a whole pool, and not all of its calls are to
+    blame.
+    """
+    queue = iter(enumerate(items))
+    running: dict[Future[Result], tuple[int, Item]] = {}
+    while True:
+        for number, item in islice(queue, farm.room - len(running)):
+            running[farm.submit(function, item)] = number, item
+        if not running:
+            return
+        suspects = []
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            number, item = running.pop(future)
+            if isinstance(_error(future), BrokenProcessPool):
+                suspects.append((number, item))
+            else:
+                yield _answer(number, future)
+        for number, item in suspects:
+            yield _answer(number, farm.alone(function, item))
+
+
+def _error(future: Future[Any]) -> BaseException | None:
+    return None if future.cancelled() else future.exception()
+
+
+def _answer(number: int, future: Future[Any]) -> Answer:
+    if future.cancelled():
+        return Answer(number, None, D2RPickError("given up by the cluster; is its scheduler still there?"))
+    error = future.exception()
+    if isinstance(error, BrokenProcessPool):
+        error = D2RPickError("its process ended without an answer; was there enough memory?")
+    return Answer(number, None if error else future.result(), error)
+
+
+class Here:
+    """In the calling process, one call after the other."""
+
+    room = 1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
+        """Compute the call at once."""
+        future: Future[Result] = Future()
+        try:
+            future.set_result(function(item))
+        except Exception as error:  # noqa: BLE001  told by the future, as a pool does
+            future.set_exception(error)
+        return future
+
+    alone = submit
+
+
+class Cores:
+    """A pool of processes on this machine."""
+
+    def __init__(self, processes: int) -> None:
+        # read when a process imports numpy: with several of them, threads would only fight over the cores
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        self.processes, self.room = processes, (1 + _WAITING) * processes
+        self._held, self._leash = Pipe(duplex=False)  # the processes see when this end of it is closed
+        self._pool = self._new(processes)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._leash.close()
+
+    def submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
+        """Hand the call to the pool; to a new one when the last is broken."""
+        try:
+            return self._pool.submit(function, item)
+        except BrokenProcessPool:
+            self._pool.shutdown(wait=False)
+            self._pool = self._new(self.processes)
+            return self._pool.submit(function, item)
+
+    def alone(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
+        """Compute the call in a process of its own."""
+        with self._new(1) as pool:
+            return pool.submit(function, item)
+
+    def _new(self, processes: int) -> ProcessPoolExecutor:
+        # plain forks copy locks that threads hold; one process that forks from a clean state is nearly as quick
+        method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
+        set_forkserver_preload(["d2rpick.study"])
+        return ProcessPoolExecutor(processes, get_context(method), _begin_work, (self._held,))
+
+
+def _begin_work(held: Connection) -> None:
+    """End this process, whatever it does, when the other end of ``held`` is closed; without a word on interrupts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    def follow() -> None:
+        held.poll(None)  # nothing is ever sent
+        os._exit(1)
+
+    Thread(target=follow, daemon=True).start()
+
+
+class Cluster:
+    """A Dask cluster that is running already, under the address of its scheduler.
+
+    Raises
+    ------
+    D2RPickError
+        If ``distributed`` is not installed or no scheduler answers.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise D2RPickError(
+                "a Dask cluster needs the extra 'dask' of d2rpick; install it with: pip install distributed"
+            ) from None
+        try:
+            self._client = Client(address, timeout=_PATIENCE, set_as_default=False)
+        except (OSError, ValueError) as error:
+            what = " ".join(str(error).split())
+            raise D2RPickError(f"{address}: no Dask scheduler answers ({what}); check the address") from None
+        self._executor = self._client.get_executor(pure=False)
+        self.threads = sum(self._client.nthreads().values())
+        self.room = max(_LEAST_ON_CLUSTER, (1 + _WAITING) * self.threads)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._client.close()
+
+    def submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
+        """Hand the call to the scheduler, which repeats it where a worker dies."""
+        future: Future[Result] = self._executor.submit(function, item)
+        return future
+
+    alone = submit

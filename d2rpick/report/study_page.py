@@ -1,0 +1,63 @@
+"""The answer of ``study`` as one HTML page to be read, printed and signed; it needs nothing but itself."""
+
+from __future__ import annotations
+
+import shlex
+from typing import TYPE_CHECKING
+
+from d2rpick.report.html import Markup, document, drawings, pairs, remarks, resource, section, table, tag
+from d2rpick.report.study import HEAD, outcome, rows
+from d2rpick.study import runs_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.study import Study
+
+
+def as_page(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    answer : Study
+    command : sequence of str
+        Arguments that repeat the answer.
+    drawing : (str, str)
+        SVG element for a wide and for a narrow page, with ids of their own.
+    """
+    title = f"Switch times of {runs_of(len(answer.rows))}"
+    sections = _sections(answer, command, drawing)
+    return document(title, *sections, signed=("checked by", "date", "signature"))
+
+
+def _sections(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> Iterator[Markup]:
+    yield tag("section", _common(answer), remarks(answer.cautions), pairs(outcome(answer)))
+    yield drawings({"Internal energies over each other, with the tr of each run, the common one and td": drawing})
+    yield section("Runs", table("Runs", [name.replace("+-", "\u00b1") for name in HEAD], rows(answer)))
+    yield section("Files", tag("pre", _files(answer), class_="wrap"))
+    yield section("Method and limits", resource("method.html"))
+    yield section("To repeat this", tag("pre", shlex.join(command), class_="wrap"))
+
+
+def _common(answer: Study) -> Markup:
+    tr = answer.common.tr
+    if tr is None:
+        text = tag("p", "There is none: ", answer.common.reason or "")
+        return tag("div", tag("div", tag("h2", "One tr for all runs"), text, class_="card"), class_="choice")
+    times = (tag("span", tag("i", name), f"{time:.6g}") for name, time in (("tr", tr), ("td", answer.td)))
+    exact = f"in full: tr = {tr!r}, td = {answer.td!r}"
+    rule = "Acceptable in every run that was judged, by the rule of d2rpick verify."
+    lines = (tag("div", *times, class_="times"), tag("p", rule), tag("p", exact, class_="soft"))
+    return tag("div", tag("div", tag("h2", "One tr for all runs"), *lines, class_="card chosen"), class_="choice")
+
+
+def _files(answer: Study) -> str:
+    """Name what was read, with size and time, in the order of the runs."""
+    from datetime import UTC, datetime
+
+    files = dict.fromkeys(stamp for row in answer.rows for stamp in row.files)
+    return "\n".join(
+        f"{datetime.fromtimestamp(stamp.mtime_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC {stamp.size:>12} {stamp.name}"
+        for stamp in files
+    )

@@ -1,0 +1,110 @@
+"""Cost of a study per run against a plain loop over the library call, and its memory.
+
+``python -m tests.benchmarks.study``: 1000 runs of 1e4 states each; every study is a process of its own.  What is
+compared takes turns, medians are told.
+Exit code 1 when a goal is missed: a study in one process costs no more than a quarter more than the loop, for it finds
+all windows of acceptable tr beside; a further run needs much less memory than its 160 kB of numbers.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from tests.paper import OMEGA_2
+from tests.records import MODE
+
+ROOT = Path(__file__).resolve().parents[2]
+TD = 0.0687534
+RUNS, STATES, FEW, ROUNDS = 1000, 10_000, 100, 3
+# Of the loop; kB of memory for each further run.
+MOST, MOST_GROWN = 1.25, 25.0
+LOOP = f"""
+import sys
+from d2rpick.choice import suggest
+from d2rpick.readers import read_history
+from d2rpick.situation import Settings
+found = [suggest(read_history([name]), {TD}, Settings()).recommended for name in sys.argv[1:]]
+assert all(found)
+"""
+
+
+def write_runs(folder: Path, number: int, states: int) -> list[str]:
+    """Write records of the paper's oscillator whose rate scatters by a thousandth; names of the files."""
+    rng = np.random.default_rng(7)
+    time = np.linspace(0.0, 0.15, states)
+    names = []
+    for i in range(number):
+        mode = type(MODE)(OMEGA_2 * (1 + 1e-3 * rng.standard_normal()), MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
+        names.append(str(folder / f"run{i:04}.csv"))
+        table = np.stack([time, mode.energy(time)], axis=1)
+        np.savetxt(names[-1], table, delimiter=",", header="time,internal_energy", comments="", fmt="%.7g")
+    return names
+
+
+def process(*args: str) -> tuple[float, float, bytes]:
+    """Seconds and peak memory of the largest process [MB] of a command, and what it prints."""
+    # the peak is that of the largest child so far, so each command has a parent of its own
+    code = (
+        "import json, subprocess, sys, time; from resource import *; start = time.perf_counter();"
+        "out = subprocess.run(sys.argv[1:], stdout=subprocess.PIPE, check=True).stdout;"
+        "print(json.dumps([time.perf_counter() - start, getrusage(RUSAGE_CHILDREN).ru_maxrss / 1024]));"
+        "sys.stdout.flush(); sys.stdout.buffer.write(out)"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code, sys.executable, *args], stdout=subprocess.PIPE, check=True, cwd=ROOT,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+    ).stdout  # fmt: skip
+    head, _, rest = result.partition(b"\n")
+    seconds, memory = json.loads(head)
+    return seconds, memory, rest
+
+
+def study(names: list[str], *options: str) -> tuple[float, float]:
+    """Seconds and peak memory of a study in which every run has a tr and all share one."""
+    args = ("-m", "d2rpick", "study", "-q", "--td", str(TD), "-f", "json", *options, *names)
+    seconds, memory, text = process(*args)
+    found = json.loads(text)
+    assert [run["status"] for run in found["runs"]] == ["ok"] * len(names)
+    assert found["common_tr"] is not None
+    return seconds, memory
+
+
+def main() -> int:
+    """Measure and tell; 1 when a goal is missed."""
+    everything = str(len(os.sched_getaffinity(0)))
+    with TemporaryDirectory() as place:
+        names = write_runs(Path(place), RUNS, STATES)
+        jobs = {f"study --jobs {number}": ("--jobs", number) for number in ("1", "2", everything)}
+        load = os.getloadavg()[0]
+        loops: list[float] = []
+        studies: dict[str, list[float]] = {name: [] for name in jobs}
+        for _ in range(ROUNDS):
+            loops.append(process("-c", LOOP, *names)[0])
+            for name, options in jobs.items():
+                studies[name].append(study(names, *options)[0])
+        loop = median(loops)
+        after = os.getloadavg()[0]
+        print(f"{RUNS} runs of {STATES} states, {everything} cores, load {load:.1f} before, {after:.1f} after")
+        for name, seconds in {"plain loop over the library call": loops, **studies}.items():
+            print(
+                f"{name:34} {median(seconds) / RUNS * 1e3:6.2f} ms per run, {median(seconds) / loop:4.2f} of the loop"
+            )
+        grown = []
+        for extra in ((), ("--plot", f"{place}/runs.png", "--overwrite")):
+            few, many = (study(some, "--jobs", "2", *extra)[1] for some in (names[:FEW], names))
+            grown.append((many - few) / (RUNS - FEW) * 1e3)
+            what = f"peak memory of study {' '.join(extra[:1])}".strip()
+            print(f"{what}: {few:.1f} MB with {FEW} runs, {many:.1f} MB with {RUNS}: {grown[-1]:.1f} kB per run more")
+    return int(median(studies["study --jobs 1"]) > MOST * loop or max(grown) > MOST_GROWN)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,182 @@
+"""Windows of acceptable tr: what lies inside verifies, what lies outside does not, and many are counted right."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from d2rpick.acceptable import acceptable_windows, common_windows, coverage, tolerance_levels
+from d2rpick.choice import Suggestion, suggest, verify
+from d2rpick.history import History
+from d2rpick.mode import Mode
+from d2rpick.modes import Modes
+from d2rpick.readers import Selection, read_history
+from d2rpick.situation import Settings
+from tests import chain
+from tests.command import ROLLOVER
+from tests.paper import OMEGA_2
+from tests.records import ENERGY, MODE, TIME, noisy
+
+if TYPE_CHECKING:
+    from d2rpick.history import Samples
+
+TD = 0.064
+PAPER = History(TIME, ENERGY, ("paper",), "made", "energy")
+
+
+def holds(windows: Samples, times: Samples) -> Samples:
+    """Whether each time lies in a window."""
+    at = times[:, np.newaxis]
+    return np.asarray(np.any((windows[:, 0] <= at) & (at <= windows[:, 1]), axis=1))
+
+
+def check(answer: Suggestion, seed: int) -> None:
+    """Hold the windows against ``verify`` at their ends, inside, and anywhere."""
+    with pytest.MonkeyPatch.context() as patch:
+        # the same record at the same td: what is found in it need not be found a hundred times
+        patch.setattr("d2rpick.choice.examine", lambda *_: answer.situation)
+        _check(answer, seed)
+
+
+def _check(answer: Suggestion, seed: int) -> None:
+    situation = answer.situation
+    history, td, asked = situation.history, situation.td, situation.settings
+    windows, *finer = acceptable_windows(answer)
+    assert np.all(windows[:, 0] <= windows[:, 1])
+    assert np.all(windows[1:, 0] > windows[:-1, 1])
+    rng = np.random.default_rng(seed)
+    ends = windows[rng.permutation(len(windows))[:4]]
+    inside = rng.uniform(ends[:, :1], ends[:, 1:], (len(ends), 4))
+    assert all(verify(history, t, td, asked).verified for t in [*ends.ravel(), *inside.ravel()])
+    # what ``verify`` accepts anywhere else lies on the swing of td, where nothing outside of the tolerance follows
+    last = max([windows[-1, 1]] if len(windows) else [history.time[0]])
+    anywhere = rng.uniform(history.time[0], last, 12) if last > history.time[0] else np.zeros(0)
+    clear = anywhere[np.min(np.abs(anywhere[:, np.newaxis] - [*windows.ravel(), np.inf]), axis=1) > 1e-5 * history.step]
+    assert [verify(history, t, td, asked).verified for t in clear] == holds(windows, clear).tolist()
+    for wider, narrower in zip((windows, *finer), finer, strict=False):
+        assert np.all(holds(wider, narrower.ravel()))
+
+
+@settings(max_examples=40)
+@given(
+    omega=st.floats(150, 400), alpha=st.floats(0, 60), phase=st.floats(0, np.pi), td=st.floats(0.04, 0.14),
+    tolerance=st.floats(0.001, 1.5), plastic=st.sampled_from([0.0, 3.0]), preload=st.sampled_from([0.0, 2.0]),
+    after=st.none() | st.floats(0.0, 0.03), limit=st.none() | st.floats(0.1, 1.5), seed=st.integers(0, 2**16),
+)  # fmt: skip
+def test_windows_of_an_oscillator_hold_what_verifies(
+    omega: float, alpha: float, phase: float, td: float, tolerance: float, plastic: float, preload: float,
+    after: float | None, limit: float | None, seed: int,
+) -> None:  # fmt: skip
+    mode = Mode(omega, alpha, 10 * np.cos(phase), 10 * np.sin(phase), 0.0, plastic, preload)
+    history = History(TIME[::3], mode.energy(TIME[::3]), ("made",), "made", "energy")
+    answer = suggest(history, td, Settings(tolerance=tolerance, after=after, max_residual=limit))
+    check(answer, seed)
+
+
+@settings(max_examples=60)
+@given(
+    energy=st.lists(st.floats(-1, 100), min_size=5, max_size=60), share=st.floats(0.3, 1.0),
+    tolerance=st.floats(0.01, 1.2), after=st.none() | st.floats(0.0, 0.5), seed=st.integers(0, 2**16),
+    uneven=st.booleans(), margin=st.sampled_from([0.0, 0.07]),
+)  # fmt: skip
+def test_windows_of_any_energy_hold_what_verifies(
+    energy: list[float], share: float, tolerance: float, after: float | None, seed: int, uneven: bool, margin: float
+) -> None:
+    time = np.linspace(0, 1, len(energy)) ** (1.5 if uneven else 1.0)
+    history = History(time, np.array(energy), ("made",), "made", "energy")
+    asked = Settings(tolerance=tolerance, after=after and after * time[-2], margin=margin, replay=False)
+    assume(share > float(asked.after or 0))
+    check(suggest(history, share, asked), seed)
+
+
+@pytest.mark.parametrize("tolerance", [0.05, 0.2, 0.6])
+def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tolerance: float) -> None:
+    record = History(TIME, noisy(ENERGY, 0.002, 5), ("noisy",), "made", "energy")
+    rollover = read_history([ROLLOVER], Selection(energy=("boxIE_J",)))
+    for history, td in ((record, TD), (rollover, 0.37)):
+        for replay in (True, False):
+            answer = suggest(history, td, Settings(tolerance=tolerance, replay=replay))
+            assert len(acceptable_windows(answer)[0])
+            check(answer, 1)
+
+
+@pytest.mark.parametrize("td", [chain.TD_PEAK, chain.TD_LATE])
+def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> None:
+    two = Modes((Mode(100.0, 4.0, 2.0, 3.0, 0.0), Mode(261.0, 4.0, -1.5, 1.0, 0.0)))
+    time = np.linspace(0.0, 0.3, 3001)
+    modes = suggest(History(time, two.energy(time), ("made",), "made", "energy"), td, Settings(tolerance=0.4))
+    assert isinstance(modes.situation.mode, Modes)
+    check(modes, 1)
+    parts = suggest(chain.history(), td, Settings())
+    assert parts.situation.basis == "parts"
+    check(parts, 1)
+    assert len(acceptable_windows(parts)[0])
+
+
+def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_sign() -> None:
+    answer = suggest(PAPER, TD, Settings())
+    for windows in acceptable_windows(answer):
+        acceptable = np.array(sorted(c.tr for c in answer.candidates if c.acceptable))
+        assert len(windows) == len(acceptable)
+        assert np.all((windows[:, 0] < acceptable) & (acceptable < windows[:, 1]))
+
+
+def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
+    answer = suggest(PAPER, TD, Settings())
+    assert acceptable_windows(answer)[0][-1, 1] < TD - 0.01
+    late = suggest(PAPER, 0.068, Settings(after=0.0655))
+    assert late.recommended is None
+    assert not any(windows.size for windows in acceptable_windows(late))
+    flat = History(np.linspace(0, 1, 50), 1 + 1e-3 * np.cos(np.arange(50) * 2.0), ("flat",), "made", "energy")
+    quiet = suggest(flat, 0.9, Settings(after=0.1, replay=False))
+    assert quiet.recommended
+    (window,) = acceptable_windows(quiet)[0]
+    assert window.tolist() == [0.1, np.nextafter(0.9, 0)]
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        Settings(max_kinetic_share=0.5),  # 0.917 there
+        Settings(max_residual=0.9),
+        Settings(tolerance=0.0, replay=False),
+    ],
+)
+def test_where_nothing_verifies_there_is_no_window(asked: Settings) -> None:
+    assert not any(windows.size for windows in acceptable_windows(suggest(PAPER, TD, asked)))
+
+
+def test_levels_end_where_errors_count_as_equal() -> None:
+    assert tolerance_levels(0.01) == (0.01,)
+    assert tolerance_levels(1.0)[-1] == 1 / 64
+
+
+def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
+    other = Mode(1.004 * OMEGA_2, MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
+    histories = [PAPER, History(TIME, other.energy(TIME), ("other",), "made", "energy")]
+    both = common_windows([acceptable_windows(suggest(history, 0.0687534, Settings()))[0] for history in histories])
+    times = np.linspace(0.01, 0.06, 400)
+    expected = [all(verify(history, t, 0.0687534, Settings()).verified for history in histories) for t in times]
+    assert holds(both, times).tolist() == expected
+    assert any(expected)
+
+
+WINDOWS = st.lists(st.integers(0, 12), min_size=0, max_size=8, unique=True).map(
+    lambda ends: np.array(sorted(ends)[: len(ends) // 2 * 2], float).reshape(-1, 2)
+)
+
+
+@given(st.lists(WINDOWS, min_size=1, max_size=5))
+def test_coverage_counts_at_every_time_the_runs_with_a_window_there(runs: list[Samples]) -> None:
+    stretches, counts = coverage(runs)
+    times = np.arange(0, 12.5, 0.25)
+    expected = np.sum([holds(windows, times) for windows in runs], axis=0)
+    held = (stretches[:, 0] <= times[:, np.newaxis]) & (times[:, np.newaxis] <= stretches[:, 1])
+    assert np.max(np.where(held, counts, 0), axis=1, initial=0).tolist() == list(expected)
+    shared = common_windows(runs)
+    assert holds(shared, times).tolist() == [count == len(runs) for count in expected]
+    assert np.all(shared[:, 0] <= shared[:, 1])

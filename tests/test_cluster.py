@@ -1,0 +1,118 @@
+"""A real Dask scheduler and workers, each a process of its own, do the work; one of them is killed on the way."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests import studies
+from tests.command import ROOT, run
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+distributed = pytest.importorskip("distributed", reason="needs the extra 'dask'")
+pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+PATIENCE = 30.0  # [s]
+
+
+def until(true: Callable[[], Any]) -> Any:
+    """Wait for something to be true."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        if found := true():
+            return found
+        time.sleep(0.02)
+    raise AssertionError("waited in vain")
+
+
+@contextmanager
+def process(*args: str, **options: Any) -> Iterator[subprocess.Popen[str]]:
+    """Run a Python program until the end of the block."""
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, **options}
+    with subprocess.Popen([sys.executable, *args], cwd=ROOT, text=True, **quiet) as started:
+        try:
+            yield started
+        finally:
+            started.kill()
+
+
+@contextmanager
+def cluster(folder: Path, names: tuple[str, ...]) -> Iterator[tuple[str, dict[str, subprocess.Popen[str]]]]:
+    """Start a scheduler and workers of these names, each of one thread; the address, and the processes by name."""
+    listed = folder / "scheduler.json"
+    common = ("--no-dashboard", "--scheduler-file", str(listed), "--host", "127.0.0.1")
+    with ExitStack() as stack:
+        stack.enter_context(process("-m", "distributed.cli.dask_scheduler", *common, "--port", "0"))
+        until(lambda: listed.exists() and listed.read_text())
+        workers = {
+            name: stack.enter_context(
+                process(
+                    *("-m", "distributed.cli.dask_worker", *common, "--name", name, "--nthreads", "1", "--no-nanny"),
+                    *("--local-directory", str(folder)),
+                )
+            )
+            for name in names
+        }
+        yield json.loads(listed.read_text())["address"], workers
+
+
+def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> None:
+    sources = studies.variants(tmp_path)
+    expected = json.loads(run(*studies.STUDY, "-f", "json", *sources, sources[0]).stdout)
+    slow, ledger = tmp_path / "slow.csv", tmp_path / "ledger.ndjson"
+    os.mkfifo(slow)  # whoever reads it waits
+    with (
+        cluster(tmp_path, ("one", "two")) as (address, workers),
+        distributed.Client(address, set_as_default=False) as client,
+    ):
+        client.wait_for_workers(2, timeout=PATIENCE)
+        args = ("study", "--td", str(studies.TD), "--scheduler", address, "-f", "json", "--resume", str(ledger))
+        names = [os.path.relpath(name, ROOT) for name in (*sources, str(slow))]
+        with process("-m", "d2rpick", *args, *names, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as study:
+            until(lambda: ledger.exists() and ledger.read_bytes().count(b"\n") == len(sources))
+            (busy,) = until(lambda: [address for address, calls in client.processing().items() if calls])
+            victim = client.scheduler_info(n_workers=-1)["workers"][busy]["id"]
+            slow.unlink()
+            slow.write_bytes(Path(sources[0]).read_bytes())
+            workers[victim].kill()
+            text, said = study.communicate(timeout=PATIENCE)
+    assert study.returncode == 0, said
+    found = json.loads(text)
+    assert [row["source"] for row in found["runs"]] == names
+    for row in (*found["runs"], *expected["runs"]):
+        del row["source"]
+    same = ("runs", "tr", "agree", "common_tr", "common_window")
+    assert {key: found[key] for key in same} == {key: expected[key] for key in same}
+
+
+def test_what_cannot_be_read_on_a_cluster_is_a_row_and_no_scheduler_an_error(tmp_path: Path) -> None:
+    with cluster(tmp_path, ("one",)) as (address, _):
+        args = ("study", "--td", str(studies.TD), "--scheduler", address)
+        result = run(*args, "-f", "ndjson", studies.write(tmp_path / "run.csv"), str(tmp_path / "absent.csv"))
+    statuses = [json.loads(line).get("status") for line in result.stdout.splitlines()]
+    assert (result.exit_code, statuses) == (1, ["ok", "unreadable", None])
+
+
+def test_where_no_scheduler_answers_the_study_ends(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("d2rpick.farm._PATIENCE", 0.3)
+    args = ("study", "--td", str(studies.TD), studies.write(tmp_path / "run.csv"), "--scheduler")
+    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
+        result = run(*args, address)
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert result.stderr.startswith(f"d2rpick: {address}: no Dask scheduler answers (")
+
+
+def test_without_the_package_its_name_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    result = run("study", "--td", "0.064", studies.write(tmp_path / "run.csv"), "--scheduler", "tcp://127.0.0.1:9")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "pip install distributed" in result.stderr

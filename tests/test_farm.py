@@ -1,0 +1,74 @@
+"""Calls are computed here, by processes, or by a cluster, always the same way; a process that dies stops nothing."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.errors import D2RPickError
+from d2rpick.farm import Cores, Farm, Here, answers, cores
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+FARMS = [Here, lambda: Cores(2)]
+
+
+def square(number: int) -> int:
+    """Work, or fail, or die, as the number asks for."""
+    if number == 13:
+        raise ValueError("thirteen")
+    if number == 99:
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(0.02 if number == 0 else 0)
+    return number**2
+
+
+@pytest.mark.parametrize("farm", FARMS)
+def test_every_item_is_answered_once_by_its_number(farm: Callable[[], Farm]) -> None:
+    with farm() as place:
+        found = {answer.number: answer.result for answer in answers(place, square, range(12))}
+    assert found == {i: i**2 for i in range(12)}
+
+
+@pytest.mark.parametrize("farm", FARMS)
+def test_an_error_is_the_answer_of_its_item_alone(farm: Callable[[], Farm]) -> None:
+    with farm() as place:
+        found = {answer.number: answer for answer in answers(place, square, (1, 13, 2))}
+    assert [found[i].result for i in range(3)] == [1, None, 4]
+    assert str(found[1].error) == "thirteen"
+    assert found[0].error is found[2].error is None
+
+
+def test_a_process_that_dies_is_told_for_its_item_alone() -> None:
+    items = [*range(8), 99, *range(8, 12), 99, 12]
+    with Cores(2) as place:
+        found = {answer.number: answer for answer in answers(place, square, items)}
+    dead = [number for number, answer in found.items() if answer.error]
+    assert sorted(dead) == [8, 13]
+    assert all(isinstance(found[number].error, D2RPickError) for number in dead)
+    assert "memory" in str(found[8].error)
+    assert [found[n].result for n in sorted(found) if n not in dead] == [i**2 for i in range(13)]
+
+
+@pytest.mark.parametrize("farm", FARMS)
+def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
+    taken = 0
+
+    def items() -> Iterator[int]:
+        nonlocal taken
+        for number in range(60):
+            taken += 1
+            yield number
+
+    with farm() as place:
+        for done, _ in enumerate(answers(place, square, items())):
+            assert taken <= done + place.room
+
+
+def test_there_is_a_core() -> None:
+    assert cores() >= 1

@@ -1,0 +1,146 @@
+"""What a ledger gives back is what was put in, unless files, options or version have changed; cut lines are no harm."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from d2rpick import study
+from d2rpick.errors import FormatError
+from d2rpick.ledger import Ledger, fingerprint, line
+from d2rpick.readers import Selection
+from d2rpick.situation import Settings
+from d2rpick.study import Question, Row, ask
+from tests import studies
+
+QUESTION = Question(studies.TD, Settings())
+
+
+def values(row: Row | None) -> dict[str, object]:
+    """All of a row as plain values."""
+    assert row is not None
+    found = {name: getattr(row, name) for name in row.__dataclass_fields__}
+    found["acceptable"] = [windows.tolist() for windows in row.acceptable]
+    found["curve"] = None if row.curve is None else row.curve.tolist()
+    return found
+
+
+def kept(folder: Path, question: Question = QUESTION) -> tuple[str, str, Row]:
+    """A run, the ledger that holds it, and its row."""
+    name, ledger = studies.write(folder / "run.csv"), str(folder / "ledger.ndjson")
+    row = ask(question, name)
+    Ledger(ledger, question).add(row)
+    return name, ledger, row
+
+
+@pytest.mark.parametrize("curve", [False, True])
+def test_a_row_comes_back_to_the_last_digit(tmp_path: Path, curve: bool) -> None:
+    question = replace(QUESTION, curve=curve)
+    name, ledger, row = kept(tmp_path, question)
+    again = Ledger(ledger, question)
+    assert values(again.find(name)) == values(row)
+    assert again.told(1) == f"1 of 1 runs taken from {ledger}"
+
+
+def test_a_row_is_found_under_another_name_of_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, ledger, row = kept(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert values(Ledger(ledger, QUESTION).find("./run.csv")) == {**values(row), "source": "./run.csv"}
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        replace(QUESTION, td=0.064),
+        replace(QUESTION, settings=Settings(tolerance=0.1)),
+        replace(QUESTION, selection=Selection(energy=("internal_energy",))),
+        replace(QUESTION, input_format="csv"),
+        replace(QUESTION, curve=True),
+        replace(QUESTION, tool_version="0.0.1"),
+    ],
+)
+def test_a_row_of_another_question_is_not_taken(tmp_path: Path, question: Question) -> None:
+    name, ledger, _ = kept(tmp_path)
+    again = Ledger(ledger, question)
+    assert again.find(name) is None
+    assert again.told(1).endswith("; 1 have changed or were asked for with other options")
+
+
+def test_a_figure_changes_no_answer_but_needs_the_outline(tmp_path: Path) -> None:
+    question = replace(QUESTION, curve=True)
+    assert fingerprint(question) == fingerprint(QUESTION)
+    name, ledger, _ = kept(tmp_path, question)
+    assert values(Ledger(ledger, QUESTION).find(name))["curve"] is None
+
+
+@pytest.mark.parametrize("change", ["touched", "longer", "gone", "more files"])
+def test_a_row_of_changed_files_is_not_taken(tmp_path: Path, change: str) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    glstat = folder / "glstat"
+    glstat.write_bytes((Path(studies.__file__).parents[1] / "sample_data" / "energy.glstat").read_bytes())
+    ledger = Ledger(str(tmp_path / "ledger.ndjson"), QUESTION)
+    ledger.add(ask(QUESTION, str(folder)))
+    assert Ledger(ledger.name, QUESTION).find(str(folder))
+    state = glstat.stat()
+    if change == "touched":
+        os.utime(glstat, ns=(state.st_atime_ns, state.st_mtime_ns + 1))
+    elif change == "longer":
+        glstat.write_bytes(glstat.read_bytes() + b"\n")
+        os.utime(glstat, ns=(state.st_atime_ns, state.st_mtime_ns))
+    elif change == "gone":
+        glstat.unlink()
+    else:
+        (folder / "matsum").write_bytes(b"")
+    assert Ledger(ledger.name, QUESTION).find(str(folder)) is None
+
+
+def test_what_could_not_be_read_is_asked_again(tmp_path: Path) -> None:
+    ledger = Ledger(str(tmp_path / "ledger.ndjson"), QUESTION)
+    name = str(tmp_path / "energy.csv")
+    Path(name).write_text("nothing of use\n")
+    ledger.add(ask(QUESTION, name))
+    ledger.add(study.failed(name, MemoryError()))
+    assert Path(ledger.name).read_bytes() == b""
+    short = studies.write(tmp_path / "short.csv", end=0.05)
+    ledger.add(ask(QUESTION, short))
+    assert values(Ledger(ledger.name, QUESTION).find(short))["status"] == "out-of-range"
+
+
+@pytest.mark.parametrize("cut", range(0, 2500, 97))
+def test_a_line_that_was_cut_anywhere_is_passed_over_and_the_next_one_is_whole(tmp_path: Path, cut: int) -> None:
+    name, ledger, row = kept(tmp_path)
+    whole = Path(ledger).read_bytes()
+    Path(ledger).write_bytes(whole + whole[: min(cut, len(whole) - 2)])
+    other = studies.write(tmp_path / "other.csv", studies.variant(1.01))
+    Ledger(ledger, QUESTION).add(ask(QUESTION, other))
+    again = Ledger(ledger, QUESTION)
+    assert values(again.find(name)) == values(row)
+    assert values(again.find(other)) == values(ask(QUESTION, other))
+
+
+@pytest.mark.parametrize("content", ["time,energy\n0,1\n", '{"schema": "d2rpick/study/1"}\n', "\n", '{"a": 1}\n'])
+def test_another_file_is_refused_and_stays_as_it_is(tmp_path: Path, content: str) -> None:
+    file = tmp_path / "file"
+    file.write_text(content)
+    with pytest.raises(FormatError, match="no run of a study"):
+        Ledger(str(file), QUESTION)
+    assert file.read_text() == content
+
+
+def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
+    for name in (tmp_path, tmp_path / "absent" / "ledger"):
+        with pytest.raises(FormatError, match="cannot be written"):
+            Ledger(str(name), QUESTION)
+
+
+def test_a_line_is_json_with_the_windows_of_the_row(tmp_path: Path) -> None:
+    row = ask(QUESTION, studies.write(tmp_path / "run.csv"))
+    found = json.loads(line(row, "asked"))
+    assert found["acceptable"] == [windows.tolist() for windows in row.acceptable]
+    assert np.array(found["acceptable"][0]).size

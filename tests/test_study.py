@@ -1,0 +1,202 @@
+"""What many runs have in common: the spread, the agreement, one tr for all, and why there is none."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.choice import verify
+from d2rpick.history import History
+from d2rpick.readers import Selection, read_history
+from d2rpick.situation import Settings
+from d2rpick.study import OK, Question, Row, ask, failed, find_runs, outline, shortest, summarise
+from tests import studies
+from tests.command import BOX, GLSTAT
+from tests.shared import SHARED, shared
+
+ASKED = Question(studies.TD, Settings())
+
+
+def row(source: str, *windows: tuple[float, float], tr: float = 2.0, width: float = 0.1, **other: object) -> Row:
+    """A run with windows of acceptable tr, the same at every level."""
+    acceptable = (np.array(windows, float).reshape(-1, 2),) * 3
+    made = Row(
+        source, OK, tr=tr, tr_low=tr - width, tr_high=tr + width, energy_td=1.0, residual=0.1, basis="oscillator",
+        acceptable=acceptable,
+    )  # fmt: skip
+    return replace(made, **other)  # type: ignore[arg-type]
+
+
+# One run.
+
+
+def test_a_row_says_what_suggest_says(tmp_path: Path) -> None:
+    name = studies.write(tmp_path / "run.csv")
+    found = ask(ASKED, name)
+    assert (found.status, found.message, found.basis, found.warnings) == ("ok", None, "oscillator", ())
+    assert found.tr == pytest.approx(0.0135866683619825, rel=1e-6)
+    assert found.tr_low is not None
+    assert found.tr_low < 0.0135866683619825 < (found.tr_high or 0)
+    assert found.energy_td == pytest.approx(6.05508394485761, rel=1e-6)
+    assert found.files == ((str(tmp_path / "run.csv"), Path(name).stat().st_size, Path(name).stat().st_mtime_ns),)
+
+
+@pytest.mark.parametrize(
+    ("content", "status", "said"),
+    [
+        (None, "unreadable", "no such file"),
+        ("", "unreadable", "the file is empty"),
+        ("time,energy\n0,1\n1,x\n2,3\n", "unreadable", ":3: "),
+        ("time,energy\n0,1\n0.05,2\n0.06,3\n", "out-of-range", "outside the record"),
+        ("time,energy\n0,1\n0.1,2\n", "out-of-range", "at least 3"),
+        ("time,energy\n0,1\n0.05,2\n0.1,3\n0.2,4\n", "none", "neither passes its level"),
+    ],
+)
+def test_what_is_wrong_with_a_run_is_said_in_its_row(
+    tmp_path: Path, content: str | None, status: str, said: str
+) -> None:
+    file = tmp_path / "run.csv"
+    if content is not None:
+        file.write_text(content)
+    found = ask(ASKED, str(file))
+    assert (found.status, found.tr) == (status, None)
+    assert said in (found.message or "")
+
+
+def test_a_process_that_did_not_answer_is_a_row() -> None:
+    found = failed("run", MemoryError("full"))
+    assert (found.source, found.status) == ("run", "failed")
+    assert found.message == "run: a fault of this program, please report it (MemoryError: full)"
+
+
+def test_another_version_gives_no_answer() -> None:
+    with pytest.raises(Exception, match=r"d2rpick 0\.0\.1 asks d2rpick"):
+        ask(replace(ASKED, tool_version="0.0.1"), "run")
+
+
+@given(st.integers(3, 3000), st.integers(0, 100))
+def test_an_outline_keeps_the_ends_of_the_energy_and_stays_small(states: int, seed: int) -> None:
+    energy = np.random.default_rng(seed).standard_normal(states)
+    history = History(np.arange(states, dtype=float), energy, ("made",), "made", "energy")
+    time, drawn = outline(history)
+    assert time.size == min(states, 400)
+    assert (drawn.min(), drawn.max()) == (energy.min(), energy.max())
+    assert np.all(np.diff(time) >= 0)
+    assert np.all(energy[time.astype(int)] == drawn)
+
+
+# Many runs.
+
+
+def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(tmp_path: Path) -> None:
+    names = studies.variants(tmp_path)
+    answer = summarise(studies.TD, [ask(ASKED, name) for name in names])
+    assert answer.common.tr is not None
+    assert answer.common.window is not None
+    for name in names:
+        for tr in (answer.common.tr, *answer.common.window):
+            assert verify(read_history([name]), tr, studies.TD, Settings()).verified
+    assert answer.spread is not None
+    assert answer.spread.min < answer.spread.median < answer.spread.max
+    assert answer.agree is False
+    assert not answer.objection
+
+
+@pytest.mark.parametrize("energies", [("IE_spring1_J", "IE_spring2_J"), ("IE_spring1_J",)])
+def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(energies: tuple[str, ...]) -> None:
+    name = str(shared("openradioss/chain_ref.csv"))
+    question = Question(0.238, Settings(), Selection(energy=energies))
+    found = ask(question, name)
+    answer = summarise(0.238, [found, found])
+    assert answer.common.tr is not None
+    history = read_history([name], question.selection)
+    assert verify(history, answer.common.tr, 0.238, Settings()).verified
+
+
+def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(tmp_path: Path) -> None:
+    found = ask(ASKED, studies.write(tmp_path / "run.csv"))
+    one, two = summarise(studies.TD, [found]), summarise(studies.TD, [found, found])
+    assert one.agree is two.agree is True
+    assert one.common == two.common
+    assert one.common.tr == pytest.approx(found.tr, abs=2e-5)
+
+
+@given(st.lists(st.tuples(st.floats(0, 1), st.floats(0, 0.3)), min_size=1, max_size=6))
+def test_runs_agree_when_their_intervals_have_a_time_in_common(intervals: list[tuple[float, float]]) -> None:
+    rows = [row(str(i), (0, 3), tr=tr, width=width) for i, (tr, width) in enumerate(intervals)]
+    pairwise = all(abs(a - b) <= v + w for a, v in intervals for b, w in intervals)
+    close = any(abs(abs(a - b) - v - w) < 1e-12 for a, v in intervals for b, w in intervals if (a, v) != (b, w))
+    assert summarise(4.0, rows).agree == pairwise or close
+
+
+def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_not() -> None:
+    rows = [row("a", (1, 2)), row("b", (1.5, 3)), row("c", (5, 6), (1.6, 1.7)), row("d", (8, 9)), row("e")]
+    found = summarise(10.0, rows).common
+    assert (found.tr, found.window) == (None, None)
+    assert found.reason == "no tr is acceptable in all of 5 runs; tr = 1.6 is in 3, not in d, e"
+    assert summarise(10.0, [row("e")]).common.reason == "no tr is acceptable in any of 1 run"
+    assert summarise(10.0, [failed("f", OSError())]).common.reason == "no run could be judged"
+
+
+def test_runs_that_were_not_judged_are_left_out_and_named() -> None:
+    answer = summarise(10.0, [row("a", (1, 2)), failed("bad", OSError())])
+    assert answer.common.tr == 1.5
+    assert answer.objection
+    (caution,) = answer.cautions
+    assert (caution.code, "bad" in caution.message) == ("runs-left-out", True)
+
+
+def test_the_worst_run_decides_among_windows_that_save_enough() -> None:
+    wide, fine = np.array([[1.0, 2.0], [3.0, 4.0], [8.0, 9.0]]), np.array([[3.4, 3.6], [8.4, 8.6]])
+    answer = summarise(10.0, [replace(row("a"), acceptable=(wide, fine, fine[1:]))])
+    assert (answer.common.tr, answer.common.window) == (3.5, (3.0, 4.0))
+
+
+def test_different_bases_and_units_are_told() -> None:
+    rows = [row("a", (1, 2)), row("b", (1, 2), basis="energy", warnings=("energy-only",)), row("c", time_unit="ms")]
+    told = {caution.code: caution.message for caution in summarise(10.0, rows).cautions}
+    assert told == {
+        "mixed-units": "times are in different units, td in only one of them: not named in 2 runs, ms in 1 run",
+        "mixed-bases": "what a choice rests on differs: oscillator in 2 runs, energy in 1 run",
+        "energy-only": "in 1 of 3 runs: b",
+    }
+
+
+@given(st.floats(1e-6, 1e3), st.floats(0, 1))
+def test_the_shortest_number_lies_between(low: float, share: float) -> None:
+    high = low * (1 + share)
+    found = shortest(low, high)
+    assert low <= found <= high
+    assert len(repr(found)) <= len(repr(low)) or share < 1e-3 or len(repr(found)) <= 7
+
+
+# Names.
+
+
+def test_every_match_of_a_pattern_is_a_run_and_what_matches_nothing_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("b", "a"):
+        Path(name).mkdir()
+        (Path(name) / "glstat").write_bytes(b"")
+    Path("odd[1].csv").write_bytes(b"")
+    assert find_runs(["*/glstat"]) == (os.path.join("a", "glstat"), os.path.join("b", "glstat"))  # noqa: PTH118
+    assert find_runs(["?"]) == ("a", "b")
+    assert find_runs(["odd[1].csv", "no*", "a"]) == ("odd[1].csv", "no*", "a")
+
+
+def test_real_files_and_samples_are_rows_of_one_study() -> None:
+    folder = shared("real/histories")
+    sources = sorted(str(path) for path in folder.iterdir() if path.is_file())
+    rows = [ask(Question(0.05, Settings()), source) for source in (*sources, GLSTAT, BOX)]
+    answer = summarise(0.05, rows)
+    assert [found.source for found in answer.rows] == [*sources, GLSTAT, BOX]
+    assert {"ok", "unreadable", "out-of-range"} <= {found.status for found in rows}, SHARED
+    assert all((found.message is None) == (found.status == OK) for found in rows)

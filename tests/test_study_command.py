@@ -1,0 +1,376 @@
+"""The command ``study`` as a user meets it: formats, codes, lists, and what is left when it is killed."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import jsonschema
+import pytest
+
+from d2rpick import __version__
+from tests import studies
+from tests.command import BOX, ENERGY, GLSTAT, ROOT, answer, run
+from tests.studies import STUDY
+from tests.test_output import check_by_schema
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+FORMATS = ("table", "json", "csv", "markdown", "ndjson")
+KEYS = ("source", "tr", "tr_low", "tr_high", "energy_td", "residual", "status", "message")
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> list[str]:
+    """Three runs that differ a little."""
+    return studies.variants(tmp_path)
+
+
+def check_line(found: dict[str, Any], kind: str) -> None:
+    """Hold a line of newline-delimited JSON against the schema that ships."""
+    schema = json.loads((files("d2rpick") / "schemas" / "study-1.json").read_text("utf-8"))
+    jsonschema.validate(found, {"$ref": f"#/$defs/{kind}", "$defs": schema["$defs"]})
+
+
+def lines_of(text: str) -> list[dict[str, Any]]:
+    """Lines of newline-delimited JSON."""
+    return [json.loads(line) for line in text.splitlines()]
+
+
+# Results.
+
+
+@pytest.mark.parametrize("extra", [(), ("absent.csv",), ("--td", "0.064"), ("--max-residual", "0.001")])
+def test_json_follows_the_schema(runs: list[str], extra: tuple[str, ...]) -> None:
+    found = answer(*STUDY, *runs, *extra)
+    check_by_schema(found)
+    assert found["tool_version"] == __version__
+    assert found["command"] == [*STUDY, *runs, *extra, "-f", "json"]
+    assert [row["source"] for row in found["runs"]][:3] == runs
+
+
+@pytest.mark.parametrize("key", ["td", "runs", "tr", "agree", "common_tr"])
+def test_the_schema_asks_for_what_scripts_rely_on(runs: list[str], key: str) -> None:
+    found = answer(*STUDY, *runs)
+    del found[key]
+    with pytest.raises(jsonschema.ValidationError, match=key):
+        check_by_schema(found)
+
+
+def test_every_format_says_the_same(runs: list[str]) -> None:
+    sources = [*runs, "absent.csv"]
+    found = answer(*STUDY, *sources)
+    rows = list(csv.DictReader(io.StringIO(run(*STUDY, *sources, "-f", "csv").stdout)))
+    for row, one in zip(rows, found["runs"], strict=True):
+        texts = {key: "" if one[key] is None else str(one[key]) for key in KEYS}
+        assert {key: row[key] for key in KEYS} == texts
+    *lines, last = lines_of(run(*STUDY, *sources, "-f", "ndjson").stdout)
+    for line in lines:
+        check_line(line, "line")
+    check_line(last, "last")
+    assert [{key: line[key] for key in one} for line, one in zip(lines, found["runs"], strict=True)] == found["runs"]
+    assert {**last, "command": 0} == {**{key: found[key] for key in found if key != "runs"}, "command": 0}
+    for form in ("table", "markdown"):
+        text = run(*STUDY, *sources, "-f", form).stdout
+        assert f"{found['common_tr']:g}, acceptable in 3 of 3 runs" in text
+        assert all(source in text for source in sources)
+
+
+def test_the_common_tr_verifies_in_each_run(runs: list[str]) -> None:
+    tr = answer(*STUDY, *runs)["common_tr"]
+    assert all(run("verify", "--tr", repr(tr), "--td", str(studies.TD), name).exit_code == 0 for name in runs)
+
+
+def test_options_of_suggest_hold_for_each_run() -> None:
+    found = answer("study", "--td", "0.37", "--part", "box", BOX, BOX, "--jobs", "2")
+    (expected,) = [c for c in answer("suggest", "--td", "0.37", "--part", "box", BOX)["candidates"] if c["recommended"]]
+    assert [row["tr"] for row in found["runs"]] == [expected["tr"]] * 2
+    assert found["runs"][0]["basis"] == "energy"
+    assert {"energy-only"} <= {warning["code"] for warning in found["warnings"]}
+    later = answer(*STUDY, "--after", "0.02", ENERGY)
+    assert later["runs"][0]["tr"] > 0.02
+
+
+# Exit codes.
+
+
+@pytest.mark.parametrize(
+    ("extra", "code"),
+    [
+        ((), 0),
+        (("absent.csv",), 1),
+        (("--max-residual", "0.001"), 1),
+        (("--tolerance", "0.001"), 1),  # each has a tr, all have none in common
+        (("--td", "7"), 2),
+        (("--td", "x"), 2),
+        (("--jobs", "0"), 2),
+        (("--from", "absent.txt"), 2),
+        (("-",), 2),
+        (("--scheduler", "tcp://127.0.0.1:9"), 2),  # beside --jobs
+        (("--energy", "a", "--part", "1"), 2),
+    ],
+)
+def test_the_exit_code_does_not_depend_on_the_format(runs: list[str], extra: tuple[str, ...], code: int) -> None:
+    args = (*STUDY, *runs, *extra)
+    assert [run(*args, "-f", form).exit_code for form in FORMATS] == [code] * len(FORMATS)
+    assert run(*args, "--exit-zero").exit_code == {0: 0, 1: 0, 2: 2}[code]
+
+
+def test_when_none_can_be_read_the_first_reason_is_told() -> None:
+    result = run(*STUDY, "absent.csv", "missing.csv")
+    assert result.exit_code == 2
+    assert "absent.csv: no such file" in result.stdout
+    assert result.stderr.startswith("d2rpick: no run could be judged; the first: absent.csv: no such file")
+
+
+@pytest.mark.parametrize("args", [STUDY, (*STUDY, "--from", "-")])
+def test_no_runs_are_a_question_of_usage(args: tuple[str, ...]) -> None:
+    result = run(*args, stdin=b"# none\n\n")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "name them, or a list of them with --from" in result.stderr
+
+
+# Lists, folders, patterns.
+
+
+def test_names_come_from_a_list_too(runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = f"# variants\n\n  run2.csv  \r\n{runs[2]}\n"
+    Path("list.txt").write_text(text)
+    expected = [runs[0], "run2.csv", runs[2]]
+    for args in ((runs[0], "--from", "list.txt"), (runs[0], "--from", "-")):
+        found = json.loads(run(*STUDY, *args, "-f", "json", stdin=text.encode()).stdout)
+        assert [row["source"] for row in found["runs"]] == expected
+    result = run(*STUDY, "-f", "csv", env={"D2RPICK_STUDY_FROM": "list.txt"})
+    assert result.stdout.count("\n") == 3
+
+
+def test_a_pattern_stands_for_runs_and_a_folder_for_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("one", "two"):
+        Path(name).mkdir()
+        (Path(name) / "glstat").write_bytes(Path(GLSTAT).read_bytes())
+    found = answer(*STUDY, "*/glstat", "one", "no*")
+    statuses = [(row["source"], row["status"]) for row in found["runs"]]
+    expected = [os.path.join(name, "glstat") for name in ("one", "two")]  # noqa: PTH118
+    assert statuses == [(expected[0], "ok"), (expected[1], "ok"), ("one", "ok"), ("no*", "unreadable")]
+    assert found["agree"] is True
+
+
+# Processes.
+
+
+def program(*args: str, cwd: Path, **options: Any) -> subprocess.Popen[str]:
+    """Start the program in a session of its own."""
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    command = [sys.executable, "-m", "d2rpick", *args]
+    return subprocess.Popen(command, cwd=cwd, text=True, start_new_session=True, **{**streams, **options})
+
+
+def wait_for(ledger: Path, lines: int) -> None:
+    """Wait until a ledger has so many lines."""
+    for _ in range(1000):
+        if ledger.exists() and ledger.read_bytes().count(b"\n") >= lines:
+            return
+        time.sleep(0.02)
+    raise AssertionError(f"{ledger} never had {lines} lines")
+
+
+def test_all_processes_give_the_answer_of_one(runs: list[str]) -> None:
+    sources = [*runs, "absent.csv", *runs]
+    expected = run(*STUDY, *sources).stdout
+    assert run("study", "--td", str(studies.TD), "--jobs", "3", *sources).stdout == expected
+
+
+def test_rows_come_in_order_as_soon_as_they_can(runs: list[str], tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "slow.csv")  # whoever reads it waits
+    args = (*STUDY[:-1], "2", "-f", "ndjson", "run1.csv", "slow.csv", "run2.csv")
+    with program(*args, cwd=tmp_path) as process:
+        assert process.stdout is not None
+        assert json.loads(process.stdout.readline())["source"] == "run1.csv"
+        (tmp_path / "slow.csv").write_bytes(Path(runs[2]).read_bytes())
+        rest, _ = process.communicate(timeout=30)
+    assert [line.get("source") for line in lines_of(rest)] == ["slow.csv", "run2.csv", None]
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_killed_study_loses_nothing_that_was_finished(runs: list[str], tmp_path: Path, jobs: str) -> None:
+    slow, ledger = tmp_path / "slow.csv", tmp_path / "ledger.ndjson"
+    args = (*STUDY[:-1], jobs, "-f", "json", *runs[:2], str(slow), runs[2], "--resume", str(ledger))
+    os.mkfifo(slow)  # whoever reads it waits
+    finished = 2 if jobs == "1" else 3
+    with program(*args, cwd=tmp_path) as process:
+        wait_for(ledger, finished)
+        process.send_signal(signal.SIGKILL)
+        text, _ = process.communicate(timeout=30)  # no process of the pool keeps the streams open
+    assert (process.returncode, text) == (-signal.SIGKILL, "")
+    with ledger.open("ab") as file:
+        file.write(ledger.read_bytes().splitlines()[0][:200])  # as if it had been writing
+    slow.unlink()
+    studies.write(slow, studies.variant(1.0005))
+    again = run(*args)
+    assert again.stderr.startswith(f"note: {finished} of 4 runs taken from {ledger}\n")
+    whole = run(*(arg for arg in args if arg not in ("--resume", str(ledger))))
+    assert {**json.loads(again.stdout), "command": 0} == {**json.loads(whole.stdout), "command": 0}
+    assert run(*args).stderr.startswith(f"note: 4 of 4 runs taken from {ledger}\n")
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("everyone", [True, False])
+def test_an_interrupted_study_ends_at_once_with_a_line(
+    runs: list[str], tmp_path: Path, jobs: str, everyone: bool
+) -> None:
+    os.mkfifo(tmp_path / "slow.csv")
+    ledger = tmp_path / "ledger.ndjson"
+    args = (*STUDY[:-1], jobs, runs[0], "slow.csv", "--resume", str(ledger))
+    with program(*args, cwd=tmp_path) as process:
+        wait_for(ledger, 1)
+        time.sleep(0.1)
+        (os.killpg if everyone else os.kill)(process.pid, signal.SIGINT)
+        text, said = process.communicate(timeout=30)
+    assert (process.returncode, text, said.strip()) == (2, "", "d2rpick: interrupted")
+
+
+def test_a_run_that_kills_its_process_is_a_row(
+    runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # as the system does when memory runs out
+    (tmp_path / "sitecustomize.py").write_text(
+        "import os, d2rpick.study as study\n"
+        "ask = study.ask\n"
+        "def kill(question, source):\n"
+        "    return os.abort() if source.endswith('deadly.csv') else ask(question, source)\n"
+        "kill.__module__, kill.__qualname__ = 'd2rpick.study', 'ask'\n"
+        "study.ask = kill\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    args = (*STUDY[:-1], "2", "-f", "json", runs[0], "deadly.csv", *runs[1:])
+    with program(*args, cwd=tmp_path) as process:
+        text, _ = process.communicate(timeout=30)
+    found = json.loads(text)
+    assert [row["status"] for row in found["runs"]] == ["ok", "failed", "ok", "ok"]
+    assert "memory" in found["runs"][1]["message"]
+    assert process.returncode == 1
+
+
+# Taking up where it ended.
+
+
+def taken(args: Sequence[str]) -> str:
+    """Say how many runs were taken from the ledger."""
+    return next((line for line in run(*args).stderr.splitlines() if "taken from" in line), "")
+
+
+def test_runs_are_computed_again_after_a_change(runs: list[str], tmp_path: Path) -> None:
+    ledger = str(tmp_path / "ledger.ndjson")
+    args = (*STUDY, *runs, "--resume", ledger)
+    assert taken(args) == ""
+    assert taken(args) == f"note: 3 of 3 runs taken from {ledger}"
+    changed = "have changed or were asked for with other options"
+    assert taken((*args, "--tolerance", "0.19")) == f"note: 0 of 3 runs taken from {ledger}; 3 {changed}"
+    os.utime(runs[1])
+    assert taken(args) == f"note: 2 of 3 runs taken from {ledger}; 1 {changed}"
+    assert taken((*args, "--tolerance", "0.19")).startswith("note: 2 of 3")
+    assert run(*args, "-q").stderr == ""
+
+
+def test_what_ndjson_gave_can_be_taken_up(runs: list[str], tmp_path: Path) -> None:
+    ledger = tmp_path / "result.ndjson"
+    ledger.write_text(run(*STUDY, *runs[:2], "-f", "ndjson").stdout)
+    assert taken((*STUDY, *runs, "--resume", str(ledger))) == f"note: 2 of 3 runs taken from {ledger}"
+    *_, third = lines_of(ledger.read_text())
+    assert third["source"] == runs[2]
+
+
+def test_a_figure_of_runs_that_were_kept_without_outline_reads_them_again(runs: list[str], tmp_path: Path) -> None:
+    ledger, figure = str(tmp_path / "ledger.ndjson"), str(tmp_path / "figure.svg")
+    run(*STUDY, *runs, "--resume", ledger)
+    args = (*STUDY, *runs, "--resume", ledger, "--plot", figure, "--overwrite")
+    assert taken(args).startswith("note: 0 of 3")
+    first = Path(figure).read_bytes()
+    assert taken(args).startswith("note: 3 of 3")
+    assert Path(figure).read_bytes() == first
+
+
+@pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
+def test_a_ledger_is_never_replaced_by_a_result(runs: list[str], tmp_path: Path, option: str) -> None:
+    name = str(tmp_path / "file.svg")
+    result = run(*STUDY, *runs, "--resume", name, option, name, "--overwrite")
+    assert result.exit_code == 2
+    assert "name the same file" in result.stderr
+    assert not Path(name).exists()
+
+
+def test_a_ledger_is_not_the_standard_output(runs: list[str], tmp_path: Path) -> None:
+    ledger = tmp_path / "ledger.ndjson"
+    with ledger.open("w") as file, program(*STUDY, *runs, "--resume", str(ledger), cwd=ROOT, stdout=file) as process:
+        _, said = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert "standard output are the same file" in said
+
+
+# Files.
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_file_gets_what_stdout_would_have_got(runs: list[str], tmp_path: Path, form: str) -> None:
+    file = tmp_path / "result"
+    printed = run(*STUDY, *runs, "-f", form).stdout
+    assert run(*STUDY, *runs, "-f", form, "-o", str(file)).stdout == ""
+    assert file.read_text().replace(f', "-o", "{file}"', "").replace(f',\n    "-o",\n    "{file}"', "") == printed
+
+
+@pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
+def test_a_file_in_the_folder_of_a_run_is_never_written_to(tmp_path: Path, option: str) -> None:
+    # a database by its content; its name is none that a plot would have
+    (tmp_path / "binout0.svg").symlink_to(tmp_path / "glstat")
+    (tmp_path / "glstat").write_bytes(Path(GLSTAT).read_bytes())
+    before = (tmp_path / "glstat").read_bytes()
+    result = run(*STUDY, str(tmp_path), option, str(tmp_path / "binout0.svg"), "--overwrite")
+    assert (result.exit_code, "this is an input" in result.stderr) == (2, True)
+    assert (tmp_path / "glstat").read_bytes() == before
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+@pytest.mark.parametrize("number", [1, 3, 60])
+def test_a_plot_shows_the_runs(runs: list[str], tmp_path: Path, suffix: str, number: int) -> None:
+    figure = tmp_path / f"figure.{suffix}"
+    sources = (runs * 20)[:number]
+    assert run(*STUDY, *sources, "absent.csv", "--plot", str(figure)).exit_code == 1
+    content = figure.read_bytes()
+    assert content.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix])
+    label = "internal energy" if number == 1 else f"internal energy of {number} runs"
+    assert suffix != "svg" or f"<!-- {label} -->" in content.decode()
+    assert len(content) < 1e6
+
+
+def test_a_plot_of_nothing_is_empty(tmp_path: Path) -> None:
+    figure = tmp_path / "figure.svg"
+    assert run(*STUDY, "absent.csv", "--plot", str(figure)).exit_code == 2
+    assert figure.read_bytes().startswith(b"<?xml")
+
+
+def test_the_report_is_one_page_with_all_of_it(runs: list[str], tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    odd = studies.write(tmp_path / "a<b>&.csv")
+    result = run(*STUDY, *runs, odd, "absent.csv", "--report", str(page))
+    text = page.read_text()
+    assert result.exit_code == 1
+    assert text.startswith("<!DOCTYPE html>")
+    assert "Switch times of 5 runs" in text
+    assert "a&lt;b&gt;&amp;.csv" in text
+    assert "a<b>" not in text
+    assert all(name in text for name in (*runs, "absent.csv: no such file", "runs-left-out", "d2rpick study --td"))
+    assert "http://" not in text.replace("http://www.w3.org", "")
+    assert run(*STUDY, "absent.csv", "--report", str(page), "--overwrite").exit_code == 2
+    assert "There is none: no run could be judged" in page.read_text()
