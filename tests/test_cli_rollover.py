@@ -103,6 +103,7 @@ def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
 def test_a_scan_at_whose_td_nothing_can_be_recommended_says_so() -> None:
     scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.04", "--t-end", "0.1", *SMALL)
     assert run(*scan, "-q").stdout.endswith("\n\nrecommended  none\n")
+    assert [run(*scan, *extra).exit_code for extra in ((), ("-f", "csv"), ("--exit-zero",))] == [1, 1, 0]
     found = answer(*scan)
     assert found["recommended"] is None
     assert "no-candidate" in codes(found)

@@ -62,7 +62,7 @@ _OF_SOLVER: Final = {"ls-dyna": ("merge", "swset"), "radioss": ("node", "end", "
 @click.option("--name", metavar="NAME", help="Radioss: name of the run.  [default: Root]")
 @shared.reference_options
 @shared.file_options
-@click.option("--exit-zero", is_flag=True, help="Exit with 0 where the answer is an objection (1).")
+@shared.EXIT_ZERO
 @click.pass_context
 def command(ctx: click.Context, /, solver: str, exit_zero: bool, **options: Any) -> None:
     """Print solver input for one switch window, ready to be pasted.

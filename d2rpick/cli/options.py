@@ -95,6 +95,7 @@ _TOLERANCE = click.option(
     "--tolerance", type=NOT_NEGATIVE, default=0.2, show_default=True, metavar="L",
     help="On the lock-in error, or on the level error where no oscillator is known.",
 )  # fmt: skip
+EXIT_ZERO = click.option("--exit-zero", is_flag=True, help="Exit with 0 where the answer is an objection (1).")
 _FORMAT = click.option(
     "-F", "--input-format", type=click.Choice(["auto", *FORMATS]), default="auto", show_default=True,
     help="Format of the history; auto goes by its content.",
@@ -149,7 +150,7 @@ def output_options(*formats: str) -> Callable[[Decorated], Decorated]:
                 "-f", "--output-format", type=click.Choice(formats), default=formats[0], show_default=True,
                 help="Form of the result.",
             ),
-            click.option("--exit-zero", is_flag=True, help="Exit with 0 where the answer is an objection (1)."),
+            EXIT_ZERO,
         )(file_options(function))  # fmt: skip
 
     return apply

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output
+from d2rpick.cli.output import Output, finish
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -50,8 +50,11 @@ Examples:
     "-f", "--output-format", type=click.Choice(["table", "json", "csv", "markdown"]), help="Form of a scan.  "
     "[default: table]",
 )  # fmt: skip
-@click.option("--plot", metavar="FILE", help="Draw the motion of the box, or the scan, to FILE (png, svg, pdf).")
+@click.option(
+    "--plot", metavar="FILE", type=shared.FILE, help="Draw the motion of the box, or the scan, to FILE (png, svg, pdf)."
+)
 @shared.file_options
+@shared.EXIT_ZERO
 @click.pass_context
 def command(ctx: click.Context, /, scan: bool, **options: Any) -> None:
     """Compute a planar box that trips over the curb of a braking sled, rolls and lands.  SI units.
@@ -148,6 +151,7 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
         "json": lambda: report.as_json(reference, outcomes, answer, cautions, ctx.meta["d2rpick.command"]),
     }
     output.result(texts[options["output_format"] or "table"]())
+    finish(ctx, objection=answer.recommended is None, exit_zero=options["exit_zero"])
 
 
 def _unbalanced(record: Record) -> tuple[Caution, ...]:
