@@ -6,11 +6,11 @@ import csv
 from functools import cache
 from typing import TYPE_CHECKING
 
-from d2rpick.readers import Selection, read_history
+from d2rpick.histories.opening import Selection, read_history
 from tests.shared import shared
 
 if TYPE_CHECKING:
-    from d2rpick.history import History
+    from d2rpick.histories.history import History
 
 TD_PEAK, TD_LATE = 0.13505, 0.238
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from d2rpick.history import History, Samples
-from d2rpick.oscillator import Oscillator, State
+from d2rpick.histories.history import History, Samples
+from d2rpick.vibration.oscillator import Oscillator, State
 
 OSCILLATOR = Oscillator(stiffness=660e3, mass=31.4, frame_mass=15.7, alpha=50.0)
 START = State.of(0.0, 0.0, 6.0, 0.0)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.readers import Run, Selection
-from d2rpick.readers.database import Legs
-from d2rpick.readers.source import Source
+from d2rpick.histories.database import Legs
+from d2rpick.histories.opening import Run, Selection
+from d2rpick.histories.source import Source
 
 if TYPE_CHECKING:
-    from d2rpick.history import History
-    from d2rpick.readers import Reader
+    from d2rpick.histories.history import History
+    from d2rpick.histories.opening import Reader
 
 
 def run_of(reader: Reader, *contents: bytes | str, selection: Selection | None = None, name: str = "run") -> Run:

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.mode import Mode
+from d2rpick.vibration.one_mode import Mode
 from tests import paper
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 # y - z = -V0 exp(-alpha t/2) sin(omega t)/omega, eq. (7), with V0 = 6 m/s and k = 660e3 N/m
 MODE = Mode(paper.OMEGA_2, 50.0, 0.0, -6.0 / paper.OMEGA_2 * (660e3 / 2) ** 0.5, 0.0)

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick import writers
-from d2rpick.rollover.model import Parameters
-from d2rpick.rollover.record import BOX, Record
-from d2rpick.rollover.run import Window, simulate
-from d2rpick.rollover.scan import scan, scan_times
+from d2rpick.models.rollover.model import Parameters
+from d2rpick.models.rollover.record import BOX, Record
+from d2rpick.models.rollover.run import Window, simulate
+from d2rpick.models.rollover.scan import scan, scan_times
+from d2rpick.report import writers
 from tests.command import answer
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from d2rpick.rollover.scan import Outcome
+    from d2rpick.models.rollover.scan import Outcome
 
 T_END = 0.55
 # td is this long before the ground comes [s], to the millisecond; as in the published study.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 SHARED = Path(os.environ.get("D2RPICK_SHARED", Path(__file__).resolve().parents[2] / "shared"))
 

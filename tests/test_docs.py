@@ -13,9 +13,9 @@ import pytest
 
 from d2rpick import __version__
 from d2rpick.cli import COMMANDS
-from d2rpick.configuration import read_configuration
-from d2rpick.readers import READERS
+from d2rpick.histories.opening import READERS
 from d2rpick.rules import RULES
+from d2rpick.rules.configuration import read_configuration
 from tests.command import DECK, GLSTAT, ROOT, run
 
 if TYPE_CHECKING:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick.cli import options, replay
-from d2rpick.readers import READERS
-from d2rpick.writers import TRAJECTORY_WRITERS
+from d2rpick.histories.opening import READERS
+from d2rpick.report.writers import TRAJECTORY_WRITERS
 from tests.command import DECK, ENERGY, GLSTAT, ROOT
 
 if TYPE_CHECKING:
@@ -21,37 +22,21 @@ if TYPE_CHECKING:
 
 PACKAGE = ROOT / "d2rpick"
 
-# Each module imports only from those above it.
-ORDER = (
-    "d2rpick", "errors", "configuration", "cards",
-    "deck.source", "deck.expression", "deck.rows", "deck.parameters", "deck.card", "deck.includes", "deck.reader",
-    "deck.parts", "deck.elements", "deck.switching", "deck.windows", "deck",
-    "rules.base", "rules.example_decks", "rules.reading", "rules.pairs", "rules.times", "rules.switched_parts",
-    "rules.energy", "rules.scope", "rules",
-    "history",
-    "readers.names", "readers.source", "readers.selection", "readers.printed", "readers.layout", "readers.columns",
-    "readers.curves", "readers.csv_table", "readers.database", "readers.fortran", "readers.fixed_text",
-    "readers.glstat", "readers.matsum", "readers.repeat", "readers.lsda", "readers.binout_states",
-    "readers.binout_branch", "readers.binout", "readers.hdf5_columns", "readers.hdf5_file", "readers.radioss_th",
-    "readers.companions", "readers.run", "balance", "readers.balance", "readers",
-    "momentum", "crossings", "oscillator", "mode", "modes", "fitting", "fitting_several", "identify",
-    "flight", "envelope", "signs", "measures", "profile", "replay", "situation",
-    "cautions", "uncertainty", "contributions", "candidates", "expectation", "switched", "health", "choice", "window",
-    "overview", "rules.judgement", "judged_card", "acceptable", "study", "ledger", "farm",
-    "integration", "reproduction", "exhibits",
-    "rollover", "rollover.model", "rollover.bars", "rollover.contact", "rollover.rigid", "rollover.motion",
-    "rollover.record", "rollover.run", "rollover.scan", "rehearsal",
-    "report", "report.findings", "report.rules", "report.tables", "report.situation", "report.suggestion",
-    "report.verdict", "report.health", "report.overview", "report.html", "report.page",
-    "report.study", "report.study_page", "report.suggestion_page", "report.verdict_page",
-    "report.reproduction", "report.rollover",
-    "writers", "plots",
-    "cli", "cli.options", "cli.output", "cli.progress", "cli.check", "cli.rule", "cli.card",
-    "cli.suggest", "cli.verify", "cli.replay", "cli.info", "cli.extract", "cli.study", "cli.reproduce", "cli.rollover",
-    "__main__",
-)  # fmt: skip
+# Each folder imports only from itself and from those on the lines above its own.
+LAYERS = (
+    ("errors",),
+    ("histories", "deck"),
+    ("vibration",),
+    ("flight",),
+    ("choice",),
+    ("rules", "study"),
+    ("models",),
+    ("report",),
+    ("cli",),
+    ("__main__",),
+)
 # The only modules that may import these.
-RESERVED = {"click": "cli", "matplotlib": "plots"}
+RESERVED = {"click": "cli", "matplotlib": "report"}
 HEAVY = {"pandas", "scipy", "matplotlib", "h5py", "PIL", "jsonschema", "unittest", "numpy.testing", "numpy.f2py"}
 
 
@@ -76,24 +61,39 @@ def imports(path: Path) -> Iterator[str]:
             yield from (name if name in MODULES else origin for name in inside)
 
 
-def test_the_order_names_every_module_once() -> None:
-    assert sorted(ORDER) == sorted(MODULES)
+LAYER = {folder: height for height, folders in enumerate(LAYERS) for folder in folders}
+INNER = sorted(name for name in MODULES if name != "d2rpick")  # the package's face is above and below all
 
 
-@pytest.mark.parametrize("module", ORDER)
-def test_a_module_imports_only_from_those_above_it(module: str) -> None:
-    above = ORDER[: ORDER.index(module)]
-    assert not {name for name in imports(MODULES[module]) if name in MODULES} - {*above}
+def folder(module: str) -> str:
+    """Folder of a module at the root of the package."""
+    return module.partition(".")[0]
 
 
-@pytest.mark.parametrize("module", ORDER)
+def test_every_folder_has_its_layer() -> None:
+    assert {folder(module) for module in INNER} == {*LAYER}
+
+
+@pytest.mark.parametrize("module", INNER)
+def test_a_module_imports_only_from_its_folder_and_from_lower_layers(module: str) -> None:
+    mine = folder(module)
+    theirs = {folder(name) for name in imports(MODULES[module]) if name in INNER}
+    assert not {name for name in theirs - {mine} if LAYER[name] >= LAYER[mine]}
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    graph = {module: {name for name in imports(MODULES[module]) if name in INNER} - {module} for module in INNER}
+    TopologicalSorter(graph).prepare()  # raises CycleError, which names the circle
+
+
+@pytest.mark.parametrize("module", MODULES)
 @pytest.mark.parametrize("library", RESERVED)
 def test_a_library_stays_behind_its_module(library: str, module: str) -> None:
     imported = {name.partition(".")[0] for name in imports(MODULES[module])}
     assert library not in imported or module.partition(".")[0] == RESERVED[library]
 
 
-@pytest.mark.parametrize("module", [name for name in ORDER if name.partition(".")[0] != "cli"])
+@pytest.mark.parametrize("module", [name for name in MODULES if name.partition(".")[0] != "cli"])
 def test_only_the_command_line_prints_and_exits(module: str) -> None:
     tree = ast.walk(ast.parse(MODULES[module].read_text("utf-8")))
     called = {ast.unparse(node.func) for node in tree if isinstance(node, ast.Call)}
@@ -113,7 +113,7 @@ def loaded(*args: str) -> set[str]:
 
 @pytest.mark.parametrize("args", [("--help",), ("--version",), ("suggest", "--help"), ("info", "--help")])
 def test_help_and_version_load_no_numbers(args: tuple[str, ...]) -> None:
-    assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.history", "d2rpick.choice"})
+    assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.histories.history", "d2rpick.choice.suggest"})
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_help_and_version_load_no_numbers(args: tuple[str, ...]) -> None:
     ],
 )
 def test_decks_and_cards_need_no_numbers_without_a_history(args: tuple[str, ...]) -> None:
-    assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.history", "d2rpick.choice"})
+    assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.histories.history", "d2rpick.choice.suggest"})
 
 
 @pytest.mark.parametrize("source", [ENERGY, GLSTAT])
@@ -139,8 +139,12 @@ def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
 # What a plain table without parts, balance or a window of td does without.
 UNNEEDED = {
     f"d2rpick.{name}"
-    for name in ("window", "signs", "envelope", "profile", "modes", "fitting_several", "momentum", "health", "balance",
-                 "judged_card", "cards", "plots", "report.page", "report.health", "readers.fixed_text", "readers.lsda")
+    for name in (
+        "choice.suggest_td", "vibration.part_signs", "vibration.envelope", "choice.lock_in_profile", "vibration.modes",
+        "vibration.fit_several", "flight.momentum", "choice.health", "histories.energy_balance", "choice.judged_card",
+        "deck.printing.cards", "report.figures", "report.page", "report.health", "histories.formats.fixed_text",
+        "histories.formats.lsda",
+    )
 } | {"pathlib", "json", "csv", "tempfile", "hashlib", "numpy.typing", "numpy.polynomial", "numpy.random"}  # fmt: skip
 
 

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick import measures
-from d2rpick.choice import EQUALLY_GOOD, approve
+from d2rpick.choice import measures
+from d2rpick.choice.suggest import EQUALLY_GOOD, approve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice import Suggestion
-    from d2rpick.history import Samples
-    from d2rpick.situation import Situation
+    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.histories.history import Samples
 
 # Each level of tolerance is this part of the one before.
 _FINER = 0.25

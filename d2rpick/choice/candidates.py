@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick import measures
-from d2rpick.contributions import PartMatch, contributions, main_contributors
-from d2rpick.crossings import find_crossings, find_extrema
-from d2rpick.mode import Mode
-from d2rpick.replay import replayed_residual
-from d2rpick.uncertainty import fitted_reach, sampled_reach
+from d2rpick.choice import measures
+from d2rpick.choice.part_shares import PartMatch, contributions, main_contributors
+from d2rpick.choice.uncertainty import fitted_reach, sampled_reach
+from d2rpick.histories.crossings import find_crossings, find_extrema
+from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.replay import replayed_residual
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.history import Samples
-    from d2rpick.situation import Situation
+    from d2rpick.choice.situation import Situation
+    from d2rpick.histories.history import Samples
 
 
 # Of a radian: below, a time is the same but for rounding.

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick import measures
+from d2rpick.choice import measures
 from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.history import History, Samples, Track
+    from d2rpick.histories.history import History, Samples, Track
 
 # A deviation of the momentum after td beyond this share of it is worth an objection: the motion is another one.
 MOST_MOMENTUM_ERROR = 0.05

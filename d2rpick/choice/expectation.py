@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
-    from d2rpick.situation import Situation
+    from d2rpick.choice.situation import Situation
+    from d2rpick.histories.history import Samples
 
 
 class Expectation(NamedTuple):

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick import measures
+from d2rpick.choice import measures
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
-    from d2rpick.measures import Vibration
+    from d2rpick.choice.measures import Vibration
+    from d2rpick.histories.history import Samples
 
 
 @dataclass(frozen=True, eq=False)

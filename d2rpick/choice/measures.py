@@ -16,8 +16,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from d2rpick.history import Samples
-    from d2rpick.mode import Mode
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.one_mode import Mode
 
 
 class Vibration(Protocol):

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.choice.health import Health, assess
 from d2rpick.errors import FormatError
-from d2rpick.health import Health, assess
-from d2rpick.momentum import FreeFlight, all_flights, to_be_asked
-from d2rpick.readers.balance import balance_of
-from d2rpick.readers.companions import doubts
-from d2rpick.readers.selection import select_parts
+from d2rpick.flight.momentum import FreeFlight, all_flights, to_be_asked
+from d2rpick.histories.balance_terms import balance_of
+from d2rpick.histories.companions import doubts
+from d2rpick.histories.selection import select_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.history import Part
-    from d2rpick.readers import Run, Selection
-    from d2rpick.readers.database import Legs
+    from d2rpick.histories.database import Legs
+    from d2rpick.histories.history import Part
+    from d2rpick.histories.opening import Run, Selection
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick import measures
+from d2rpick.choice import measures
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.situation import Situation
+    from d2rpick.choice.situation import Situation
 
 # The parts that are named together make up this much of the mismatch.
 _MOST = 0.8

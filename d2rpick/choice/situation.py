@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick import measures
-from d2rpick.crossings import find_extrema
+from d2rpick.choice import measures
 from d2rpick.errors import RangeError
-from d2rpick.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
-from d2rpick.identify import Identification, assess, identify, identify_several
+from d2rpick.flight.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
+from d2rpick.histories.crossings import find_extrema
+from d2rpick.vibration.identify import Identification, assess, identify, identify_several
 
 if TYPE_CHECKING:
-    from d2rpick.history import History, Samples
-    from d2rpick.mode import Mode
-    from d2rpick.modes import Modes
-    from d2rpick.momentum import FreeFlight
-    from d2rpick.profile import Profile
-    from d2rpick.signs import Parts, PartVibration
+    from d2rpick.choice.lock_in_profile import Profile
+    from d2rpick.flight.momentum import FreeFlight
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.one_mode import Mode
+    from d2rpick.vibration.part_signs import Parts, PartVibration
 
 # Of the fastest mode: what a parabola through three of them misses of a minimum is of the order of 1e-4 of a period.
 _POINTS_PER_PERIOD = 64
@@ -221,7 +221,7 @@ class Situation:
             vibration, times = self.mode, np.linspace(self.span.start, self.td, count)
         else:
             return None
-        from d2rpick.profile import Profile
+        from d2rpick.choice.lock_in_profile import Profile
 
         return Profile.of(vibration, times, self.td)
 
@@ -270,7 +270,7 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
 
 def _seen_flight(history: History, td: float) -> FreeFlight | None:
     """Find the free flight around ``td`` in the momenta."""
-    from d2rpick.momentum import flight_around, to_be_asked
+    from d2rpick.flight.momentum import flight_around, to_be_asked
 
     return next(filter(None, (flight_around(momenta, td) for momenta in to_be_asked(history.momenta))), None)
 
@@ -301,8 +301,8 @@ def _oscillator(
 
 def _with_parts(situation: Situation, energies: Samples, end: float) -> Situation:
     """Add what the energies of single parts, (n, k), tell of the flight up to ``end``."""
-    from d2rpick.envelope import upper_envelope
-    from d2rpick.signs import PartVibration, read_parts
+    from d2rpick.vibration.envelope import upper_envelope
+    from d2rpick.vibration.part_signs import PartVibration, read_parts
 
     history, td, start = situation.history, situation.td, situation.flight.start
     first = min(td, float(history.time[0]) if start is None else start)

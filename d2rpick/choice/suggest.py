@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from d2rpick.candidates import Candidate, Found, find_candidates, judge
-from d2rpick.cautions import POOR_KINETIC_SHARE, Caution, cautions_of
+from d2rpick.choice.candidates import Candidate, Found, find_candidates, judge
+from d2rpick.choice.expectation import Expectation, expectation
+from d2rpick.choice.situation import Settings, Situation, examine
+from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of
 from d2rpick.errors import RangeError
-from d2rpick.expectation import Expectation, expectation
-from d2rpick.situation import Settings, Situation, examine
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from d2rpick.balance import Balance
-    from d2rpick.health import Health
-    from d2rpick.history import History
-    from d2rpick.switched import Comparison
+    from d2rpick.choice.comparison import Comparison
+    from d2rpick.choice.health import Health
+    from d2rpick.histories.energy_balance import Balance
+    from d2rpick.histories.history import History
 
 # Candidates whose error is within this of the smallest count as equally good: then the longer rigid window wins.
 EQUALLY_GOOD = 0.02
@@ -121,7 +121,7 @@ def with_health(answer: _Answer, balance: Balance) -> _Answer:
 
     ``balance`` is that of the reference run up to td: what comes later does not matter for the choice.
     """
-    from d2rpick.health import assess, cautions_of_health
+    from d2rpick.choice.health import assess, cautions_of_health
 
     history, td = answer.situation.history, answer.situation.td
     if isinstance(answer, Verdict):

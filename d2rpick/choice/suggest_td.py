@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from d2rpick.candidates import find_candidates
-from d2rpick.choice import EQUALLY_GOOD, Pair, Suggestion, best_of, rank, suggest
-from d2rpick.expectation import expectation, mean_in_flight, shortfall
-from d2rpick.momentum import all_flights, to_be_asked
-from d2rpick.situation import examine
+from d2rpick.choice.candidates import find_candidates
+from d2rpick.choice.expectation import expectation, mean_in_flight, shortfall
+from d2rpick.choice.situation import examine
+from d2rpick.choice.suggest import EQUALLY_GOOD, Pair, Suggestion, best_of, rank, suggest
+from d2rpick.flight.momentum import all_flights, to_be_asked
 
 if TYPE_CHECKING:
-    from d2rpick.candidates import Candidate
-    from d2rpick.history import History
-    from d2rpick.situation import Settings, Situation
+    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.situation import Settings, Situation
+    from d2rpick.histories.history import History
 
 # Peaks of a window that are tried, the highest first: the higher a peak of several modes, the less energy is kinetic.
 _MOST_PEAKS = 12

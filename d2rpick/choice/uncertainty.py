@@ -10,10 +10,10 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from d2rpick.history import History, Precision, Samples
-    from d2rpick.identify import Identification
-    from d2rpick.mode import Mode
-    from d2rpick.modes import Modes
+    from d2rpick.histories.history import History, Precision, Samples
+    from d2rpick.vibration.identify import Identification
+    from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.one_mode import Mode
 
 # Between samples E'' may exceed what second differences of the samples show; on random vibrations a quarter
 # more covers 99 % of the true crossings from 8 samples per vibration period on.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.situation import Situation
+    from d2rpick.choice.situation import Situation
 
 # Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.
 POOR_KINETIC_SHARE = 0.5

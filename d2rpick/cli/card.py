@@ -14,11 +14,11 @@ from d2rpick.cli.output import Output, finish
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.cards import PrintedCard
-    from d2rpick.cautions import Caution
-    from d2rpick.choice import Verdict
-    from d2rpick.readers import Run
-    from d2rpick.situation import Settings
+    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.suggest import Verdict
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.deck.printing.cards import PrintedCard
+    from d2rpick.histories.opening import Run
 
     Writer = Callable[[Sequence[str]], PrintedCard]
 
@@ -90,7 +90,7 @@ def _judged(
     write: Writer, reference: tuple[Run, Settings], options: dict[str, Any], output: Output
 ) -> tuple[PrintedCard, bool]:
     """Write the card with the verdict of the history in its comments, and tell it on stderr too."""
-    from d2rpick.judged_card import judged
+    from d2rpick.choice.judged_card import judged
 
     run, settings = reference
     parts = () if options["energy"] or not run.parts else options["part"]
@@ -102,7 +102,7 @@ def _judged(
 
 def all_cautions(verdict: Verdict) -> tuple[Caution, ...]:
     """Cautions of a verdict, and the verdict itself where it is an objection."""
-    from d2rpick.cautions import Caution
+    from d2rpick.choice.warnings import Caution
 
     if verdict.verified:
         return verdict.cautions
@@ -110,11 +110,11 @@ def all_cautions(verdict: Verdict) -> tuple[Caution, ...]:
 
 
 def _ls_dyna(options: dict[str, Any], run: Run | None) -> Writer:
-    from d2rpick.cards import ls_dyna
+    from d2rpick.deck.printing.cards import ls_dyna
 
     known = run.parts if run and not options["energy"] else ()
     if known:
-        from d2rpick.readers.selection import select_parts
+        from d2rpick.histories.selection import select_parts
 
         ids = [part.id for part in select_parts(options["part"], known, run.name if run else "")]
     else:
@@ -129,7 +129,7 @@ def _ls_dyna(options: dict[str, Any], run: Run | None) -> Writer:
 
 
 def _radioss(options: dict[str, Any], run: Run | None) -> Writer:
-    from d2rpick.cards import radioss
+    from d2rpick.deck.printing.cards import radioss
 
     nodes = _numbers("--node", options["node"])
     if not nodes:

@@ -14,9 +14,9 @@ from d2rpick.errors import ConfigurationError, DeckError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.cautions import Caution
-    from d2rpick.configuration import Configuration
+    from d2rpick.choice.warnings import Caution
     from d2rpick.rules import Checked, Unreadable
+    from d2rpick.rules.configuration import Configuration
     from d2rpick.rules.judgement import HistoryJudge
 
 EXAMPLES = """\b
@@ -89,8 +89,8 @@ def _checked(
 
     A deck that cannot be read, or whose configuration cannot, does not hide the others.
     """
-    from d2rpick.configuration import Configuration
     from d2rpick.rules import RULES, Unreadable, check_deck
+    from d2rpick.rules.configuration import Configuration
 
     asked = Configuration(_ids(options["select"]), _ids(options["ignore"]))
     asked.verify(RULES)
@@ -112,8 +112,8 @@ def _configuration(deck: str, asked: Configuration) -> Configuration:
     from dataclasses import replace
     from pathlib import Path
 
-    from d2rpick.configuration import find_configuration
     from d2rpick.rules import RULES
+    from d2rpick.rules.configuration import find_configuration
 
     found = find_configuration(Path(deck).parent)
     found.verify(RULES)
@@ -121,7 +121,7 @@ def _configuration(deck: str, asked: Configuration) -> Configuration:
 
 
 def _cautions(results: Sequence[Checked], judge: HistoryJudge | None) -> list[Caution]:
-    from d2rpick.cautions import Caution
+    from d2rpick.choice.warnings import Caution
 
     remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
     return [*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)]

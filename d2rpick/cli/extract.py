@@ -30,7 +30,7 @@ def command(write_as: str | None, **options: Any) -> None:
 
     With more than one part a column part_<id> for each follows.
     """
-    from d2rpick import writers
+    from d2rpick.report import writers
 
     form = write_as or writers.format_of(options["output_file"], list(writers.TABLE_WRITERS))
     with reading(options["history"], quiet=options["quiet"]):

@@ -23,7 +23,7 @@ Examples:
 @click.pass_context
 def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **options: Any) -> None:  # noqa: ARG001
     """Tell what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health."""
-    from d2rpick.overview import survey
+    from d2rpick.choice.overview import survey
     from d2rpick.report import overview as report
 
     with reading(options["history"], quiet=options["quiet"]):

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
-    from d2rpick.oscillator import Oscillator
-    from d2rpick.readers import Run, Selection
-    from d2rpick.situation import Settings
+    from d2rpick.choice.situation import Settings
+    from d2rpick.histories.opening import Run, Selection
+    from d2rpick.vibration.oscillator import Oscillator
 
 Decorated = Any  # a command function; click's decorators do not say more
 
@@ -47,7 +47,7 @@ class Number(click.ParamType[float]):
         return number
 
 
-# of d2rpick.readers, which is too heavy to be imported for --help; a test holds them together
+# of d2rpick.histories.opening, which is too heavy to be imported for --help; a test holds them together
 FORMATS = ("binout", "radioss-th", "glstat", "matsum", "hdf5", "csv")
 
 
@@ -222,7 +222,7 @@ def judging_options(function: Decorated) -> Decorated:
 
 def selection(options: dict[str, Any]) -> Selection:
     """Collect what of a run is asked for; UsageError when energies are asked for in two ways."""
-    from d2rpick.readers import Selection
+    from d2rpick.histories.opening import Selection
 
     parts = options.get("part", ())
     if options["energy"] and parts:
@@ -232,7 +232,7 @@ def selection(options: dict[str, Any]) -> Selection:
 
 def open_run(options: dict[str, Any]) -> Run:
     """Open the run that the options of ``history_options`` name."""
-    from d2rpick.readers import open_run
+    from d2rpick.histories.opening import open_run
 
     return open_run(options["history"], selection(options), options["input_format"])
 
@@ -245,7 +245,7 @@ def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
         if lost:
             raise click.UsageError(f"--{_dashed(lost[0])} is about an energy history; name it with --history")
         return None
-    from d2rpick.situation import Settings
+    from d2rpick.choice.situation import Settings
 
     judging = Settings(after=options["after"], margin=options["margin"], tolerance=options["tolerance"])
     return open_run({**options, "part": ()}), judging
@@ -275,7 +275,7 @@ def repeat() -> list[str]:
 
 def oscillator(options: dict[str, Any]) -> Oscillator | None:
     """Build the oscillator that the options give, None when they give none; UsageError when they give half of one."""
-    from d2rpick.oscillator import Oscillator
+    from d2rpick.vibration.oscillator import Oscillator
 
     names = ("stiffness", "mass", "alpha", "v0")
     given = [name for name in (*names, "frame_mass", "beta") if options[name] is not None]
@@ -292,8 +292,8 @@ def oscillator(options: dict[str, Any]) -> Oscillator | None:
 
 def settings(options: dict[str, Any]) -> Settings:
     """Collect the options of ``choosing_options``; UsageError where they contradict each other."""
-    from d2rpick.replay import to_mode
-    from d2rpick.situation import Settings
+    from d2rpick.choice.situation import Settings
+    from d2rpick.vibration.replay import to_mode
 
     given, window = oscillator(options), options["fit_window"]
     ways = {"an oscillator": given, "--fit-window": window, "--no-verify": options["no_verify"]}

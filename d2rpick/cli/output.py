@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from d2rpick.cautions import Caution
+    from d2rpick.choice.warnings import Caution
 
 OBJECTION = 1
 
@@ -33,9 +33,9 @@ class Output(NamedTuple):
         output = cls(file, options["overwrite"], options["quiet"], inputs)
         plot = options.get("plot")
         if plot is not None:
-            from d2rpick import plots
+            from d2rpick.report import figures
 
-            plots.format_of(plot)
+            figures.format_of(plot)
         if options.get("report") == "-":
             raise D2RPickError("-: --report writes a file; name one")
         names = {"--output-file": options["output_file"], "--plot": plot, "--report": options.get("report")}

@@ -10,7 +10,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
 
 MOST_STATES = 10_000_000  # their text takes some gigabytes
-FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.writers, which --help does without
+FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.report.writers, which --help does without
 
 EXAMPLES = """\b
 Examples:
@@ -43,9 +43,9 @@ def command(
     The frame starts with velocity v0, everything else at rest.  Columns: time, displacement and velocity of frame
     (z) and suspended mass (y), internal and kinetic energy; at tr itself the state after the switch.
     """
-    from d2rpick import writers
-    from d2rpick.oscillator import State
-    from d2rpick.replay import Replay, trajectory
+    from d2rpick.report import writers
+    from d2rpick.vibration.oscillator import State
+    from d2rpick.vibration.replay import Replay, trajectory
 
     oscillator = shared.oscillator(options)
     assert oscillator is not None  # its options are required
@@ -61,8 +61,8 @@ def command(
     switched = None if tr is None or td is None else Replay(oscillator, start, 0.0, tr, td)
     motion = trajectory(oscillator, start, t_end, dt, switched)
     if plot:
-        from d2rpick import plots
+        from d2rpick.report import figures
 
-        output.write(plot, plots.render(plots.draw_replay(motion, switched), plot))
+        output.write(plot, figures.render(figures.draw_replay(motion, switched), plot))
     if options["output_file"] or not plot:
         output.content(writers.TRAJECTORY_WRITERS[form](motion, oscillator))

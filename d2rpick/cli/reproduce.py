@@ -12,9 +12,9 @@ from d2rpick.cli.output import Output, finish
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from d2rpick.exhibits import Exhibit
-    from d2rpick.history import Samples
-    from d2rpick.reproduction import Row
+    from d2rpick.histories.history import Samples
+    from d2rpick.models.published import Row
+    from d2rpick.models.published_figures import Exhibit
 
 EXAMPLES = """\b
 Examples:
@@ -49,9 +49,9 @@ def command(
     Displacement for several pairs, closed form against numerical integration, the energy level and the motion that
     follows, beside it the better pair; published numbers beside those found here.
     """
-    from d2rpick.exhibits import exhibits
+    from d2rpick.models.published import table
+    from d2rpick.models.published_figures import exhibits
     from d2rpick.report import reproduction as report
-    from d2rpick.reproduction import table
 
     output = Output.of(options, *([solver] if solver else []))
     rows, shown = table(), exhibits(_solver(solver) if solver else None)
@@ -68,7 +68,7 @@ def command(
 
 
 def _solver(name: str) -> Mapping[str, Samples]:
-    from d2rpick.readers import Selection, open_run
+    from d2rpick.histories.opening import Selection, open_run
 
     (database,) = open_run([name], Selection(energy=SOLVER[:1])).databases
     return {"time_s": database.time, **{column: database.channel(database.find(column)) for column in SOLVER}}
@@ -78,8 +78,8 @@ def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exh
     """Write all files, or none where one may not be written; give their names."""
     from pathlib import Path
 
-    from d2rpick import plots, writers
     from d2rpick.errors import D2RPickError
+    from d2rpick.report import figures, writers
     from d2rpick.report import reproduction as report
 
     place = Path(folder)
@@ -90,8 +90,8 @@ def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exh
     index = report.as_markdown(rows, [(one.title, f"{one.name}.svg") for one in shown])
     contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{report.as_csv(rows)}\n".encode()}
     for one in shown:
-        figure = plots.draw_exhibit(one)
-        contents |= {f"{one.name}.{form}": plots.render(figure, f"x.{form}") for form in PICTURES}
+        figure = figures.draw_exhibit(one)
+        contents |= {f"{one.name}.{form}": figures.render(figure, f"x.{form}") for form in PICTURES}
         contents[f"{one.name}.csv"] = writers.table_csv(dict(one.columns))
     named = {str(place / name): content for name, content in contents.items()}
     for name in named:

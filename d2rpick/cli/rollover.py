@@ -13,12 +13,12 @@ from d2rpick.cli.output import Output, finish
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from d2rpick.cautions import Caution
-    from d2rpick.rollover.model import Parameters
-    from d2rpick.rollover.record import Record
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.models.rollover.model import Parameters
+    from d2rpick.models.rollover.record import Record
 
 MOST_STATES = 1_000_000
-FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.writers, which --help does without
+FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.report.writers, which --help does without
 PARAMETERS = ("speed", "stiffness", "yield_strain", "damping", "mesh")
 TD = 0.37  # of the published study, 10 ms before the ground comes
 BALANCED = 0.01  # so well the energy of a run must be balanced [-]
@@ -90,15 +90,15 @@ def _check(
 
 
 def _parameters(options: dict[str, Any]) -> Parameters:
-    from d2rpick.rollover.model import Parameters
+    from d2rpick.models.rollover.model import Parameters
 
     return Parameters(**{name: options[name] for name in PARAMETERS if options[name] is not None})
 
 
 def _run(options: dict[str, Any]) -> None:
     """One run; for a plot also the one without switching."""
-    from d2rpick import writers
-    from d2rpick.rollover.run import Window, simulate
+    from d2rpick.models.rollover.run import Window, simulate
+    from d2rpick.report import writers
 
     form = options["write_as"] or writers.format_of(options["output_file"], FORMATS)
     output = Output.of(options)
@@ -111,20 +111,20 @@ def _run(options: dict[str, Any]) -> None:
     record = simulated(window)
     output.notes((), _unbalanced(record))
     if plot:
-        from d2rpick import plots
+        from d2rpick.report import figures
 
         reference, switched = (simulated(None), record) if window else (record, None)
-        output.write(plot, plots.render(plots.draw_rollover(reference, switched, window), plot))
+        output.write(plot, figures.render(figures.draw_rollover(reference, switched, window), plot))
     if options["output_file"] or not plot:
         output.content(writers.ROLLOVER_WRITERS[form](record))
 
 
 def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     """Many switched runs, the tr that the tool recommends among them."""
-    from d2rpick.rehearsal import suggestion_for
+    from d2rpick.models.rollover.as_history import suggestion_for
+    from d2rpick.models.rollover.run import simulate
+    from d2rpick.models.rollover.scan import comparison_end, scan, scan_times
     from d2rpick.report import rollover as report
-    from d2rpick.rollover.run import simulate
-    from d2rpick.rollover.scan import comparison_end, scan, scan_times
 
     output = Output.of(options)
     parameters, td, plot = _parameters(options), TD if options["td"] is None else options["td"], options["plot"]
@@ -141,9 +141,9 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     with click.progressbar(found, len(times), "switched runs", file=sys.stderr, hidden=hidden) as runs:
         outcomes = list(runs)
     if plot:
-        from d2rpick import plots
+        from d2rpick.report import figures
 
-        output.write(plot, plots.render(plots.draw_scan(reference, outcomes, answer), plot))
+        output.write(plot, figures.render(figures.draw_scan(reference, outcomes, answer), plot))
     texts: dict[str, Callable[[], str]] = {
         "table": lambda: report.as_table(reference, outcomes, answer),
         "markdown": lambda: report.as_markdown(outcomes),
@@ -156,7 +156,7 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
 
 def _unbalanced(record: Record) -> tuple[Caution, ...]:
     """Object to a run whose energy is not balanced, as with damping that is over within some steps."""
-    from d2rpick.cautions import Caution
+    from d2rpick.choice.warnings import Caution
 
     off = float(abs(record.balance - 1).max())
     if off <= BALANCED:

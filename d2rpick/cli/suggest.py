@@ -11,10 +11,10 @@ from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
-    from d2rpick.choice import Suggestion
-    from d2rpick.history import History
-    from d2rpick.readers import Run
-    from d2rpick.situation import Settings
+    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.histories.history import History
+    from d2rpick.histories.opening import Run
 
 EXAMPLES = """\b
 Examples:
@@ -58,8 +58,8 @@ def command(
     A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
-    from d2rpick.choice import with_health
-    from d2rpick.readers.balance import balance_of
+    from d2rpick.choice.suggest import with_health
+    from d2rpick.histories.balance_terms import balance_of
     from d2rpick.report import suggestion as report
 
     if _only_in_environment(ctx, "td", overruled_by="td_window"):
@@ -76,9 +76,9 @@ def command(
         answer = with_health(answer, balance)
     output.notes(history.notes, answer.cautions)
     if options["plot"]:
-        from d2rpick import plots
+        from d2rpick.report import figures
 
-        output.write(options["plot"], plots.render(plots.draw_suggestion(answer), options["plot"]))
+        output.write(options["plot"], figures.render(figures.draw_suggestion(answer), options["plot"]))
     if options["report"]:
         output.write(options["report"], text_bytes(_page(answer, run, options)))
     if output_format == "card":
@@ -114,11 +114,11 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
 
 def _answer(history: History, td: float | None, window: tuple[float, float] | None, settings: Settings) -> Suggestion:
     """Choose tr for ``td``, or both in ``window``; UsageError with what the record tells when neither is given."""
-    from d2rpick.choice import suggest
+    from d2rpick.choice.suggest import suggest
 
     if td is not None:
         return suggest(history, td, settings)
-    from d2rpick.window import advice, suggest_in_window
+    from d2rpick.choice.suggest_td import advice, suggest_in_window
 
     if window is None:
         raise click.UsageError(advice(history, settings))
@@ -127,21 +127,21 @@ def _answer(history: History, td: float | None, window: tuple[float, float] | No
 
 def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
     """Draw the figures, wide and narrow, and write the page around them."""
-    from d2rpick import plots
+    from d2rpick.report import figures
     from d2rpick.report.page import Record
     from d2rpick.report.suggestion_page import as_page, better_pair
 
     caption = "Internal energy with its level at td, and the choice"
-    figures = {caption: plots.both_widths(plots.draw_suggestion, answer, "choice")}
+    drawn = {caption: figures.both_widths(figures.draw_suggestion, answer, "choice")}
     if better_pair(answer):
-        figures["The better pair"] = plots.both_widths(plots.draw_better, answer, "better")
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), figures))
+        drawn["The better pair"] = figures.both_widths(figures.draw_better, answer, "better")
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn))
 
 
 def _card(answer: Suggestion, output: Output) -> bool:
     """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
+    from d2rpick.choice.judged_card import of_parts
     from d2rpick.cli.card import all_cautions
-    from d2rpick.judged_card import of_parts
 
     pair, situation = answer.recommended, answer.situation
     found = of_parts(situation.history, (pair.tr, pair.td), situation.settings) if pair else None

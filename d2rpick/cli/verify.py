@@ -13,10 +13,10 @@ from d2rpick.cli.progress import reading
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice import Verdict
-    from d2rpick.history import Part, Track
-    from d2rpick.readers import Run, Selection
-    from d2rpick.switched import Comparison
+    from d2rpick.choice.comparison import Comparison
+    from d2rpick.choice.suggest import Verdict
+    from d2rpick.histories.history import Part, Track
+    from d2rpick.histories.opening import Run, Selection
 
 EXAMPLES = """\b
 Examples:
@@ -57,8 +57,8 @@ class _Verify(click.Command):
 @click.pass_context
 def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exit_zero: bool, **options: Any) -> None:
     """Judge one pair of switch times against the HISTORY of a run without switching."""
-    from d2rpick.choice import verify, with_comparison, with_health
-    from d2rpick.readers.balance import balance_of
+    from d2rpick.choice.suggest import verify, with_comparison, with_health
+    from d2rpick.histories.balance_terms import balance_of
     from d2rpick.report import verdict as report
 
     with reading(options["history"], quiet=options["quiet"]):
@@ -74,9 +74,9 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
             answer = with_comparison(answer, _comparison(run, switched, answer, shared.selection(options)))
     output.notes(history.notes, answer.cautions)
     if options["plot"]:
-        from d2rpick import plots
+        from d2rpick.report import figures
 
-        output.write(options["plot"], plots.render(plots.draw_verdict(answer), options["plot"]))
+        output.write(options["plot"], figures.render(figures.draw_verdict(answer), options["plot"]))
     if options["report"]:
         output.write(options["report"], text_bytes(_page(answer, run, options)))
     texts = {
@@ -91,18 +91,18 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
 
 def _page(answer: Verdict, run: Run, options: dict[str, Any]) -> str:
     """Draw the figure, wide and narrow, and write the page around it."""
-    from d2rpick import plots
+    from d2rpick.report import figures
     from d2rpick.report.page import Record
     from d2rpick.report.verdict_page import as_page
 
     caption = "Internal energy with its level at td, and the pair"
-    figures = {caption: plots.both_widths(plots.draw_verdict, answer, "pair")}
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), figures))
+    drawn = {caption: figures.both_widths(figures.draw_verdict, answer, "pair")}
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn))
 
 
 def _switched(options: dict[str, Any]) -> Run | None:
     """Open the switched run, as the reference is read; None where none was given."""
-    from d2rpick.readers import open_run
+    from d2rpick.histories.opening import open_run
 
     if not options["switched"]:
         return None
@@ -111,7 +111,7 @@ def _switched(options: dict[str, Any]) -> Run | None:
 
 def _comparison(run: Run, other: Run, answer: Verdict, selection: Selection) -> Comparison:
     """Hold the switched run against the reference, read in the same way."""
-    from d2rpick.switched import compare
+    from d2rpick.choice.comparison import compare
 
     situation = answer.situation
     flight, parts = situation.flight, situation.history.parts

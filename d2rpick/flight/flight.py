@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick.crossings import find_crossings
-from d2rpick.identify import identify
+from d2rpick.histories.crossings import find_crossings
+from d2rpick.vibration.identify import identify
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from d2rpick.history import History, Part, Samples
-    from d2rpick.identify import Identification
+    from d2rpick.histories.history import History, Part, Samples
+    from d2rpick.vibration.identify import Identification
 
     Fitter = Callable[[Samples, Samples], Identification]
 

@@ -14,7 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from d2rpick.history import Momenta, Part, Samples
+    from d2rpick.histories.history import Momenta, Part, Samples
 
 # Misfit that free flight may leave, as a share of the largest component's range over the record: contact shows at once,
 # a solver's own error is a tenth of it.

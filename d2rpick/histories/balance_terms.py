@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.names import is_internal_energy, normalised
+from d2rpick.histories.names import is_internal_energy, normalised
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from d2rpick.balance import Balance
-    from d2rpick.history import Part, Samples
-    from d2rpick.readers.database import Legs
-    from d2rpick.readers.run import Run
+    from d2rpick.histories.database import Legs
+    from d2rpick.histories.energy_balance import Balance
+    from d2rpick.histories.history import Part, Samples
+    from d2rpick.histories.run import Run
 
-# Normalised names, see `d2rpick.readers.names`: glstat and binout, Radioss, Abaqus (ALLAE is its hourglass energy),
+# Normalised names, see `d2rpick.histories.names`: glstat and binout, Radioss, Abaqus (ALLAE is its hourglass energy),
 # tables.  Names are taken whole: "eroded hourglass energy" is another quantity.
 _NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     "kinetic": ("kineticenergy", "allke", "ketotal", "ke"),
@@ -51,7 +51,7 @@ def balance_of(run: Run, parts: Sequence[Part] | None, until: float = np.inf) ->
     judged = whole is not None and not _JUDGED.isdisjoint(map(normalised, whole.channels))
     if not (judged or of_parts):
         return None
-    from d2rpick.balance import Balance  # not above: plain tables do without it
+    from d2rpick.histories.energy_balance import Balance  # not above: plain tables do without it
 
     if whole is None:
         return Balance(run.databases[0].part_time, hourglass_of_parts=of_parts)

@@ -12,8 +12,8 @@ from d2rpick.errors import FormatError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.history import Samples
-    from d2rpick.readers.database import Legs
+    from d2rpick.histories.database import Legs
+    from d2rpick.histories.history import Samples
 
 # Output intervals may differ, but a solver writes at its own cycles: unless less than this share of the states of the
 # coarser database are at times of the other one, both may be of one run.

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Final, Protocol
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.history import Precision, newest_states
-from d2rpick.readers.names import listing, resolve
+from d2rpick.histories.history import Precision, newest_states
+from d2rpick.histories.names import listing, resolve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.history import Part, Samples
+    from d2rpick.histories.history import Part, Samples
 
 # A restart steps back once; times that do so in more than this share of their states are none.
 _MOST_BACK: Final = 0.1

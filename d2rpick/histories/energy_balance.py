@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from d2rpick.history import EXACT, Precision
+from d2rpick.histories.history import EXACT, Precision
 
 if TYPE_CHECKING:
-    from d2rpick.history import Part, Samples
+    from d2rpick.histories.history import Part, Samples
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,17 +10,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, cast
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.companions import check_companions
-from d2rpick.readers.database import Legs
-from d2rpick.readers.run import Run
-from d2rpick.readers.selection import Selection
-from d2rpick.readers.source import Source, expand, open_source, sha256
+from d2rpick.histories.companions import check_companions
+from d2rpick.histories.database import Legs
+from d2rpick.histories.run import Run
+from d2rpick.histories.selection import Selection
+from d2rpick.histories.source import Source, expand, open_source, sha256
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from d2rpick.history import History
-    from d2rpick.readers.database import Database
+    from d2rpick.histories.database import Database
+    from d2rpick.histories.history import History
 
 __all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "read_history", "reader", "sha256"]
 
@@ -60,7 +60,7 @@ READERS: Final[Mapping[str, Listed]] = {
 
 def reader(kind: str) -> Reader:
     """Import the reader of a format, one of `READERS`."""
-    return cast("Reader", import_module(f"d2rpick.readers.{READERS[kind].module}"))
+    return cast("Reader", import_module(f"d2rpick.histories.formats.{READERS[kind].module}"))
 
 
 def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.history import History, Momenta, Track
-from d2rpick.readers.companions import doubts
-from d2rpick.readers.names import listing, quantity_note
-from d2rpick.readers.selection import menu, select_parts
+from d2rpick.histories.companions import doubts
+from d2rpick.histories.history import History, Momenta, Track
+from d2rpick.histories.names import listing, quantity_note
+from d2rpick.histories.selection import menu, select_parts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.history import Part, Samples
-    from d2rpick.readers.database import Legs
-    from d2rpick.readers.selection import Selection
+    from d2rpick.histories.database import Legs
+    from d2rpick.histories.history import Part, Samples
+    from d2rpick.histories.selection import Selection
 
 _AXES = ("x_momentum", "y_momentum", "z_momentum")
 _CENTRES = ("x_center", "y_center", "z_center")

@@ -6,12 +6,12 @@ import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.names import listing, near_miss
+from d2rpick.histories.names import listing, near_miss
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.history import Part
+    from d2rpick.histories.history import Part
 
 _RANGE = re.compile(r"(\d+)(?:\s*-\s*(\d+))?")
 
@@ -39,7 +39,7 @@ def select_parts(wanted: Sequence[str], known: Sequence[Part], where: str) -> tu
 
     Examples
     --------
-    >>> from d2rpick.history import Part
+    >>> from d2rpick.histories.history import Part
     >>> select_parts(["roof", "2-9"], [Part(1, "roof"), Part(2, "door"), Part(7, "seat, left")], "run1")
     (Part(id=1, title='roof'), Part(id=2, title='door'), Part(id=7, title='seat, left'))
     """

@@ -9,7 +9,7 @@ import sys
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.names import listing
+from d2rpick.histories.names import listing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick import measures
-from d2rpick.oscillator import Oscillator, State
-from d2rpick.replay import Replay, to_mode
+from d2rpick.choice import measures
+from d2rpick.vibration.oscillator import Oscillator, State
+from d2rpick.vibration.replay import Replay, to_mode
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 OSCILLATOR: Final = Oscillator(stiffness=660e3, mass=31.4, frame_mass=15.7, alpha=50.0)
 V0: Final = 6.0

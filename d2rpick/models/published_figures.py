@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.integration import integrated
-from d2rpick.reproduction import (
+from d2rpick.models.published import (
     INTEGRATED,
     MODE,
     OSCILLATOR,
@@ -18,11 +17,12 @@ from d2rpick.reproduction import (
     residual,
     switched,
 )
+from d2rpick.vibration.integration import integrated
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 # (tr, td) [s] of the displacements: the two of the paper, and one beside each
 _PAIRS: Final = ((0.006, 0.040), INTEGRATED, (0.012, 0.080), PUBLISHED)

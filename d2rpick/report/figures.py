@@ -15,23 +15,23 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from d2rpick.errors import FormatError
-from d2rpick.mode import Mode
-from d2rpick.replay import Replay, Trajectory, from_mode
+from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.replay import Replay, Trajectory, from_mode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from matplotlib.axes import Axes
 
-    from d2rpick.candidates import Candidate
-    from d2rpick.choice import Suggestion, Verdict
-    from d2rpick.exhibits import Exhibit, Panel
-    from d2rpick.history import Samples
-    from d2rpick.rollover.record import Record
-    from d2rpick.rollover.run import Window
-    from d2rpick.rollover.scan import Outcome
-    from d2rpick.situation import Situation
-    from d2rpick.study import Study
+    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.suggest import Suggestion, Verdict
+    from d2rpick.histories.history import Samples
+    from d2rpick.models.published_figures import Exhibit, Panel
+    from d2rpick.models.rollover.record import Record
+    from d2rpick.models.rollover.run import Window
+    from d2rpick.models.rollover.scan import Outcome
+    from d2rpick.study.study import Study
 
 FORMATS = ("png", "svg", "pdf")
 # Okabe and Ito's palette: told apart with any colour vision.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick import health as limits
+from d2rpick.choice import health as limits
 
 if TYPE_CHECKING:
-    from d2rpick.health import Health
+    from d2rpick.choice.health import Health
 
 
 HEAD = ("health", "this run", "practice", "verdict")

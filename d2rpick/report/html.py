@@ -12,7 +12,7 @@ from d2rpick.report.tables import short
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from d2rpick.cautions import Caution
+    from d2rpick.choice.warnings import Caution
     from d2rpick.report.tables import Cell
 
 # Nothing is ever fetched, and nothing runs, whatever the files that were read may hold.

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
-from d2rpick.health import cautions_of_health
+from d2rpick.choice.health import cautions_of_health
 from d2rpick.report import tables
 from d2rpick.report.health import HEAD as HEALTH_HEAD
 from d2rpick.report.health import measures_of
@@ -14,9 +14,9 @@ from d2rpick.report.health import measures_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.cautions import Caution
-    from d2rpick.momentum import FreeFlight
-    from d2rpick.overview import Overview
+    from d2rpick.choice.overview import Overview
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.flight.momentum import FreeFlight
 
 SCHEMA = "d2rpick/info/1"
 _PARTS_HEAD = ("part", "title", "highest internal energy")

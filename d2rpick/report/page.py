@@ -6,8 +6,8 @@ import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from d2rpick.choice.judged_card import of_parts
 from d2rpick.errors import D2RPickError
-from d2rpick.judged_card import of_parts
 from d2rpick.report.health import measures_of
 from d2rpick.report.html import Markup, document, pairs, resource, section, table, tag
 from d2rpick.report.situation import heading
@@ -16,11 +16,11 @@ from d2rpick.report.tables import measure, short
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from d2rpick.candidates import Candidate
-    from d2rpick.health import Health
-    from d2rpick.history import History
-    from d2rpick.readers import Run
-    from d2rpick.situation import Situation
+    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.health import Health
+    from d2rpick.choice.situation import Situation
+    from d2rpick.histories.history import History
+    from d2rpick.histories.opening import Run
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def pair(title: str, times: tuple[float, float], residual: float | None, history
 
 def digests(sources: Iterable[str]) -> list[tuple[str, str]]:
     """Name each file with its SHA-256."""
-    from d2rpick.readers.source import sha256
+    from d2rpick.histories.source import sha256
 
     return [("SHA-256", f"{name}: {sha256(name)}") for name in sources]
 

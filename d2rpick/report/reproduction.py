@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
+from d2rpick.models.published import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, better_pair, residual
 from d2rpick.report import tables
-from d2rpick.reproduction import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, better_pair, residual
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.reproduction import Row
+    from d2rpick.models.published import Row
 
 SCHEMA = "d2rpick/reproduce/1"
 _DECIMALS = 12

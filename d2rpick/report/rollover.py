@@ -6,16 +6,16 @@ from dataclasses import asdict, fields
 from typing import TYPE_CHECKING
 
 from d2rpick import __version__
+from d2rpick.models.rollover.record import BOX
+from d2rpick.models.rollover.scan import Outcome
 from d2rpick.report import tables
-from d2rpick.rollover.record import BOX
-from d2rpick.rollover.scan import Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.cautions import Caution
-    from d2rpick.choice import Suggestion
-    from d2rpick.rollover.record import Record
+    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.models.rollover.record import Record
 
 SCHEMA = "d2rpick/rollover/1"
 _COLUMNS = tuple(field.name for field in fields(Outcome))

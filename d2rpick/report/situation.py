@@ -11,9 +11,9 @@ from d2rpick.report.tables import measure
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from d2rpick.cautions import Caution
-    from d2rpick.history import Part
-    from d2rpick.situation import Situation
+    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.histories.history import Part
 
 
 def heading(situation: Situation) -> list[str]:
@@ -61,7 +61,7 @@ def _parts(situation: Situation) -> str:
 
 def frame(situation: Situation, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
     """Keys that every JSON result begins with, and the history it rests on."""
-    from d2rpick.readers.source import sha256
+    from d2rpick.histories.source import sha256
 
     history = situation.history
     return {

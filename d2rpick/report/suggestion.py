@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING
 
-from d2rpick.candidates import Candidate
+from d2rpick.choice.candidates import Candidate
 from d2rpick.report import tables
 from d2rpick.report.situation import frame, heading, mechanics
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice import Pair, Suggestion
+    from d2rpick.choice.suggest import Pair, Suggestion
 
 SCHEMA = "d2rpick/suggest/1"
 HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")

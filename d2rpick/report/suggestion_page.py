@@ -12,7 +12,7 @@ from d2rpick.report.tables import measure, short
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.choice import Pair, Suggestion
+    from d2rpick.choice.suggest import Pair, Suggestion
 
 # More rows than one compares by eye; csv and json hold all.
 _MOST_ROWS = 20

@@ -11,8 +11,8 @@ from d2rpick.report.situation import frame, heading, mechanics
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice import Verdict
-    from d2rpick.switched import Comparison
+    from d2rpick.choice.comparison import Comparison
+    from d2rpick.choice.suggest import Verdict
 
 SCHEMA = "d2rpick/verify/1"
 COMPARED = ("", "switched", "reference")

@@ -12,9 +12,9 @@ from d2rpick.report.verdict import COMPARED, comparison, deviations, measures, w
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.choice import Verdict
+    from d2rpick.choice.comparison import Comparison
+    from d2rpick.choice.suggest import Verdict
     from d2rpick.report.html import Markup
-    from d2rpick.switched import Comparison
 
 
 def as_page(answer: Verdict, record: page.Record) -> str:

@@ -13,10 +13,10 @@ from d2rpick.report.tables import as_csv
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from d2rpick.history import Samples
-    from d2rpick.oscillator import Oscillator
-    from d2rpick.replay import Trajectory
-    from d2rpick.rollover.record import Record
+    from d2rpick.histories.history import Samples
+    from d2rpick.models.rollover.record import Record
+    from d2rpick.vibration.oscillator import Oscillator
+    from d2rpick.vibration.replay import Trajectory
 
 Table = dict[str, "Samples"]
 
@@ -120,7 +120,7 @@ def trajectory_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
 
 def rollover_matsum(record: Record) -> bytes:
     """Parts box and step with their energies and momenta; while the box is rigid, those of its motion as one body."""
-    from d2rpick.rollover.record import PARTS
+    from d2rpick.models.rollover.record import PARTS
 
     columns = zip(
         PARTS, record.internal_energy.T, record.kinetic_energy.T, record.momentum.T.real, record.momentum.T.imag,

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.configuration import Configuration, expected_instead
 from d2rpick.deck import read_deck
 from d2rpick.errors import ConfigurationError
 from d2rpick.rules import energy, pairs, reading, scope, switched_parts, times
 from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, Severity, Unreadable
+from d2rpick.rules.configuration import Configuration, expected_instead
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -8,18 +8,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.cautions import POOR_KINETIC_SHARE, Caution
-from d2rpick.choice import Verdict, better_pair, suggest, verify
+from d2rpick.choice.situation import examine
+from d2rpick.choice.suggest import Verdict, better_pair, suggest, verify
+from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution
 from d2rpick.rules.base import Fault, name_units
-from d2rpick.situation import examine
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from d2rpick.choice.situation import Settings
     from d2rpick.deck import Window
-    from d2rpick.history import History, Momenta
-    from d2rpick.readers import Run, Selection
-    from d2rpick.situation import Settings
+    from d2rpick.histories.history import History, Momenta
+    from d2rpick.histories.opening import Run, Selection
 
 # What verify warns of and no rule reports.
 _KEPT: Final = ("truncated-input", "energy-only", "no-free-flight", "flight-from-energy", "plastic-or-preload")

@@ -11,20 +11,20 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick import __version__
-from d2rpick.acceptable import acceptable_windows, common_windows, coverage
-from d2rpick.cautions import Caution
-from d2rpick.choice import suggest, with_health
+from d2rpick.choice.acceptable_windows import acceptable_windows, common_windows, coverage
+from d2rpick.choice.suggest import suggest, with_health
+from d2rpick.choice.warnings import Caution
 from d2rpick.errors import D2RPickError, RangeError
-from d2rpick.readers import Selection, open_run
-from d2rpick.readers.balance import balance_of
-from d2rpick.readers.names import listing
-from d2rpick.readers.source import expand
+from d2rpick.histories.balance_terms import balance_of
+from d2rpick.histories.names import listing
+from d2rpick.histories.opening import Selection, open_run
+from d2rpick.histories.source import expand
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.history import History, Samples
-    from d2rpick.situation import Settings
+    from d2rpick.choice.situation import Settings
+    from d2rpick.histories.history import History, Samples
 
 # A run has one of these; the first two were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = "ok", "none", "unreadable", "out-of-range", "failed"

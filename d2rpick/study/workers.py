@@ -158,7 +158,7 @@ class Cores:
     def _new(self, processes: int) -> ProcessPoolExecutor:
         # plain forks copy locks that threads hold; one process that forks from a clean state is nearly as quick
         method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-        set_forkserver_preload(["d2rpick.study"])
+        set_forkserver_preload(["d2rpick.study.study"])
         return ProcessPoolExecutor(processes, get_context(method), _begin_work, (self._held,))
 
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.crossings import find_extrema
+from d2rpick.histories.crossings import find_extrema
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 # Of the highest energy: a solver errs by a tenth of it at any time, so that nothing below is sure to be vibration.
 _SOLVER_FLOOR: Final = 1e-4

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.mode import energy_and_jacobian
+from d2rpick.vibration.one_mode import energy_and_jacobian
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6  # free parameters of the three models
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.fitting import CERTAIN, COARSE, STARTS, minimise, rates
-from d2rpick.modes import sum_and_jacobian
+from d2rpick.vibration.fit_one import CERTAIN, COARSE, STARTS, minimise, rates
+from d2rpick.vibration.modes import sum_and_jacobian
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 # Least difference of two rates over the record to start from [rad]: below a quarter of a beat two modes act as one.
 _APART: Final = np.pi / 4

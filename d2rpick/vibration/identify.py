@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.fitting import VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, rates
-from d2rpick.mode import Mode, energy_and_jacobian
+from d2rpick.vibration.fit_one import VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, rates
+from d2rpick.vibration.one_mode import Mode, energy_and_jacobian
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
-    from d2rpick.modes import Modes
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.modes import Modes
 
 # Thresholds of acceptance.  White noise may be large; what a true model must not leave over is structure, the
 # part of the misfit that neighbouring samples share.
@@ -153,7 +153,7 @@ def identify_several(time: Samples, energy: Samples) -> Identification:
     >>> found.describes_record, [f"{mode.omega:.6f}" for mode in found.mode.modes]
     (True, ['5.000000', '8.000000'])
     """
-    from d2rpick.fitting_several import fit_several
+    from d2rpick.vibration.fit_several import fit_several
 
     lacking = _lacking(time, energy)
     if lacking:
@@ -240,7 +240,7 @@ def _one(parameters: Samples, size: int, record: _Record) -> _Attempt:
 
 def _sum(parameters: Samples, record: _Record) -> _Attempt:
     """Fit of several modes."""
-    from d2rpick.modes import Modes, sum_and_jacobian
+    from d2rpick.vibration.modes import Modes, sum_and_jacobian
 
     fitted, jacobian = sum_and_jacobian(parameters, record.s)
     rate, root = record.units[1], record.units[2]

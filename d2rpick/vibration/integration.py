@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.oscillator import State
+from d2rpick.vibration.oscillator import State
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
-    from d2rpick.replay import Replay
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.replay import Replay
 
 # Of each step, relative and absolute: far below what a figure shows, far above rounding.
 _RELATIVE, _ABSOLUTE = 1e-11, 1e-14

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.mode import Mode, energy_and_jacobian
+from d2rpick.vibration.one_mode import Mode, energy_and_jacobian
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 # Points per period of the fastest mode on which sign changes are looked for: an extremum of the energy lasts a quarter
 # of that period at least, but for shallow ones that are no use as switch times.
@@ -37,7 +37,7 @@ class Modes:
 
     Examples
     --------
-    >>> from d2rpick.mode import Mode
+    >>> from d2rpick.vibration.one_mode import Mode
     >>> two = Modes((Mode(np.pi, 0.0, 1.0, 0.0, 0.0), Mode(2 * np.pi, 0.0, 1.0, 0.0, 0.0)))
     >>> float(two.energy(1.0)), float(two.vibration_energy(0.3))
     (2.0, 2.0)

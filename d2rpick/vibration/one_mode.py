@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 _EPS = float(np.finfo(np.float64).eps)
 # Of the amplitude: below, a deformation is zero but for rounding.

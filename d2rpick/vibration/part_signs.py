@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick.envelope import Envelope
+from d2rpick.vibration.envelope import Envelope
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.history import Samples
-    from d2rpick.mode import Mode
-    from d2rpick.modes import Modes
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.one_mode import Mode
 
 # One way must be this many times smoother than the other to be believed.  At 24 samples per period of a chain of two
 # springs the least clear of 35 minima has 2.5, the usual ones have 5 to 60.

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.errors import RangeError
-from d2rpick.mode import Mode
-from d2rpick.oscillator import Oscillator, State
+from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.oscillator import Oscillator, State
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
-    from d2rpick.modes import Modes
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.modes import Modes
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 ROOT = Path(__file__).resolve().parents[2]
 SUGGEST = ("suggest", "--td", "0.064", "sample_data/energy.csv")

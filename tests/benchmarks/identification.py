@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import least_squares
 
-from d2rpick.identify import identify
+from d2rpick.vibration.identify import identify
 from tests.records import ENERGY, MODE, TIME, printed, vibration
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 _TRUTH = np.array([MODE.omega, MODE.alpha, MODE.cosine, MODE.sine])
 _ROUNDS = 51

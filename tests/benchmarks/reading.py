@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.readers import Selection, open_run
+from d2rpick.histories.opening import Selection, open_run
 from tests.made_binout import GLSTAT, LsdaWriter, values
 from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.history import History, Samples
+    from d2rpick.histories.history import History, Samples
 
 LASSO = Path(os.environ.get("D2RPICK_LASSO_PYTHON", sys.executable))
 _STATES = 100_000
@@ -88,12 +88,12 @@ def memory_over_limit(kind: str) -> float:
     """Anonymous memory of a process at its peak while it reads, over twice the answer plus 64 MB."""
     file = {"glstat": _glstat, "matsum": _matsum, "binout": _binout}[kind]()
     code = (
-        "import sys; from pathlib import Path; from d2rpick.readers import Selection, open_run\n"
+        "import sys; from pathlib import Path; from d2rpick.histories.opening import Selection, open_run\n"
         "def anonymous():\n"
         "    status = Path('/proc/self/status').read_text().split('RssAnon:')[1]\n"
         "    return int(status.split()[0]) / 1024\n"
         "import threading, time\n"
-        "import d2rpick.readers.binout, d2rpick.readers.glstat, d2rpick.readers.matsum\n"
+        "import d2rpick.histories.formats.binout, d2rpick.histories.formats.glstat, d2rpick.histories.formats.matsum\n"
         "before, peak, done = anonymous(), 0.0, False\n"
         "def watch():\n"
         "    global peak\n"

@@ -19,9 +19,9 @@ from time import perf_counter
 
 import numpy as np
 
-from d2rpick.rehearsal import suggestion_for
-from d2rpick.rollover.model import Parameters
-from d2rpick.rollover.run import Window, simulate
+from d2rpick.models.rollover.as_history import suggestion_for
+from d2rpick.models.rollover.model import Parameters
+from d2rpick.models.rollover.run import Window, simulate
 from tests.rehearsals import SETS, Rehearsal, rehearse
 
 WINDOW = Window(0.0970, 0.370)  # what suggest recommends for the default

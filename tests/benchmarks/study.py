@@ -28,9 +28,9 @@ RUNS, STATES, FEW, ROUNDS = 1000, 10_000, 100, 3
 MOST, MOST_GROWN = 1.25, 25.0
 LOOP = f"""
 import sys
-from d2rpick.choice import suggest
-from d2rpick.readers import read_history
-from d2rpick.situation import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.histories.opening import read_history
+from d2rpick.choice.situation import Settings
 found = [suggest(read_history([name]), {TD}, Settings()).recommended for name in sys.argv[1:]]
 assert all(found)
 """

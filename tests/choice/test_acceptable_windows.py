@@ -9,20 +9,20 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from d2rpick.acceptable import acceptable_windows, common_windows, coverage, tolerance_levels
-from d2rpick.choice import Suggestion, suggest, verify
-from d2rpick.history import History
-from d2rpick.mode import Mode
-from d2rpick.modes import Modes
-from d2rpick.readers import Selection, read_history
-from d2rpick.situation import Settings
+from d2rpick.choice.acceptable_windows import acceptable_windows, common_windows, coverage, tolerance_levels
+from d2rpick.choice.situation import Settings
+from d2rpick.choice.suggest import Suggestion, suggest, verify
+from d2rpick.histories.history import History
+from d2rpick.histories.opening import Selection, read_history
+from d2rpick.vibration.modes import Modes
+from d2rpick.vibration.one_mode import Mode
 from tests import chain
 from tests.command import ROLLOVER
 from tests.paper import OMEGA_2
 from tests.records import ENERGY, MODE, TIME, noisy
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 TD = 0.064
 PAPER = History(TIME, ENERGY, ("paper",), "made", "energy")
@@ -38,7 +38,7 @@ def check(answer: Suggestion, seed: int) -> None:
     """Hold the windows against ``verify`` at their ends, inside, and anywhere."""
     with pytest.MonkeyPatch.context() as patch:
         # the same record at the same td: what is found in it need not be found a hundred times
-        patch.setattr("d2rpick.choice.examine", lambda *_: answer.situation)
+        patch.setattr("d2rpick.choice.suggest.examine", lambda *_: answer.situation)
         _check(answer, seed)
 
 

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare
 from d2rpick.errors import RangeError
-from d2rpick.history import History, Track
-from d2rpick.switched import MOST_MOMENTUM_ERROR, Comparison, compare
+from d2rpick.histories.history import History, Track
+from tests.cli.test_output import check_by_schema
 from tests.command import ENERGY, OSCILLATOR, answer, run
 from tests.shared import shared
-from tests.test_output import check_by_schema
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 TR, TD = 0.0135867, 0.0687534
 ROLLOVER = ("verify", "--tr", "0.1", "--td", "0.37", "--part", "box")

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from d2rpick.balance import Balance
-from d2rpick.health import Health, assess, cautions_of_health
-from d2rpick.history import Part, Precision
-from d2rpick.readers import open_run
-from d2rpick.readers.balance import balance_of
+from d2rpick.choice.health import Health, assess, cautions_of_health
+from d2rpick.histories.balance_terms import balance_of
+from d2rpick.histories.energy_balance import Balance
+from d2rpick.histories.history import Part, Precision
+from d2rpick.histories.opening import open_run
 from d2rpick.report.health import measures_of
 from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run
 from tests.shared import shared
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
 TIME: Samples = np.linspace(0.0, 1.0, 201)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from d2rpick.writers import table_csv, table_hdf5
+from d2rpick.report.writers import table_csv, table_hdf5
+from tests.cli.test_output import check_by_schema
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
 from tests.shared import shared
-from tests.test_output import check_by_schema
 
 REPLAY = ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4")
 FORMATS = ("table", "json", "csv", "markdown")

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick import measures
-from d2rpick.candidates import Candidate
-from d2rpick.choice import EQUALLY_GOOD, Suggestion, rank, suggest, verify
+from d2rpick.choice import measures
+from d2rpick.choice.candidates import Candidate
+from d2rpick.choice.situation import Settings
+from d2rpick.choice.suggest import EQUALLY_GOOD, Suggestion, rank, suggest, verify
 from d2rpick.errors import RangeError
-from d2rpick.history import History
-from d2rpick.replay import to_mode
-from d2rpick.situation import Settings
+from d2rpick.histories.history import History
+from d2rpick.vibration.replay import to_mode
 from tests import paper
 from tests.shared import shared
 

@@ -7,21 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from d2rpick import choice
-from d2rpick.choice import EQUALLY_GOOD, suggest
+from d2rpick.choice.expectation import expectation, shortfall
+from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.suggest import EQUALLY_GOOD, suggest
+from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.errors import RangeError
-from d2rpick.expectation import expectation, shortfall
-from d2rpick.history import EXACT, History, Momenta, Part
-from d2rpick.readers import Selection, open_run
-from d2rpick.situation import Settings, examine
-from d2rpick.window import suggest_in_window
+from d2rpick.histories.history import EXACT, History, Momenta, Part
+from d2rpick.histories.opening import Selection, open_run
 from tests import chain, paper
 from tests.command import ENERGY, ROLLOVER, answer, run
 from tests.shared import shared
 
 if TYPE_CHECKING:
-    from d2rpick.history import Samples
-    from d2rpick.situation import Situation
+    from d2rpick.choice.situation import Situation
+    from d2rpick.histories.history import Samples
 
 PLAIN = Settings()
 T01 = str(ROLLOVER).replace(".csv", "T01.gz")
@@ -91,7 +90,7 @@ def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr(monkey
         sought.append(td)
         return examine(history, td, settings)
 
-    monkeypatch.setattr(choice, "examine", counted)
+    monkeypatch.setattr("d2rpick.choice.suggest.examine", counted)
     late = Settings(after=0.34)  # no tr lies between the end of the load and these peaks
     found = suggest_in_window(rollover(), (0.30, 0.335), late)
     assert found.recommended is None

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice import suggest
-from d2rpick.crossings import find_crossings
-from d2rpick.history import History, Precision
-from d2rpick.identify import identify
-from d2rpick.mode import Mode
-from d2rpick.modes import Modes
-from d2rpick.situation import Settings
-from d2rpick.uncertainty import curvature, fitted_reach, reach, sampled_reach
+from d2rpick.choice.situation import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.choice.uncertainty import curvature, fitted_reach, reach, sampled_reach
+from d2rpick.histories.crossings import find_crossings
+from d2rpick.histories.history import History, Precision
+from d2rpick.vibration.identify import identify
+from d2rpick.vibration.modes import Modes
+from d2rpick.vibration.one_mode import Mode
 
 
 def rounded(values: np.ndarray, digits: int) -> np.ndarray:

@@ -14,7 +14,7 @@ import pytest
 
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import BOX, DECK, ENERGY, GLSTAT, ROOT, answer, run
-from tests.test_findings_report import junit_is_valid, sarif_is_valid
+from tests.report.test_findings import junit_is_valid, sarif_is_valid
 
 FORMATS = ("table", "json", "github", "junit", "sarif")
 SCHEMA = json.loads((ROOT / "d2rpick/schemas/check-1.json").read_text())

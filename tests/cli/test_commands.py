@@ -15,7 +15,7 @@ import pytest
 
 from d2rpick import __version__
 from d2rpick.cli import COMMANDS
-from d2rpick.readers import Selection, read_history
+from d2rpick.histories.opening import Selection, read_history
 from tests import paper
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, codes, run
 

@@ -13,13 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import Selection, open_run, read_history
-from d2rpick.writers import format_of, table_csv, table_hdf5
+from d2rpick.histories.opening import Selection, open_run, read_history
+from d2rpick.report.writers import format_of, table_csv, table_hdf5
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
 from tests.shared import shared
 
 if TYPE_CHECKING:
-    from d2rpick.history import History
+    from d2rpick.histories.history import History
 
 REPLAY = ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4")
 SUFFIXES = ["csv", "h5", "hdf5"]

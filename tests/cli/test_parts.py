@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from d2rpick.cautions import cautions_of
-from d2rpick.history import EXACT, History, Momenta, Part
-from d2rpick.situation import Settings, examine
+from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.warnings import cautions_of
+from d2rpick.histories.history import EXACT, History, Momenta, Part
+from tests.cli.test_output import check_by_schema
 from tests.command import OSCILLATOR, answer, codes, run
 from tests.records import ENERGY, TIME
 from tests.shared import shared
-from tests.test_output import check_by_schema
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -19,9 +19,9 @@ import pytest
 
 from d2rpick import __version__
 from tests import studies
+from tests.cli.test_output import check_by_schema
 from tests.command import BOX, ENERGY, GLSTAT, ROOT, answer, run
 from tests.studies import STUDY
-from tests.test_output import check_by_schema
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -246,11 +246,11 @@ def test_a_run_that_kills_its_process_is_a_row(
 ) -> None:
     # as the system does when memory runs out
     (tmp_path / "sitecustomize.py").write_text(
-        "import os, d2rpick.study as study\n"
+        "import os, d2rpick.study.study as study\n"
         "ask = study.ask\n"
         "def kill(question, source):\n"
         "    return os.abort() if source.endswith('deadly.csv') else ask(question, source)\n"
-        "kill.__module__, kill.__qualname__ = 'd2rpick.study', 'ask'\n"
+        "kill.__module__, kill.__qualname__ = 'd2rpick.study.study', 'ask'\n"
         "study.ask = kill\n"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))

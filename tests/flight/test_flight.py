@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from d2rpick.choice import suggest
-from d2rpick.flight import Flight, Span, described_span, energy_flight
-from d2rpick.history import History
-from d2rpick.replay import to_mode
-from d2rpick.situation import Settings, examine
+from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.suggest import suggest
+from d2rpick.flight.flight import Flight, Span, described_span, energy_flight
+from d2rpick.histories.history import History
+from d2rpick.vibration.replay import to_mode
 from tests import paper
 from tests.shared import shared
 

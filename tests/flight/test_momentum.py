@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.history import EXACT, Momenta, Part, Precision
-from d2rpick.momentum import FreeFlight, all_flights, flight_around, flight_of
-from d2rpick.readers import open_run
+from d2rpick.flight.momentum import FreeFlight, all_flights, flight_around, flight_of
+from d2rpick.histories.history import EXACT, Momenta, Part, Precision
+from d2rpick.histories.opening import open_run
 from tests.command import answer
 from tests.records import printed
 from tests.shared import shared
@@ -21,7 +21,7 @@ from tests.shared import shared
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 PARTS = (Part(1, "box"), Part(2, "step"), Part(3, "sled"))
 MASSES = np.array([300.0, 78.0])

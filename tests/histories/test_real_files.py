@@ -21,9 +21,9 @@ from typing import NamedTuple
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import read_history
+from d2rpick.histories.opening import read_history
 
-FOLDER = Path(os.environ.get("D2RPICK_REAL_FILES", Path(__file__).parents[2] / "shared" / "real")) / "histories"
+FOLDER = Path(os.environ.get("D2RPICK_REAL_FILES", Path(__file__).parents[3] / "shared" / "real")) / "histories"
 
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no real files in {FOLDER}; set D2RPICK_REAL_FILES")
 

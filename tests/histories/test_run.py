@@ -9,24 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from d2rpick.choice.overview import survey
 from d2rpick.errors import FormatError
-from d2rpick.overview import survey
-from d2rpick.readers import (
+from d2rpick.histories.companions import check_companions
+from d2rpick.histories.database import Legs
+from d2rpick.histories.formats import binout, csv_table, glstat, matsum, radioss_th
+from d2rpick.histories.opening import (
     READERS,
     Run,
     Selection,
-    binout,
-    csv_table,
-    glstat,
-    matsum,
     open_run,
-    radioss_th,
     read_history,
     reader,
 )
-from d2rpick.readers.companions import check_companions
-from d2rpick.readers.database import Legs
-from d2rpick.readers.source import Source
+from d2rpick.histories.source import Source
 from tests.made_binout import binout as made_binout
 from tests.made_binout import values
 from tests.made_t01 import MadePart, t01
@@ -37,7 +33,7 @@ from tests.text_files import HEAD, glstat_text, matsum_text
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-SAMPLES = Path(__file__).parents[1] / "sample_data"
+SAMPLES = Path(__file__).parents[2] / "sample_data"
 TIMES = np.arange(1, 9) / 8
 GLSTAT = glstat_text(TIMES, 10 * TIMES)
 MATSUM = matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import READERS, Selection, open_run, read_history
-from d2rpick.readers.source import expand
+from d2rpick.histories.opening import READERS, Selection, open_run, read_history
+from d2rpick.histories.source import expand
 from tests.hdf5_files import plain, written
 from tests.made_binout import binout
 from tests.made_t01 import t01

@@ -11,12 +11,12 @@ import jsonschema
 import numpy as np
 import pytest
 
-from d2rpick import reproduction
-from d2rpick.exhibits import Exhibit, exhibits
-from d2rpick.integration import integrated
-from d2rpick.oscillator import Oscillator, State
-from d2rpick.replay import Replay
-from d2rpick.reproduction import MISPRINTS, Row, table
+from d2rpick.models import published
+from d2rpick.models.published import MISPRINTS, Row, table
+from d2rpick.models.published_figures import Exhibit, exhibits
+from d2rpick.vibration.integration import integrated
+from d2rpick.vibration.oscillator import Oscillator, State
+from d2rpick.vibration.replay import Replay
 from tests import paper
 from tests.command import ENERGY, ROOT, answer, run
 
@@ -28,8 +28,8 @@ ALL = {exhibit.name: exhibit for exhibit in exhibits()}
 
 
 def test_the_oscillator_is_that_of_the_paper() -> None:
-    assert reproduction.OSCILLATOR == paper.OSCILLATOR
-    assert paper.START == reproduction.START
+    assert published.OSCILLATOR == paper.OSCILLATOR
+    assert paper.START == published.START
 
 
 def test_every_independent_number_is_met_and_the_plot_was_read_roughly() -> None:
@@ -51,9 +51,9 @@ def test_a_wrong_number_does_not_agree() -> None:
 
 
 def test_the_better_pair_has_no_residual() -> None:
-    assert reproduction.better_pair() == pytest.approx((paper.BETTER_TR, paper.BETTER_TD), rel=1e-12)
-    assert reproduction.residual(reproduction.better_pair()) < 1e-12
-    assert reproduction.residual(reproduction.PUBLISHED) == pytest.approx(0.963, abs=1e-3)
+    assert published.better_pair() == pytest.approx((paper.BETTER_TR, paper.BETTER_TD), rel=1e-12)
+    assert published.residual(published.better_pair()) < 1e-12
+    assert published.residual(published.PUBLISHED) == pytest.approx(0.963, abs=1e-3)
 
 
 @pytest.mark.parametrize("known", [paper.SWITCHED_6_80, paper.SWITCHED_13_64])
@@ -81,7 +81,7 @@ def test_integration_of_times_before_the_switch_only() -> None:
 def test_the_exhibits_are_those_of_the_paper_and_their_columns_hold_all_they_show() -> None:
     assert list(ALL) == ["displacement", "integration", "choice"]
     for exhibit in ALL.values():
-        assert {values.shape for values in exhibit.columns.values()} == {reproduction.TIME.shape}
+        assert {values.shape for values in exhibit.columns.values()} == {published.TIME.shape}
         drawn = {curve.column for row in exhibit.panels for panel in row for curve in panel.curves}
         assert drawn <= {*exhibit.columns}
     assert np.abs(ALL["integration"].columns["z_difference_m"]).max() < 1e-11

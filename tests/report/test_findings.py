@@ -18,7 +18,7 @@ from d2rpick.rules import RULES, Checked, Finding, Severity, check_deck
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, automatic
 from tests.decks import write
 
-SCHEMAS = Path(__file__).parent / "schemas"
+SCHEMAS = Path(__file__).parents[1] / "schemas"
 BAD = HEAD + PARTS + automatic(1, "0.02", rigid=["1", "2"]) + automatic(2, "0.5", deformable=["1"]) + END
 
 

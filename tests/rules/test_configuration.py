@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.configuration import Configuration, find_configuration, read_configuration
 from d2rpick.errors import ConfigurationError
+from d2rpick.rules.configuration import Configuration, find_configuration, read_configuration
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from d2rpick.configuration import Configuration
 from d2rpick.errors import ConfigurationError, DeckError
 from d2rpick.rules import RULES, Example, Rule, Severity, check_deck
+from d2rpick.rules.configuration import Configuration
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import answer, run
 from tests.decks import found, write

@@ -103,7 +103,7 @@ def test_what_cannot_be_read_on_a_cluster_is_a_row_and_no_scheduler_an_error(tmp
 
 
 def test_where_no_scheduler_answers_the_study_ends(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("d2rpick.farm._PATIENCE", 0.3)
+    monkeypatch.setattr("d2rpick.study.workers._PATIENCE", 0.3)
     args = ("study", "--td", str(studies.TD), studies.write(tmp_path / "run.csv"), "--scheduler")
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         result = run(*args, address)

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from d2rpick import study
+from d2rpick.choice.situation import Settings
 from d2rpick.errors import FormatError
-from d2rpick.ledger import Ledger, fingerprint, line
-from d2rpick.readers import Selection
-from d2rpick.situation import Settings
-from d2rpick.study import Question, Row, ask
+from d2rpick.histories.opening import Selection
+from d2rpick.study import study
+from d2rpick.study.resume_file import Ledger, fingerprint, line
+from d2rpick.study.study import Question, Row, ask
 from tests import studies
 
 QUESTION = Question(studies.TD, Settings())

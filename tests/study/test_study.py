@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice import verify
-from d2rpick.history import History
-from d2rpick.readers import Selection, read_history
-from d2rpick.situation import Settings
-from d2rpick.study import OK, Question, Row, ask, failed, find_runs, outline, shortest, summarise
+from d2rpick.choice.situation import Settings
+from d2rpick.choice.suggest import verify
+from d2rpick.histories.history import History
+from d2rpick.histories.opening import Selection, read_history
+from d2rpick.study.study import OK, Question, Row, ask, failed, find_runs, outline, shortest, summarise
 from tests import studies
 from tests.command import BOX, GLSTAT
 from tests.shared import SHARED, shared

@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from d2rpick.identify import Identification, _covariance, identify
-from d2rpick.mode import Mode
+from d2rpick.vibration.identify import Identification, _covariance, identify
+from d2rpick.vibration.one_mode import Mode
 from tests.records import ENERGY, MODE, TIME, noisy, printed, vibration
 from tests.shared import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 
 def accepted(time: Samples, energy: Samples) -> tuple[Identification, Mode]:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from d2rpick.choice import suggest
-from d2rpick.history import History
-from d2rpick.identify import identify, identify_several
-from d2rpick.measures import kinetic_share, lock_in_error, residual
-from d2rpick.mode import Mode
-from d2rpick.modes import Modes, sum_and_jacobian
-from d2rpick.replay import replayed_residual
-from d2rpick.situation import Settings, examine
+from d2rpick.choice.measures import kinetic_share, lock_in_error, residual
+from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.suggest import suggest
+from d2rpick.histories.history import History
+from d2rpick.vibration.identify import identify, identify_several
+from d2rpick.vibration.modes import Modes, sum_and_jacobian
+from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.replay import replayed_residual
 from tests import chain
 from tests.records import noisy, printed
 from tests.shared import columns

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.mode import Mode
+from d2rpick.vibration.one_mode import Mode
 from tests import paper
 from tests.records import MODE
 

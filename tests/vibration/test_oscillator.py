@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from d2rpick.errors import RangeError
-from d2rpick.oscillator import Oscillator, State
+from d2rpick.vibration.oscillator import Oscillator, State
 from tests import paper
 
 # zero, or of a size that an integrator's absolute tolerance does not hide

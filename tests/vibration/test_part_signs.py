@@ -9,14 +9,14 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from d2rpick.candidates import Found, judge
-from d2rpick.choice import suggest
+from d2rpick.choice.candidates import Found, judge
+from d2rpick.choice.situation import Settings, Situation, examine
+from d2rpick.choice.suggest import suggest
 from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threads
-from d2rpick.envelope import upper_envelope
-from d2rpick.history import History
-from d2rpick.readers import Selection, open_run
-from d2rpick.signs import MOST_UNSIGNED, read_parts
-from d2rpick.situation import Settings, Situation, examine
+from d2rpick.histories.history import History
+from d2rpick.histories.opening import Selection, open_run
+from d2rpick.vibration.envelope import upper_envelope
+from d2rpick.vibration.part_signs import MOST_UNSIGNED, read_parts
 from tests import chain
 from tests.records import printed
 from tests.shared import shared

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from d2rpick import measures
+from d2rpick.choice import measures
 from d2rpick.errors import RangeError
-from d2rpick.mode import Mode
-from d2rpick.oscillator import Oscillator, State
-from d2rpick.replay import Replay, from_mode, replayed_residual, to_mode, trajectory
+from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.oscillator import Oscillator, State
+from d2rpick.vibration.replay import Replay, from_mode, replayed_residual, to_mode, trajectory
 from tests import paper
 
 modes = st.builds(

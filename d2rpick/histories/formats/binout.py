@@ -12,18 +12,18 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import FormatError
-from d2rpick.history import Part
-from d2rpick.readers.binout_branch import Branch
-from d2rpick.readers.database import DIGITS, SolverFile
-from d2rpick.readers.lsda import Lsda, recognises
-from d2rpick.readers.names import listing
+from d2rpick.histories.database import DIGITS, SolverFile
+from d2rpick.histories.formats.binout_branch import Branch
+from d2rpick.histories.formats.lsda import Lsda, recognises
+from d2rpick.histories.history import Part
+from d2rpick.histories.names import listing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.history import Samples
-    from d2rpick.readers.selection import Selection
-    from d2rpick.readers.source import Content, Source
+    from d2rpick.histories.history import Samples
+    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.source import Content, Source
 
 __all__ = ["Binout", "open_legs", "recognises"]
 

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.binout_states import Group, States
-from d2rpick.readers.names import listing, plain_text
+from d2rpick.histories.formats.binout_states import Group, States
+from d2rpick.histories.names import listing, plain_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.history import Samples
-    from d2rpick.readers.lsda import Layout, Lsda, Variable
+    from d2rpick.histories.formats.lsda import Layout, Lsda, Variable
+    from d2rpick.histories.history import Samples
 
     Indices = NDArray[np.int64]
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.readers.lsda import Layout, Lsda, Variable
+    from d2rpick.histories.formats.lsda import Layout, Lsda, Variable
 
     Indices = NDArray[np.int64]
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.names import internal_energies, is_time, listing, near_miss, normalised
+from d2rpick.histories.names import internal_energies, is_time, listing, near_miss, normalised
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.readers.layout import Layout
+    from d2rpick.histories.formats.layout import Layout
 
 
 def labelled(layout: Layout, time: int) -> dict[str, int]:

@@ -17,18 +17,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import printed
-from d2rpick.readers.columns import internal_energy, labelled, named_column, own_times, time_column
-from d2rpick.readers.curves import Curves, find_curves
-from d2rpick.readers.layout import Layout, as_number, find_layout, is_skipped, split
-from d2rpick.readers.names import listing
+from d2rpick.histories.formats import printed
+from d2rpick.histories.formats.columns import internal_energy, labelled, named_column, own_times, time_column
+from d2rpick.histories.formats.curves import Curves, find_curves
+from d2rpick.histories.formats.layout import Layout, as_number, find_layout, is_skipped, split
+from d2rpick.histories.names import listing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.history import Part, Precision, Samples
-    from d2rpick.readers.selection import Selection
-    from d2rpick.readers.source import Source
+    from d2rpick.histories.history import Part, Precision, Samples
+    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.source import Source
 
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _UTF8 = b"\xef\xbb\xbf"

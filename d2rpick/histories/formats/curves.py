@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import printed
-from d2rpick.readers.layout import as_number
-from d2rpick.readers.names import internal_energies, is_time, listing, resolve, unit_of
+from d2rpick.histories.formats import printed
+from d2rpick.histories.formats.layout import as_number
+from d2rpick.histories.names import internal_energies, is_time, listing, resolve, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.history import Part, Precision, Samples
-    from d2rpick.readers.selection import Selection
+    from d2rpick.histories.history import Part, Precision, Samples
+    from d2rpick.histories.selection import Selection
 
 _POINTS = re.compile(r"(.*?)\s*#pts=\s*(\d+)\s*")
 _DYNAFORM = re.compile(r"\s*\d+\s+'([^']*)'\s*")

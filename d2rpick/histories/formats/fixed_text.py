@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.fortran import decode
+from d2rpick.histories.formats.fortran import decode
 
 if TYPE_CHECKING:
     import re
     from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 
-    from d2rpick.history import Samples
-    from d2rpick.readers.source import Content
+    from d2rpick.histories.history import Samples
+    from d2rpick.histories.source import Content
 
 Bytes = NDArray[np.uint8]
 Addresses = NDArray[np.int64]

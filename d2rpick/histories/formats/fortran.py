@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 _NUMBER: Final = re.compile(rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?")
 _EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly

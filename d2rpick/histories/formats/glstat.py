@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Final, NoReturn
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.database import SolverFile
-from d2rpick.readers.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
+from d2rpick.histories.database import SolverFile
+from d2rpick.histories.formats.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Sequence
 
-    from d2rpick.history import Part, Samples
-    from d2rpick.readers.selection import Selection
-    from d2rpick.readers.source import Content, Source
+    from d2rpick.histories.history import Part, Samples
+    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.source import Content, Source
 
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"

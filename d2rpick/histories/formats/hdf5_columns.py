@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     import h5py
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
 _PICKLED_INDEX_NAME: Final = re.compile(rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE)

@@ -16,20 +16,20 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.history import Part, Precision
-from d2rpick.readers.database import DIGITS, SolverFile
-from d2rpick.readers.hdf5_columns import Column, check_size, columns_of, finite
-from d2rpick.readers.names import near_miss
+from d2rpick.histories.database import DIGITS, SolverFile
+from d2rpick.histories.formats.hdf5_columns import Column, check_size, columns_of, finite
+from d2rpick.histories.history import Part, Precision
+from d2rpick.histories.names import near_miss
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     import h5py
 
-    from d2rpick.history import Samples
-    from d2rpick.readers.database import Database
-    from d2rpick.readers.selection import Selection
-    from d2rpick.readers.source import Source
+    from d2rpick.histories.database import Database
+    from d2rpick.histories.history import Samples
+    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.source import Source
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _ENERGY_NAMES: Final = ("internal_energy", "ie", "inten", "allie", "e_int")

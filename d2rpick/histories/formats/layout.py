@@ -8,7 +8,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.names import is_time, is_unit, listing, unit_of
+from d2rpick.histories.names import is_time, is_unit, listing, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -23,14 +23,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.repeat import Pattern, repeats
+from d2rpick.histories.formats.repeat import Pattern, repeats
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from numpy.typing import NDArray
 
-    from d2rpick.readers.source import Content
+    from d2rpick.histories.source import Content
 
 DIRECTORY: Final = 2
 VARIABLE: Final = 3

@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Final, NoReturn
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.history import Part
-from d2rpick.readers.database import SolverFile
-from d2rpick.readers.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
+from d2rpick.histories.database import SolverFile
+from d2rpick.histories.formats.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
+from d2rpick.histories.history import Part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from d2rpick.history import Samples
-    from d2rpick.readers.selection import Selection
-    from d2rpick.readers.source import Content, Source
+    from d2rpick.histories.history import Samples
+    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.source import Content, Source
 
 QUANTITIES: Final[Mapping[str, str]] = {
     "internal_energy": "inten",

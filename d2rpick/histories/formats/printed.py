@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.history import EXACT, Precision
+from d2rpick.histories.history import EXACT, Precision
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.history import Samples
+    from d2rpick.histories.history import Samples
 
 _PARTS = re.compile(r"[+-]?(\d*)\.?(\d*)(?:[eEdD]([+-]?\d+))?")
 

@@ -16,18 +16,18 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.history import Part
-from d2rpick.readers.database import DIGITS, SolverFile
-from d2rpick.readers.names import listing, plain_text
+from d2rpick.histories.database import DIGITS, SolverFile
+from d2rpick.histories.history import Part
+from d2rpick.histories.names import listing, plain_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.history import Samples
-    from d2rpick.readers.selection import Selection
-    from d2rpick.readers.source import Content, Source
+    from d2rpick.histories.history import Samples
+    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.source import Content, Source
 
 _INT: Final = struct.Struct(">i")
 _WIDTH: Final = 4  # bytes of a number, and of the length before and behind a record

@@ -2,5 +2,5 @@
 
     model → bars, contact, rigid → motion (one step) → run (to the end, switched or not) → record → scan (many tr)
 
-Nothing here knows of histories or of choosing; ``d2rpick.rehearsal`` lets the tool choose on such a run.
+Nothing of the model knows of histories or of choosing; ``as_history`` lets the tool choose on such a run.
 """

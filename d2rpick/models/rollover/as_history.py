@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.choice import suggest
-from d2rpick.history import EXACT, History, Momenta, Part
-from d2rpick.rollover.record import BOX, PARTS
-from d2rpick.situation import Settings
+from d2rpick.choice.situation import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.histories.history import EXACT, History, Momenta, Part
+from d2rpick.models.rollover.record import BOX, PARTS
 
 if TYPE_CHECKING:
-    from d2rpick.choice import Suggestion
-    from d2rpick.rollover.record import Record
+    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.models.rollover.record import Record
 
 
 def history_of(record: Record) -> History:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from d2rpick.rollover.model import Plane, Truss, Values
+    from d2rpick.models.rollover.model import Plane, Truss, Values
 
 
 class Bars:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from d2rpick.rollover.model import Parameters, Plane, Structure, Values
+    from d2rpick.models.rollover.model import Parameters, Plane, Structure, Values
 
 # Of floor, curb and ground at one point [N/m]: softer than the box, so that contact does not set the time step; the
 # weight of the box sinks in by half a millimetre, a landing by centimetres.

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.rollover.bars import Bars, stiffest_rate
-from d2rpick.rollover.contact import STIFFNESS, Contact
-from d2rpick.rollover.model import GRAVITY, build
-from d2rpick.rollover.rigid import RigidBody
+from d2rpick.models.rollover.bars import Bars, stiffest_rate
+from d2rpick.models.rollover.contact import STIFFNESS, Contact
+from d2rpick.models.rollover.model import GRAVITY, build
+from d2rpick.models.rollover.rigid import RigidBody
 
 if TYPE_CHECKING:
-    from d2rpick.rollover.contact import Push
-    from d2rpick.rollover.model import Parameters, Plane
+    from d2rpick.models.rollover.contact import Push
+    from d2rpick.models.rollover.model import Parameters, Plane
 
 # Share of the limit 2/omega that a step takes; the limit of linear bars, which turn, yield and touch here.
 _SAFETY = 0.9

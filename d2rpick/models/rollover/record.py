@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from d2rpick.rollover.model import Plane, Values
-    from d2rpick.rollover.motion import Motion
+    from d2rpick.models.rollover.model import Plane, Values
+    from d2rpick.models.rollover.motion import Motion
 
 PARTS: Final = ("box", "step")
 BOX: Final = 0

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from d2rpick.errors import RangeError
-from d2rpick.rollover.motion import Motion
-from d2rpick.rollover.record import Recorder
+from d2rpick.models.rollover.motion import Motion
+from d2rpick.models.rollover.record import Recorder
 
 if TYPE_CHECKING:
-    from d2rpick.rollover.model import Parameters
-    from d2rpick.rollover.record import Record
+    from d2rpick.models.rollover.model import Parameters
+    from d2rpick.models.rollover.record import Record
 
 # States are given out in this time [s]: 25 of them for a mode of 400 Hz, and a step is not much shorter.
 INTERVAL = 1e-4
@@ -38,7 +38,7 @@ def simulate(
 
     Examples
     --------
-    >>> from d2rpick.rollover.model import Parameters
+    >>> from d2rpick.models.rollover.model import Parameters
     >>> run = simulate(Parameters(mesh=4), 0.01)
     >>> run.time.size, bool(abs(run.balance - 1).max() < 0.01)
     (101, True)

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import RangeError
-from d2rpick.rollover.motion import Motion
-from d2rpick.rollover.record import BOX
-from d2rpick.rollover.run import Window, proceed, run_to
+from d2rpick.models.rollover.motion import Motion
+from d2rpick.models.rollover.record import BOX
+from d2rpick.models.rollover.run import Window, proceed, run_to
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.rollover.model import Parameters
-    from d2rpick.rollover.record import Record
+    from d2rpick.models.rollover.model import Parameters
+    from d2rpick.models.rollover.record import Record
 
 # Between the times of a scan [s], while the load may last and then; and how long before td the last one is.
 _FINE, _COARSE, _LAST = 0.003, 0.02, 0.03

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.cards import ls_dyna, radioss, shortest
+from d2rpick.deck.printing.cards import ls_dyna, radioss, shortest
 from d2rpick.errors import DeckError
 from d2rpick.rules import check_deck
 from tests.decks import found, read, spans, write

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import Run, Selection, binout
-from d2rpick.readers.binout import Binout, recognises
-from d2rpick.readers.database import Legs
-from d2rpick.readers.source import Source
+from d2rpick.histories.database import Legs
+from d2rpick.histories.formats import binout
+from d2rpick.histories.formats.binout import Binout, recognises
+from d2rpick.histories.opening import Run, Selection
+from d2rpick.histories.source import Source
 from tests.made_binout import GLSTAT, LsdaWriter, Style, values
 from tests.made_binout import binout as made_binout
 from tests.reading import run_of

@@ -10,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
-from d2rpick.history import EXACT, Precision
-from d2rpick.readers import Selection, csv_table
+from d2rpick.histories.formats import csv_table
+from d2rpick.histories.history import EXACT, Precision
+from d2rpick.histories.opening import Selection
 from tests.reading import history_of, states_of
 
 if TYPE_CHECKING:
-    from d2rpick.history import History
+    from d2rpick.histories.history import History
 
 TIMES = [0.0, 0.25, 0.625]
 ENERGIES = [1.5, 2.75, -3.125]

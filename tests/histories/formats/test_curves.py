@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
-from d2rpick.history import History, Precision
-from d2rpick.readers import Selection, csv_table
+from d2rpick.histories.formats import csv_table
+from d2rpick.histories.history import History, Precision
+from d2rpick.histories.opening import Selection
 from tests.reading import history_of, run_of, states_of
 
 CURVEPLOT = """\

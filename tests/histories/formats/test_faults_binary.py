@@ -18,8 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.binout import Binout
-from d2rpick.readers.radioss_th import TimeHistory
+from d2rpick.histories.formats.binout import Binout
+from d2rpick.histories.formats.radioss_th import TimeHistory
 from tests.faults import cases, some
 from tests.made_binout import LsdaWriter, Style, binout, values
 from tests.made_t01 import MadePart, T01Writer, t01, value
@@ -27,7 +27,7 @@ from tests.made_t01 import MadePart, T01Writer, t01, value
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from d2rpick.readers.database import Database
+    from d2rpick.histories.database import Database
 
 Read = TypeVar("Read")
 

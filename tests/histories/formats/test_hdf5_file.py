@@ -11,15 +11,16 @@ import pytest
 from hypothesis import given
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import Selection, hdf5_file
-from d2rpick.readers.hdf5_file import SavedBinout
-from d2rpick.readers.source import Source
+from d2rpick.histories.formats import hdf5_file
+from d2rpick.histories.formats.hdf5_file import SavedBinout
+from d2rpick.histories.opening import Selection
+from d2rpick.histories.source import Source
 from tests.faults import FAULTS, Fault, cases, damage
 from tests.hdf5_files import ENERGY, KINETIC, LAYOUTS, PARTS, TIME, lasso, plain, written
 from tests.reading import history_of
 
 if TYPE_CHECKING:
-    from d2rpick.history import History
+    from d2rpick.histories.history import History
 
 
 def read(file: io.BytesIO, *energy: str, time: str | None = None) -> History:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.readers import matsum
+from d2rpick.histories.formats import matsum
 from tests.shared import shared_bytes
 from tests.text_files import HEAD, matsum_head, matsum_part, matsum_state, matsum_text
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.readers.radioss_th import TimeHistory, recognises
+from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
 from tests.made_t01 import MadePart, T01Writer, t01, value
 from tests.shared import shared_bytes
 

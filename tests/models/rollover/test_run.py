@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.errors import RangeError
-from d2rpick.rollover.bars import Bars, stiffest_rate
-from d2rpick.rollover.contact import SLIP, Contact
-from d2rpick.rollover.model import Parameters, Truss, build
-from d2rpick.rollover.motion import Motion
-from d2rpick.rollover.record import BOX
-from d2rpick.rollover.rigid import RigidBody
-from d2rpick.rollover.run import Window, proceed, run_to, simulate
-from d2rpick.rollover.scan import compare, comparison_end, scan, scan_times
+from d2rpick.models.rollover.bars import Bars, stiffest_rate
+from d2rpick.models.rollover.contact import SLIP, Contact
+from d2rpick.models.rollover.model import Parameters, Truss, build
+from d2rpick.models.rollover.motion import Motion
+from d2rpick.models.rollover.record import BOX
+from d2rpick.models.rollover.rigid import RigidBody
+from d2rpick.models.rollover.run import Window, proceed, run_to, simulate
+from d2rpick.models.rollover.scan import compare, comparison_end, scan, scan_times
 
 COARSE = Parameters(mesh=4, damping=1.0)
 INTERVAL = 2e-4

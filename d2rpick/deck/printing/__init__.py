@@ -1,0 +1,1 @@
+"""A switch window as solver input."""

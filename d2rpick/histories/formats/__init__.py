@@ -1,0 +1,1 @@
+"""One module per format that recognises, reads and writes it; opening.READERS lists them."""

@@ -1,0 +1,1 @@
+"""The same question for many runs, on many cores, resumable."""
