@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.suggest import verify
+from d2rpick.choice.verify import verify
 from d2rpick.deck.printing.cards import ls_dyna
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from d2rpick.choice.situation import Settings
-    from d2rpick.choice.suggest import Verdict
+    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.verify import Verdict
     from d2rpick.deck.printing.cards import PrintedCard
     from d2rpick.histories.history import History
 

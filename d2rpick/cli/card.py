@@ -14,8 +14,8 @@ from d2rpick.cli.output import Output, finish
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.choice.situation import Settings
-    from d2rpick.choice.suggest import Verdict
+    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.verify import Verdict
     from d2rpick.choice.warnings import Caution
     from d2rpick.deck.printing.cards import PrintedCard
     from d2rpick.histories.opening import Run
