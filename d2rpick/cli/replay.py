@@ -61,8 +61,8 @@ def command(
     switched = None if tr is None or td is None else Replay(oscillator, start, 0.0, tr, td)
     motion = trajectory(oscillator, start, t_end, dt, switched)
     if plot:
-        from d2rpick.report import figures
+        from d2rpick.report import figures, figures_models
 
-        output.write(plot, figures.render(figures.draw_replay(motion, switched), plot))
+        output.write(plot, figures.render(figures_models.draw_replay(motion, switched), plot))
     if options["output_file"] or not plot:
         output.content(writers.TRAJECTORY_WRITERS[form](motion, oscillator))
