@@ -173,6 +173,7 @@ def file_options(function: Decorated) -> Decorated:
 
 def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
     """Parameters of the floating oscillator."""
+    rest = "" if required else "; all else at rest"
     return _stack(
         click.option("--stiffness", type=POSITIVE, required=required, help="Spring k."),
         click.option("--mass", type=POSITIVE, required=required, help="Suspended mass M."),
@@ -182,7 +183,7 @@ def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
             "--alpha", type=NOT_NEGATIVE, default=0.0 if required else None, show_default=required,
             help="Damping rate, proportional to mass.",
         ),
-        click.option("--v0", type=TIME, required=required, help="Velocity of the frame at time 0; all else at rest."),
+        click.option("--v0", type=TIME, help=f"Velocity of the frame at time 0{rest}."),
     )  # fmt: skip
 
 

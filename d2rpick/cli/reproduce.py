@@ -79,7 +79,7 @@ def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exh
     from pathlib import Path
 
     from d2rpick.errors import D2RPickError
-    from d2rpick.report import figures, writers
+    from d2rpick.report import figures, figures_models, writers
     from d2rpick.report import reproduction as report
 
     place = Path(folder)
@@ -90,7 +90,7 @@ def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exh
     index = report.as_markdown(rows, [(one.title, f"{one.name}.svg") for one in shown])
     contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{report.as_csv(rows)}\n".encode()}
     for one in shown:
-        figure = figures.draw_exhibit(one)
+        figure = figures_models.draw_exhibit(one)
         contents |= {f"{one.name}.{form}": figures.render(figure, f"x.{form}") for form in PICTURES}
         contents[f"{one.name}.csv"] = writers.table_csv(dict(one.columns))
     named = {str(place / name): content for name, content in contents.items()}

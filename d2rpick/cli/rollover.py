@@ -111,10 +111,10 @@ def _run(options: dict[str, Any]) -> None:
     record = simulated(window)
     output.notes((), _unbalanced(record))
     if plot:
-        from d2rpick.report import figures
+        from d2rpick.report import figures, figures_models
 
         reference, switched = (simulated(None), record) if window else (record, None)
-        output.write(plot, figures.render(figures.draw_rollover(reference, switched, window), plot))
+        output.write(plot, figures.render(figures_models.draw_rollover(reference, switched, window), plot))
     if options["output_file"] or not plot:
         output.content(writers.ROLLOVER_WRITERS[form](record))
 
@@ -141,9 +141,9 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     with click.progressbar(found, len(times), "switched runs", file=sys.stderr, hidden=hidden) as runs:
         outcomes = list(runs)
     if plot:
-        from d2rpick.report import figures
+        from d2rpick.report import figures, figures_models
 
-        output.write(plot, figures.render(figures.draw_scan(reference, outcomes, answer), plot))
+        output.write(plot, figures.render(figures_models.draw_scan(reference, outcomes, answer), plot))
     texts: dict[str, Callable[[], str]] = {
         "table": lambda: report.as_table(reference, outcomes, answer),
         "markdown": lambda: report.as_markdown(outcomes),

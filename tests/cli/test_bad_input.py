@@ -153,6 +153,8 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         # replay
         ("replay", ["--stiffness"]),
         ("replay --stiffness 1 --mass 1 --v0 1 --t-end 1 --dt 1", ["either --frame-mass or --beta"]),
+        ("replay --stiffness 1 --mass 1 --beta 1 --t-end 1 --dt 1", ["needs a start", "--v0", "--vy0"]),
+        (f"{ONE_COMMAND} --vz0 1", ["--v0 and --vz0 exclude each other"]),
         (f"{ONE_COMMAND} --dt 0", ["--dt", "above 0 was expected"]),
         (f"{ONE_COMMAND} --dt 1e-12", ["--dt 1e-12", "10000000"]),
         (f"{ONE_COMMAND} --tr 0.006", ["--tr and --td go together"]),

@@ -179,6 +179,23 @@ def test_replay_writes_the_motion_through_both_switches() -> None:
         np.testing.assert_allclose(table[expected[0]][:6], expected, rtol=1e-11)
 
 
+def test_a_replay_that_starts_in_the_middle_goes_on_as_the_whole_does() -> None:
+    def motion(*args: str) -> np.ndarray:
+        text = run("replay", *OSCILLATOR[:-2], *args, "--dt", "1e-3").stdout
+        return np.array([[float(cell) for cell in row.split(",")] for row in text.splitlines()[1:]])
+
+    whole = motion("--v0", "6", "--tr", "0.03", "--td", "0.05", "--t-end", "0.1")
+    _, z, y, vz, vy, *_ = whole[20].tolist()
+    start = [f"--{name}={value!r}" for name, value in (("z0", z), ("y0", y), ("vz0", vz), ("vy0", vy))]
+    later = motion(*start, "--tr", "0.01", "--td", "0.03", "--t-end", "0.08")
+    np.testing.assert_allclose(later[:, 1:], whole[20:, 1:], rtol=1e-10, atol=1e-12)
+
+
+def test_velocity_of_the_frame_has_two_names() -> None:
+    rest = (*OSCILLATOR[:-2], "--t-end", "0.01", "--dt", "1e-3")
+    assert run("replay", *rest, "--v0", "6").stdout == run("replay", *rest, "--vz0", "6", "--y0", "0").stdout
+
+
 def test_what_stdout_is_given_and_what_a_file_is_given_is_the_same(tmp_path: Path) -> None:
     args = ("replay", *OSCILLATOR, "--t-end", "0.01", "--dt", "1e-3", "--write-as", "glstat")
     run(*args, "-o", str(tmp_path / "motion.csv"))

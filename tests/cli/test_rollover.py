@@ -17,7 +17,7 @@ import pytest
 
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import Window, simulate
-from d2rpick.report import figures
+from d2rpick.report import figures_models
 from tests.command import ROOT, answer, codes, run
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def test_a_switched_run_is_rigid_in_between_and_differs_after_it(tmp_path: Path)
 def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
     window = Window(0.05, 0.2)
     reference, switched = (simulate(Parameters(mesh=4), 0.25, rigid, interval=5e-4) for rigid in (None, window))
-    outlines, roll, height = figures.draw_rollover(reference, switched, window).axes
+    outlines, roll, height = figures_models.draw_rollover(reference, switched, window).axes
     assert len(outlines.lines) == 16
     corners = np.asarray(outlines.lines[8].get_xydata())
     np.testing.assert_array_equal(corners[0], corners[-1])
