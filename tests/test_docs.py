@@ -121,6 +121,13 @@ def test_links_of_a_page_lead_somewhere(page: str) -> None:
         assert not anchor or anchor in anchors(path)
 
 
+@pytest.mark.skipif(not (ROOT / "d2rpick/vibration/model.py").exists(), reason="no protocol of the vibration here")
+def test_the_files_that_the_recipes_name_exist() -> None:
+    named = re.findall(r"`((?:d2rpick|tests)/[\w/.-]+)`", text_of("docs/developing.md"))
+    assert len(named) > 20
+    assert not {name for name in named if "NAME" not in name and not (ROOT / name).exists()}
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_help_and_is_documented_with_its_options(command: str) -> None:
     assert f"| `d2rpick {command} " in README
