@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,11 +26,13 @@ BOX = str(ROOT / "sample_data" / "rolloverT01.gz")
 OSCILLATOR = tuple(shlex.split("--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6"))
 # No colour variables and no options that the tester's own environment may set.
 _ENVIRONMENT = {"NO_COLOR": None, "FORCE_COLOR": None, "D2RPICK_SUGGEST_TD": None}
+# Before 8.2, click's runner mixes the streams unless it is told not to.
+_APART: dict[str, Any] = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}
 
 
 def run(*args: str, stdin: bytes | None = None, color: bool = False, env: Mapping[str, str] | None = None) -> Result:
     """Call ``d2rpick`` with these arguments; whatever it raises but the exit itself is raised here."""
-    result = CliRunner().invoke(d2rpick, args, input=stdin, color=color, env={**_ENVIRONMENT, **(env or {})})
+    result = CliRunner(**_APART).invoke(d2rpick, args, input=stdin, color=color, env={**_ENVIRONMENT, **(env or {})})
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result

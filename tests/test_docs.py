@@ -1,7 +1,8 @@
-"""The README shows what the program does: its sessions are run, its commands are those there are."""
+"""The documentation shows what the program does: its examples are run, its commands and links exist."""
 
 from __future__ import annotations
 
+import doctest
 import re
 import shlex
 import shutil
@@ -11,128 +12,182 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick import __version__
+import d2rpick
 from d2rpick.cli import COMMANDS
 from d2rpick.histories.opening import READERS
 from d2rpick.rules import RULES
 from d2rpick.rules.configuration import read_configuration
 from tests.command import DECK, GLSTAT, ROOT, run
+from tests.examples import (
+    PAGES,
+    blocks,
+    folder_of_a_reader,
+    languages,
+    printed,
+    prose,
+    rounded,
+    sessions,
+    text_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-README = (ROOT / "README.md").read_text("utf-8")
-CHANGELOG = (ROOT / "CHANGELOG.md").read_text("utf-8")
-PROMPT = "$ d2rpick "  # lines of a card begin with "$ " too
-
-# The last digits of a number at full precision differ from machine to machine.
-_FULL_PRECISION = re.compile(r"\d+\.\d{13,}(?:e[+-]\d+)?")
-
-
-def blocks(language: str) -> list[str]:
-    """Fenced blocks of the README in a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, flags=re.DOTALL | re.MULTILINE)
+README = text_of("README.md")
+ALL = "\n".join(text_of(page) for page in PAGES)
+LONGEST_README = 12_000  # [bytes] read in five minutes
+# Each has a test below, or shows nothing to be run.
+KINDS = {"console", "pycon", "sh", "yaml", "toml", "mermaid", "text"}
 
 
-def sessions() -> Iterator[tuple[str, str]]:
-    """Commands and, below each, what a terminal shows: first stderr, then stdout."""
-    for block in blocks("console"):
-        assert block.startswith(PROMPT), block
-        for entry in f"\n{block}".split(f"\n{PROMPT}")[1:]:
-            command, _, shown = entry.replace("\\\n", "").partition("\n")
-            yield f"d2rpick {command}", shown.rstrip("\n")
+def slug(heading: str) -> str:
+    """Anchor that GitHub gives a heading."""
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 
-def rounded(text: str) -> str:
-    """Text with its numbers at full precision cut to what every machine gives."""
-    return _FULL_PRECISION.sub(lambda number: f"{float(number[0]):.12g}", text)
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page."""
+    return {slug(heading) for heading in re.findall(r"^#+ (.*)$", prose(page.read_text("utf-8")), flags=re.MULTILINE)}
 
 
-def test_the_sessions_in_the_readme_show_what_the_commands_print(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    place = tmp_path_factory.mktemp("readme")
-    shutil.copytree(ROOT / "sample_data", place / "sample_data")
-    monkeypatch.chdir(place)
-    ran = set()
-    for line, shown in sessions():  # in order and in one folder, as a reader would type them
-        _, *args = shlex.split(line)
-        result = run(*args)
-        printed = f"{result.stderr}{result.stdout}".rstrip("\n")
-        assert f"{line}\n{rounded(printed)}" == f"{line}\n{rounded(shown)}"
-        ran.add(args[0])
-    assert {"suggest", "verify", "check", "card"} <= ran
+def links(page: str) -> Iterator[tuple[Path, str]]:
+    """Files and anchors in the repository that a page points to."""
+    for target in re.findall(r"\]\(([^)]+)\)", prose(text_of(page))):
+        if "://" not in target:
+            name, _, anchor = target.partition("#")
+            yield (PAGES[page].parent / name if name else PAGES[page]), anchor
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_sessions_on_a_page_show_what_the_commands_print(page: str) -> None:
+    with folder_of_a_reader():
+        for command, shown in sessions(text_of(page)):  # in order and in one folder, as a reader would type them
+            assert f"{command}\n{rounded(printed(command))}" == f"{command}\n{rounded(shown)}"
+
+
+def test_the_sessions_show_the_commands_that_matter_most() -> None:
+    shown = {shlex.split(command)[1] for command, _ in sessions(ALL)}
+    assert {*COMMANDS} - {"rule"} <= shown
+
+
+@pytest.mark.skipif(not hasattr(d2rpick, "suggest"), reason="the package has no library interface")
+@pytest.mark.parametrize("page", [page for page in PAGES if "pycon" in languages(text_of(page))])
+def test_the_python_on_a_page_gives_what_it_shows(page: str) -> None:
+    source = "".join(blocks(text_of(page), "pycon"))
+    test = doctest.DocTestParser().get_doctest(source, {}, page, page, 0)
+    report: list[str] = []
+    with folder_of_a_reader():
+        doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(test, out=report.append)
+    assert not report, "".join(report)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_no_example_escapes_the_tests(page: str) -> None:
+    text = text_of(page)
+    assert text.count("\n```") == 2 * len(re.findall(r"^```\w+$", text, flags=re.MULTILINE))
+    assert languages(text) <= KINDS
+    assert not [block for block in blocks(text, "text") if "d2rpick " in block]
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page != "README.md"])
+def test_a_page_begins_with_what_the_reader_gets(page: str) -> None:
+    title, first, *_ = text_of(page).split("\n\n")
+    assert re.fullmatch(r"# .+", title)
+    assert re.match(r"[A-Z`]", first)
+
+
+def test_no_page_repeats_another() -> None:
+    paragraphs = [
+        paragraph
+        for page in PAGES
+        for paragraph in {" ".join(found.split()) for found in re.split(r"\n\n|\n(?=[|*])", prose(text_of(page)))}
+        if len(paragraph) > 80
+    ]
+    assert not {paragraph for paragraph in paragraphs if paragraphs.count(paragraph) > 1}
+
+
+def test_the_readme_is_read_in_five_minutes() -> None:
+    assert len(README.encode()) <= LONGEST_README
+
+
+def test_the_readme_leads_to_every_page() -> None:
+    assert {*PAGES.values()} - {ROOT / "README.md"} <= {path for path, _ in links("README.md")}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_of_a_page_lead_somewhere(page: str) -> None:
+    for path, anchor in links(page):
+        assert path.exists()
+        assert not anchor or anchor in anchors(path)
+
+
+@pytest.mark.skipif(not (ROOT / "d2rpick/vibration/model.py").exists(), reason="no protocol of the vibration here")
+def test_the_files_that_the_recipes_name_exist() -> None:
+    named = re.findall(r"`((?:d2rpick|tests)/[\w/.-]+)`", text_of("docs/developing.md"))
+    assert len(named) > 20
+    assert not {name for name in named if "NAME" not in name and not (ROOT / name).exists()}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_and_each_of_its_options_is_in_the_readme(command: str) -> None:
-    assert f"`d2rpick {command} " in README
-    options = set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", run(command, "--help").stdout.split("Options:")[1]))
-    common = {"--help", "--debug", "--input-format", "--output-format", "--output-file", "--write-as", "--limit"}
-    assert not {option for option in options - common if option not in README}
+def test_every_command_has_help_and_is_documented_with_its_options(command: str) -> None:
+    assert f"| `d2rpick {command} " in README
+    shown = run(command, "--help").stdout
+    assert re.search(r"Examples:\n +d2rpick", shown)
+    options = set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", shown.split("Options:")[1].split("Examples:")[0]))
+    common = {"--help", "--input-format", "--output-format", "--output-file"}  # by their short names
+    assert not {option for option in options - common if option not in ALL}
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_every_format_is_in_the_readme(name: str) -> None:
-    assert f"| `{name}` |" in README
+def test_every_format_is_documented(name: str) -> None:
+    assert f"| `{name}` |" in text_of("docs/histories.md")
 
 
 def test_the_readme_lists_the_exit_codes() -> None:
-    assert [line.split("|")[1].strip() for line in README.splitlines() if re.match(r"\| \d \|", line)] == [
-        "0",
-        "1",
-        "2",
-    ]
+    assert re.findall(r"^\| (\d) \|", README, flags=re.MULTILINE) == ["0", "1", "2"]
 
 
-def test_files_that_the_readme_points_to_exist() -> None:
-    targets = [target for target in re.findall(r"\]\(([^)#]+)\)", README) if "://" not in target]
-    assert targets
-    assert not [target for target in targets if not (ROOT / target).exists()]
+def test_the_two_commands_of_the_readme_are_one_line_each() -> None:
+    first, second = blocks(README, "sh")
+    assert [block.count("\n") for block in (first, second)] == [1, 1]
+    (command,) = re.findall(r"\.venv/bin/(d2rpick .*)", first)
+    assert command in {re.sub(r" --limit \d+", "", command) for command, _ in sessions(README)}
+    assert "pytest" in second
 
 
-def test_ci_runs_the_test_command_of_the_readme_and_nothing_else() -> None:
-    lines = (line.strip() for line in (ROOT / ".ci" / "run").read_text("utf-8").splitlines())
-    own = [line for line in lines if line and not line.startswith(("#", "set ", "cd "))]
-    assert len(own) == 1
-    assert "pytest" in own[0]
-    assert f"{own[0]}\n" in blocks("sh")
+def test_ci_runs_the_test_command_of_the_readme() -> None:
+    _, second = blocks(README, "sh")
+    assert second in (ROOT / ".ci" / "run").read_text("utf-8")
 
 
-def test_the_jobs_in_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_jobs_in_the_documentation_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copy(DECK, "main.k")
     shutil.copy(GLSTAT, "glstat")
-    calls = re.findall(r"- (?:run: )?d2rpick (.*)", "".join(blocks("yaml")))
+    calls = re.findall(r"- (?:run: )?d2rpick (.*)", "".join(blocks(ALL, "yaml")))
     assert len(calls) == 2
     assert [run(*shlex.split(call)).exit_code for call in calls] == [1, 1]
-    (report,) = re.findall(r"junit: (.*)", README)
+    (report,) = re.findall(r"junit: (.*)", ALL)
     assert "<failure" in Path(report).read_text("utf-8")
 
 
-def test_the_configuration_in_the_readme_is_one() -> None:
-    (block,) = blocks("toml")
+def test_the_configuration_in_the_documentation_is_one() -> None:
+    (block,) = blocks(ALL, "toml")
     read_configuration(tomllib.loads(block)).verify(RULES)
 
 
-def test_the_pre_commit_hook_is_the_one_of_the_readme() -> None:
+def test_the_pre_commit_hook_is_the_one_of_the_documentation() -> None:
     hook = dict(re.findall(r"(\w+): (.*)", (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8")))
-    assert f"      - id: {hook['id']}\n" in README
+    assert f"      - id: {hook['id']}\n" in ALL
     assert hook["entry"].split() == ["d2rpick", "check"]
     assert [bool(re.search(hook["files"], name)) for name in ("a/run.k", "RUN.KEY", "x.dyn", "k.py", "glstat")] == [
         *(True, True, True, False, False)
     ]
 
 
-def test_the_two_commands_of_the_readme_are_one_line_each() -> None:
-    first, second = blocks("sh")
-    assert [block.count("\n") for block in (first, second)] == [1, 1]
-    assert "d2rpick suggest --td 0.064 sample_data/energy.csv" in first
-    assert "pytest" in second
-
-
 def test_the_changelog_begins_with_this_version() -> None:
-    assert re.findall(r"^## (\S+)", CHANGELOG, flags=re.MULTILINE)[0] == __version__
+    changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    assert re.findall(r"^## (\S+)", changelog, flags=re.MULTILINE)[0] == d2rpick.__version__
 
 
 def test_every_sample_has_a_line_on_what_wrote_it() -> None:

@@ -19,8 +19,13 @@ if TYPE_CHECKING:
 
 Decorated = Any  # a command function; click's decorators do not say more
 
+if TYPE_CHECKING:
+    FloatType = click.ParamType[float]
+else:
+    FloatType = click.ParamType  # generic from click 8.4 on
 
-class Number(click.ParamType[float]):
+
+class Number(FloatType):
     """A finite number with a point, not below ``low`` (or above it, when ``above``) and not above ``high``."""
 
     name = "number"

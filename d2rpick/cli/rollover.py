@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
+from d2rpick.cli.progress import counting
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -136,10 +136,11 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     output.notes((), cautions)
     if answer.recommended:
         times = sorted({*times, answer.recommended.tr})
-    found = scan(parameters, reference, times, td, options["jobs"])
-    hidden = options["quiet"] or not sys.stderr.isatty()
-    with click.progressbar(found, len(times), "switched runs", file=sys.stderr, hidden=hidden) as runs:
-        outcomes = list(runs)
+    outcomes = []
+    with counting(len(times), quiet=options["quiet"]) as count:
+        for outcome in scan(parameters, reference, times, td, options["jobs"]):
+            outcomes.append(outcome)
+            count.done += 1
     if plot:
         from d2rpick.report import figures, figures_models
 
