@@ -10,7 +10,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
 
 MOST_STATES = 10_000_000  # their text takes some gigabytes
-FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.report.writers, which --help does without
+FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.models.oscillator_files, which --help does without
 
 EXAMPLES = """\b
 Examples:
@@ -43,7 +43,8 @@ def command(
     The frame starts with velocity v0, everything else at rest.  Columns: time, displacement and velocity of frame
     (z) and suspended mass (y), internal and kinetic energy; at tr itself the state after the switch.
     """
-    from d2rpick.report import writers
+    from d2rpick.histories.writing import format_of
+    from d2rpick.models import oscillator_files
     from d2rpick.vibration.oscillator import State
     from d2rpick.vibration.replay import Replay, trajectory
 
@@ -55,7 +56,7 @@ def command(
         raise click.UsageError(f"--tr {tr:g} is not before --td {td:g}")
     if t_end / dt > MOST_STATES:
         raise click.UsageError(f"--t-end {t_end:g} holds more than {MOST_STATES} intervals of --dt {dt:g}")
-    form = write_as or writers.format_of(options["output_file"], FORMATS)
+    form = write_as or format_of(options["output_file"], FORMATS)
     output = Output.of({**options, "plot": plot})
     start = State.of(0.0, 0.0, options["v0"], 0.0)
     switched = None if tr is None or td is None else Replay(oscillator, start, 0.0, tr, td)
@@ -65,4 +66,4 @@ def command(
 
         output.write(plot, figures.render(figures.draw_replay(motion, switched), plot))
     if options["output_file"] or not plot:
-        output.content(writers.TRAJECTORY_WRITERS[form](motion, oscillator))
+        output.content(oscillator_files.WRITERS[form](motion, oscillator))
