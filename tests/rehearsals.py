@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.models.rollover import files
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.record import BOX, Record
 from d2rpick.models.rollover.run import Window, simulate
 from d2rpick.models.rollover.scan import scan, scan_times
-from d2rpick.report import writers
 from tests.command import answer
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def rehearse(parameters: Parameters, folder: Path, *, every: int = 1, interval: 
     shown = reference.time <= reference.landed + 0.04
     td = round(reference.landed - BEFORE_LANDING, 3)
     file = folder / "reference.matsum"
-    file.write_bytes(writers.rollover_matsum(_until(reference, int(shown.sum()))))
+    file.write_bytes(files.as_matsum(_until(reference, int(shown.sum()))))
     found = answer("suggest", "--td", str(td), "--part", "box", str(file))
     tr = found["recommended"]["tr"] if found["recommended"] else None
     flight = found["flight"]

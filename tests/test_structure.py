@@ -13,7 +13,7 @@ import pytest
 
 from d2rpick.cli import options, replay
 from d2rpick.histories.opening import READERS
-from d2rpick.report.writers import TRAJECTORY_WRITERS
+from d2rpick.models import oscillator_files
 from tests.command import DECK, ENERGY, GLSTAT, ROOT
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ def test_a_plain_table_loads_only_what_its_answer_needs() -> None:
 
 def test_the_command_line_offers_the_formats_there_are() -> None:
     assert tuple(READERS) == options.FORMATS
-    assert tuple(TRAJECTORY_WRITERS) == replay.FORMATS
+    assert tuple(oscillator_files.WRITERS) == replay.FORMATS
 
 
 SCHEMAS = [

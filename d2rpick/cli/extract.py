@@ -30,9 +30,9 @@ def command(write_as: str | None, **options: Any) -> None:
 
     With more than one part a column part_<id> for each follows.
     """
-    from d2rpick.report import writers
+    from d2rpick.histories.writing import TABLE_WRITERS, format_of
 
-    form = write_as or writers.format_of(options["output_file"], list(writers.TABLE_WRITERS))
+    form = write_as or format_of(options["output_file"], list(TABLE_WRITERS))
     with reading(options["history"], quiet=options["quiet"]):
         run = shared.open_run(options)
         output = Output.of(options, *run.sources)
@@ -42,4 +42,4 @@ def command(write_as: str | None, **options: Any) -> None:
             energies = run.part_energies(history.parts)
             table |= {f"part_{part.id}": column for part, column in zip(history.parts, energies.T, strict=True)}
     output.notes(history.notes, ())
-    output.content(writers.TABLE_WRITERS[form](table))
+    output.content(TABLE_WRITERS[form](table))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import State
 
 MOST_STATES = 10_000_000  # their text takes some gigabytes
-FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.report.writers, which --help does without
+FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.models.oscillator_files, which --help does without
 
 EXAMPLES = """\b
 Examples:
@@ -52,7 +52,8 @@ def command(
     displacement and velocity of frame (z) and suspended mass (y), internal and kinetic energy; at tr itself the state
     after the switch.
     """
-    from d2rpick.report import writers
+    from d2rpick.histories.writing import format_of
+    from d2rpick.models import oscillator_files
     from d2rpick.vibration.replay import Replay, trajectory
 
     start = _start(**options)
@@ -64,7 +65,7 @@ def command(
         raise click.UsageError(f"--tr {tr:g} is not before --td {td:g}")
     if t_end / dt > MOST_STATES:
         raise click.UsageError(f"--t-end {t_end:g} holds more than {MOST_STATES} intervals of --dt {dt:g}")
-    form = write_as or writers.format_of(options["output_file"], FORMATS)
+    form = write_as or format_of(options["output_file"], FORMATS)
     output = Output.of({**options, "plot": plot})
     switched = None if tr is None or td is None else Replay(oscillator, start, 0.0, tr, td)
     motion = trajectory(oscillator, start, t_end, dt, switched)
@@ -73,7 +74,7 @@ def command(
 
         output.write(plot, figures.render(figures_models.draw_replay(motion, switched), plot))
     if options["output_file"] or not plot:
-        output.content(writers.TRAJECTORY_WRITERS[form](motion, oscillator))
+        output.content(oscillator_files.WRITERS[form](motion, oscillator))
 
 
 def _start(

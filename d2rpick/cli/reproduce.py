@@ -79,7 +79,8 @@ def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exh
     from pathlib import Path
 
     from d2rpick.errors import D2RPickError
-    from d2rpick.report import figures, figures_models, writers
+    from d2rpick.histories.formats import csv_table
+    from d2rpick.report import figures, figures_models
     from d2rpick.report import reproduction as report
 
     place = Path(folder)
@@ -92,7 +93,7 @@ def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exh
     for one in shown:
         figure = figures_models.draw_exhibit(one)
         contents |= {f"{one.name}.{form}": figures.render(figure, f"x.{form}") for form in PICTURES}
-        contents[f"{one.name}.csv"] = writers.table_csv(dict(one.columns))
+        contents[f"{one.name}.csv"] = csv_table.write(dict(one.columns))
     named = {str(place / name): content for name, content in contents.items()}
     for name in named:
         output.claim(name)

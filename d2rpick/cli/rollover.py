@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from d2rpick.models.rollover.record import Record
 
 MOST_STATES = 1_000_000
-FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.report.writers, which --help does without
+FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.models.rollover.files, which --help does without
 PARAMETERS = ("speed", "stiffness", "yield_strain", "damping", "mesh")
 TD = 0.37  # of the published study, 10 ms before the ground comes
 BALANCED = 0.01  # so well the energy of a run must be balanced [-]
@@ -97,10 +97,11 @@ def _parameters(options: dict[str, Any]) -> Parameters:
 
 def _run(options: dict[str, Any]) -> None:
     """One run; for a plot also the one without switching."""
+    from d2rpick.histories.writing import format_of
+    from d2rpick.models.rollover import files
     from d2rpick.models.rollover.run import Window, simulate
-    from d2rpick.report import writers
 
-    form = options["write_as"] or writers.format_of(options["output_file"], FORMATS)
+    form = options["write_as"] or format_of(options["output_file"], FORMATS)
     output = Output.of(options)
     parameters, plot = _parameters(options), options["plot"]
     window = None if options["tr"] is None else Window(options["tr"], options["td"])
@@ -116,7 +117,7 @@ def _run(options: dict[str, Any]) -> None:
         reference, switched = (simulated(None), record) if window else (record, None)
         output.write(plot, figures.render(figures_models.draw_rollover(reference, switched, window), plot))
     if options["output_file"] or not plot:
-        output.content(writers.ROLLOVER_WRITERS[form](record))
+        output.content(files.WRITERS[form](record))
 
 
 def _scan(ctx: click.Context, options: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection, open_run, read_history
-from d2rpick.report.writers import format_of, table_csv, table_hdf5
+from d2rpick.histories.writing import TABLE_WRITERS, format_of
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
 from tests.shared import shared
 
@@ -66,7 +66,7 @@ def test_any_numbers_read_back_bit_for_bit(
     tmp_path_factory: pytest.TempPathFactory, times: list[float], energy: list[float]
 ) -> None:
     columns = {"time": np.sort(times) + 0.0, "internal_energy": np.array(energy[: len(times)]) + 0.0}
-    for name, writer in {"any.csv": table_csv, "any.h5": table_hdf5}.items():
+    for name, writer in {"any.csv": TABLE_WRITERS["csv"], "any.h5": TABLE_WRITERS["hdf5"]}.items():
         file = tmp_path_factory.mktemp("any") / name
         file.write_bytes(writer(columns))
         again = read_history([str(file)])

@@ -24,7 +24,7 @@ from d2rpick.histories.formats.layout import Layout, as_number, find_layout, is_
 from d2rpick.histories.names import listing
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.history import Part, Precision, Samples
     from d2rpick.histories.selection import Selection
@@ -260,3 +260,20 @@ def _value(where: str, layout: Layout, column: int, cell: str) -> float:
             f"{where}: {layout.name(column)!r} is {cell!r}, a number was expected; repair or delete the line"
         )
     return value
+
+
+def write(columns: Mapping[str, Samples]) -> bytes:
+    r"""Columns (n,) side by side under their names, each number in the shortest digits that read back to it.
+
+    Examples
+    --------
+    >>> write({"time": np.array([0.0, 0.1]), "part 1, IE": np.array([1e-20, 2.5])})
+    b'time,"part 1, IE"\n0.0,1e-20\n0.1,2.5\n'
+    """
+    import csv
+    import io
+
+    head = io.StringIO()
+    csv.writer(head, lineterminator="\n").writerow(columns)
+    rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)
+    return "\n".join([head.getvalue().removesuffix("\n"), *map(",".join, rows), ""]).encode()

@@ -16,9 +16,10 @@ import numpy as np
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
 from d2rpick.histories.formats.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
+from d2rpick.histories.formats.written_head import written_head
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Sequence
+    from collections.abc import Hashable, Mapping, Sequence
 
     from d2rpick.histories.history import Part, Samples
     from d2rpick.histories.selection import Selection
@@ -132,3 +133,14 @@ def _is_whole(layout: Layout) -> bool:
 
 
 _GRAMMAR: Final = Grammar(_START, _describe, _is_whole, _WIDTH, decimals=5, compare_all=True)
+
+
+def write(title: str, lines: Mapping[str, Samples]) -> bytes:
+    """Blocks of ``label....... value`` with six significant digits (14 columns, E14.5), ``time`` first, all (n,)."""
+    states = zip(*(values.tolist() for values in lines.values()), strict=True)
+    blocks = (
+        f" dt of cycle{cycle:8d} is controlled by solid              1 of part         1\n\n"
+        + "".join(f" {label:.<31}{value:14.5E}\n" for label, value in zip(lines, values, strict=True))
+        for cycle, values in enumerate(states, start=1)
+    )
+    return (written_head(title, "glstat") + "\n\n" + "\n\n".join(blocks)).encode()

@@ -22,7 +22,7 @@ from d2rpick.histories.history import Part, Precision
 from d2rpick.histories.names import near_miss
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import h5py
 
@@ -321,3 +321,14 @@ def _opened(file: Path | BinaryIO, source: str) -> Iterator[h5py.File]:
     ) as error:
         reason = " ".join(str(error).split())
         raise FormatError(f"{source}: HDF5 cannot be read ({reason}); the file is damaged or needs a filter") from error
+
+
+def write(columns: Mapping[str, Samples]) -> bytes:
+    """Give a file with a dataset of doubles for each column (n,)."""
+    import h5py
+
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        for name, column in columns.items():
+            file[name] = column
+    return content.getvalue()

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from typing import TYPE_CHECKING, Final, NoReturn
+from typing import TYPE_CHECKING, Final, NamedTuple, NoReturn
 
 import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
 from d2rpick.histories.formats.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
+from d2rpick.histories.formats.written_head import written_head
 from d2rpick.histories.history import Part
 
 if TYPE_CHECKING:
@@ -196,3 +197,36 @@ def _legend(data: Content) -> dict[int, str]:
     match = _LEGEND.search(data, 0, first_state if first_state >= 0 else _LONGEST)
     entries = _ENTRY.findall(match[1]) if match else []
     return {int(id_): title.decode("latin-1").strip() for id_, title in entries}
+
+
+class PartColumns(NamedTuple):
+    """Histories of one part to be written, all of the same shape (n,)."""
+
+    title: str
+    internal_energy: Samples
+    kinetic_energy: Samples
+    x_momentum: Samples
+    z_momentum: Samples
+
+
+def write(title: str, time: Samples, parts: Sequence[PartColumns]) -> bytes:
+    """Blocks of the parts, numbered from 1, with five significant digits (13 columns, E13.4); ``time`` is (n,)."""
+    legend = "".join(f"{number:9d}     {part.title:<70}\n" for number, part in enumerate(parts, start=1))
+    columns = [list(zip(*(column.tolist() for column in part[1:]), strict=True)) for part in parts]
+    blocks = (
+        f"\n time ={moment:13.4E}\n"
+        + "".join(_written(number, *rows[i]) for number, rows in enumerate(columns, start=1))
+        for i, moment in enumerate(time.tolist())
+    )
+    head = f"{written_head(title, 'matsum')}\n{{BEGIN LEGEND}}\n Entity #        Title\n{legend}{{END LEGEND}}\n"
+    return (head + "\n".join(blocks)).encode()
+
+
+def _written(number: int, internal: float, kinetic: float, x_momentum: float, z_momentum: float) -> str:
+    return (
+        f" mat.#={number:5d}             inten={internal:13.4E}     kinen={kinetic:13.4E}"
+        f"     eroded_ie={0:13.4E}     eroded_ke={0:13.4E}\n"
+        f" x-mom={x_momentum:13.4E}     y-mom={0:13.4E}     z-mom={z_momentum:13.4E}\n"
+        f" x-rbv={0:13.4E}     y-rbv={0:13.4E}     z-rbv={0:13.4E}\n"
+        f"                         hgeng={0:13.4E}     +mass={0:13.4E}     eroded_he={0:13.4E}\n"
+    )
