@@ -79,7 +79,7 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
 
         output.write(options["plot"], figures.render(figures.draw_verdict(answer), options["plot"]))
     if options["report"]:
-        output.write(options["report"], text_bytes(_page(answer, run, options)))
+        output.write(options["report"], text_bytes(_page(answer, run, switched, options)))
     texts = {
         "table": lambda: report.as_table(answer),
         "markdown": lambda: report.as_markdown(answer),
@@ -90,7 +90,7 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
     finish(ctx, objection=not answer.verified, exit_zero=exit_zero)
 
 
-def _page(answer: Verdict, run: Run, options: dict[str, Any]) -> str:
+def _page(answer: Verdict, run: Run, switched: Run | None, options: dict[str, Any]) -> str:
     """Draw the figure, wide and narrow, and write the page around it."""
     from d2rpick.report import figures
     from d2rpick.report.page import Record
@@ -98,7 +98,7 @@ def _page(answer: Verdict, run: Run, options: dict[str, Any]) -> str:
 
     caption = "Internal energy with its level at td, and the pair"
     drawn = {caption: figures.both_widths(figures.draw_verdict, answer, "pair")}
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn))
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, switched))
 
 
 def _switched(options: dict[str, Any]) -> Run | None:

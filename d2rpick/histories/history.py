@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from d2rpick.histories.source import Source
+
 # in quotes: numpy.typing costs start-up
 Samples: TypeAlias = "NDArray[np.float64]"
 
@@ -96,6 +98,7 @@ class History:
     Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
     in them was taken for the energy, ``parts`` whose energy it is, None for the whole model.  ``complete``
     is False when a file stopped inside a state; ``notes`` say in plain sentences what was left out or assumed.
+    ``files`` are the contents that were read.
     Where the energy is a sum, ``part_names`` (k,) and ``part_energies`` (n, k) are its terms that are not always zero.
     ``time_unit`` is given only where the file names it; solver databases do not.  ``momenta`` tell when parts fly
     freely, where the files have them: of the parts, then of the whole model.
@@ -115,6 +118,7 @@ class History:
     momenta: tuple[Momenta, ...] = ()
     complete: bool = True
     notes: tuple[str, ...] = ()
+    files: tuple[Source, ...] = ()
 
     def __post_init__(self) -> None:
         time, energy = _frozen(self.time), _frozen(self.energy)

@@ -14,7 +14,7 @@ from d2rpick.histories.companions import check_companions
 from d2rpick.histories.database import Legs
 from d2rpick.histories.run import Run
 from d2rpick.histories.selection import Selection
-from d2rpick.histories.source import Source, expand, open_source, sha256
+from d2rpick.histories.source import Source, expand, open_source
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.database import Database
     from d2rpick.histories.history import History
 
-__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "read_history", "reader", "sha256"]
+__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "read_history", "reader"]
 
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
@@ -82,7 +82,8 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
     """
     files = expand(names)
     kinds: dict[str, list[Source]] = {}
-    for source in map(open_source, files):
+    sources = tuple(map(open_source, files))
+    for source in sources:
         kinds.setdefault(input_format if input_format != "auto" else _format(source), []).append(source)
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
@@ -91,7 +92,7 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
         for kind in ordered
     )
     check_companions(databases)
-    return Run(files, databases)
+    return Run(files, databases, sources)
 
 
 def read_history(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> History:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import Part, Samples
     from d2rpick.histories.selection import Selection
+    from d2rpick.histories.source import Source
 
 _AXES = ("x_momentum", "y_momentum", "z_momentum")
 _CENTRES = ("x_center", "y_center", "z_center")
@@ -27,10 +28,14 @@ _CENTRES = ("x_center", "y_center", "z_center")
 
 @dataclass(frozen=True)
 class Run:
-    """Databases of one run, one per format, those that say most of it first; ``sources`` name their files."""
+    """Databases of one run, one per format, those that say most of it first.
+
+    ``sources`` name their files; ``files`` are what was read of them.
+    """
 
     sources: tuple[str, ...]
     databases: tuple[Legs, ...]
+    files: tuple[Source, ...] = ()
 
     @property
     def name(self) -> str:
@@ -181,6 +186,7 @@ class Run:
             time=time,
             energy=energy,
             source=self.sources,
+            files=self.files,
             format=" + ".join(one.format for one in self.databases),
             channel=channel,
             parts=parts,

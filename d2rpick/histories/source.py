@@ -2,38 +2,50 @@
 
 from __future__ import annotations
 
-import mmap
 import os
 import re
 import sys
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import FormatError
+from d2rpick.histories.content import stored
 from d2rpick.histories.names import listing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from d2rpick.histories.content import OnDisk
+
 STDIN = "-"
-Content = bytes | mmap.mmap
+_GZIP = b"\x1f\x8b"
 
 # What solvers call their databases in the folder of a run.
 _DATABASE = re.compile(r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?")
 
-# Standard input can be read only once; its bytes stay here for a later sha256("-").
-_stdin = b""
-
 
 class Source(NamedTuple):
-    """The unpacked bytes of one file, mapped where it lies on a disk, under the name the user gave it.
+    """The unpacked bytes of one file, those of a big one still on its disk, under the name the user gave it.
 
-    ``cut`` is True when packed data ends early: ``data`` is what could be unpacked.
+    ``cut`` is True when packed data ends early: ``data`` is what could be unpacked of ``packed``.
     """
 
     name: str
-    data: Content
+    data: bytes | OnDisk
     cut: bool = False
+    packed: bytes | OnDisk | None = None
+
+    def sha256(self) -> str:
+        """SHA-256 of the bytes that were read, as they lay on the disk or came in by standard input.
+
+        FormatError where a big file was written anew since.
+        """
+        read = self.data if self.packed is None else self.packed
+        if not isinstance(read, bytes):
+            return read.sha256()
+        import hashlib
+
+        return hashlib.sha256(read).hexdigest()
 
 
 def expand(names: Sequence[str]) -> tuple[str, ...]:
@@ -57,26 +69,11 @@ def open_source(name: str) -> Source:
     FormatError
         If there is nothing to be read under this name.
     """
-    data: Content = _read_stdin() if name == STDIN else _mapped(name)
-    cut = False
-    if data[:2] == b"\x1f\x8b":
-        data, cut = _unpacked(name, data)
-    if not data:
+    data = _read_stdin() if name == STDIN else _read_file(name)
+    source = _unpacked(name, data) if data[:2] == _GZIP else Source(name, data)
+    if not source.data:
         raise FormatError(f"{name}: the file is empty, an energy history was expected; was the run started?")
-    return Source(name, data, cut)
-
-
-def sha256(name: str) -> str:
-    """SHA-256 of the bytes under this name, as they lie on the disk or came in by standard input.
-
-    For ``-`` these are the bytes of the last history read from there.
-    """
-    import hashlib
-
-    if name == STDIN:
-        return hashlib.sha256(_stdin).hexdigest()
-    with open(name, "rb") as file:  # noqa: PTH123
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return source
 
 
 def _files(name: str) -> Sequence[str]:
@@ -115,18 +112,17 @@ def _databases(folder: Path) -> list[str]:
 
 
 def _read_stdin() -> bytes:
-    global _stdin  # noqa: PLW0603
-    _stdin = sys.stdin.buffer.read()
-    return _stdin
-
-
-def _mapped(name: str) -> Content:
+    if sys.stdin is None:
+        raise FormatError(f"{STDIN}: standard input is closed; name a file")
     try:
-        with open(name, "rb") as file:  # noqa: PTH123
-            try:
-                return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-            except (OSError, ValueError):  # empty, or a pipe
-                return file.read()
+        return sys.stdin.buffer.read()
+    except OSError as error:
+        raise FormatError(f"{STDIN}: standard input cannot be read ({error.strerror}); name a file") from None
+
+
+def _read_file(name: str) -> bytes | OnDisk:
+    try:
+        return stored(name)
     except FileNotFoundError:
         raise FormatError(f"{name}: no such file; check the name and the folder") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
@@ -134,18 +130,19 @@ def _mapped(name: str) -> Content:
         raise FormatError(f"{name}: cannot be read ({reason}); check the name and the permissions") from None
 
 
-def _unpacked(name: str, data: Content) -> tuple[bytes, bool]:
-    """Unpack what there is, of files that were packed one behind the other too; True when the last one ends early."""
+def _unpacked(name: str, packed: bytes | OnDisk) -> Source:
+    """Unpack what there is, of files that were packed one behind the other too."""
     import zlib
 
-    found, rest = [], bytes(data)
-    while rest[:2] == b"\x1f\x8b":
-        unpacker = zlib.decompressobj(wbits=31)  # 31: the gzip format
-        try:
+    found, rest, cut = [], bytes(packed), False
+    try:
+        while rest[:2] == _GZIP and not cut:
+            unpacker = zlib.decompressobj(wbits=31)  # 31: the gzip format
             found.append(unpacker.decompress(rest))
-        except zlib.error as error:
-            raise FormatError(f"{name}: gzip data that cannot be unpacked ({error}); copy the file again") from None
-        if not unpacker.eof:
-            return b"".join(found), True
-        rest = unpacker.unused_data
-    return b"".join(found), False
+            cut, rest = not unpacker.eof, unpacker.unused_data
+        data = found[0] if len(found) == 1 else b"".join(found)
+    except zlib.error as error:
+        raise FormatError(f"{name}: gzip data that cannot be unpacked ({error}); copy the file again") from None
+    except MemoryError:
+        raise FormatError(f"{name}: what is packed in it does not fit into memory; unpack it with gunzip") from None
+    return Source(name, data, cut, packed)

@@ -21,20 +21,23 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
+    from d2rpick.histories.source import Source
 
 
 @dataclass(frozen=True)
 class Record:
     """What a page shows besides the answer.
 
-    ``run`` is what was read; ``command`` repeats the answer, ``judging`` are the options of ``card`` that judge by the
-    same history.  ``figures`` are SVG elements by caption, for a wide and for a narrow page, with ids of their own.
+    ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the
+    options of ``card`` that judge by the same history.  ``figures`` are SVG elements by caption, for a wide and for a
+    narrow page, with ids of their own.
     """
 
     run: Run
     command: Sequence[str]
     judging: Sequence[str]
     figures: Mapping[str, tuple[str, str]]
+    switched: Run | None = None
 
 
 def run_page(run: Run, sections: Iterable[Markup]) -> str:
@@ -55,11 +58,9 @@ def pair(title: str, times: tuple[float, float], residual: float | None, history
     return tag("div", tag("h2", title), tag("div", *shown, class_="times"), *lines, class_=class_)
 
 
-def digests(sources: Iterable[str]) -> list[tuple[str, str]]:
-    """Name each file with its SHA-256."""
-    from d2rpick.histories.source import sha256
-
-    return [("SHA-256", f"{name}: {sha256(name)}") for name in sources]
+def digests(files: Iterable[Source]) -> list[tuple[str, str]]:
+    """Name each file with the SHA-256 of what was read of it."""
+    return [("SHA-256", f"{file.name}: {file.sha256()}") for file in files]
 
 
 def parts(candidate: Candidate | None) -> Markup:
@@ -103,7 +104,7 @@ def solver_input(situation: Situation, times: tuple[float, float], record: Recor
 
 def _read(situation: Situation, run: Run) -> Markup:
     listed = [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in heading(situation)]
-    listed += digests(run.sources)
+    listed += digests(run.files)
     listed += [(f"{database.format} by", database.version) for database in run.databases if database.version]
     whole = "the files end behind a whole state" if situation.history.complete else "only whole states were used"
     listed += [("complete", whole)]

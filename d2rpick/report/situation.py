@@ -61,8 +61,6 @@ def _parts(situation: Situation) -> str:
 
 def frame(situation: Situation, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
     """Keys that every JSON result begins with, and the history it rests on."""
-    from d2rpick.histories.source import sha256
-
     history = situation.history
     return {
         "schema": schema,
@@ -71,7 +69,7 @@ def frame(situation: Situation, schema: str, command: Sequence[str], cautions: I
         "warnings": [caution._asdict() for caution in cautions],
         "history": {
             "source": list(history.source),
-            "sha256": [sha256(name) for name in history.source],
+            "sha256": [file.sha256() for file in history.files],
             "format": history.format,
             "channel": history.channel,
             "parts": parts_of(history.parts),

@@ -10,10 +10,11 @@ from d2rpick.report.tables import short
 from d2rpick.report.verdict import COMPARED, comparison, deviations, measures, word
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.verify import Verdict
+    from d2rpick.histories.source import Source
     from d2rpick.report.html import Markup
 
 
@@ -32,15 +33,15 @@ def _sections(answer: Verdict, record: page.Record) -> Iterator[Markup]:
     yield section("Measures", pairs((name.replace("_", " "), short(one)) for name, one in measures(answer).items()))
     yield page.parts(candidate)
     if answer.switched:
-        yield _switched(answer.switched)
+        yield _switched(answer.switched, record.switched.files if record.switched else ())
     yield from page.evidence(situation, answer.health, record)
     if answer.verified:
         yield page.solver_input(situation, times, record)
 
 
-def _switched(found: Comparison) -> Markup:
+def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
     """Show what the finished switched run has of the reference."""
     title = "The switched run"
-    listed = [("after td", f"means to {found.end:.6g}"), *deviations(found), *page.digests(found.source)]
+    listed = [("after td", f"means to {found.end:.6g}"), *deviations(found), *page.digests(files)]
     listed += [("note", note) for note in found.notes]
     return section(title, table(title, ("quantity", *COMPARED[1:]), comparison(found)), pairs(listed))

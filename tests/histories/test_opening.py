@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.opening import READERS, Selection, read_history, sha256
+from d2rpick.histories.opening import READERS, Selection, read_history
 
 CSV = b"time,internal_energy\n0.0,1.0\n0.1,2.0\n0.2,1.5\n"
 GLSTAT = (
@@ -52,8 +52,9 @@ def test_content_decides_and_not_the_name(file: Write, data: bytes, name: str) -
 def test_a_gzipped_file_is_read_and_hashed_as_it_lies_there(file: Write) -> None:
     packed = gzip.compress(CSV)
     name = file(packed, "history.gz")
-    assert read_history([name]).energy.tolist() == [1.0, 2.0, 1.5]
-    assert sha256(name) == hashlib.sha256(packed).hexdigest()
+    history = read_history([name])
+    assert history.energy.tolist() == [1.0, 2.0, 1.5]
+    assert history.files[0].sha256() == hashlib.sha256(packed).hexdigest()
 
 
 def test_standard_input_is_read_once_and_still_hashed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,7 +62,7 @@ def test_standard_input_is_read_once_and_still_hashed(monkeypatch: pytest.Monkey
     history = read_history(["-"])
     assert history.source == ("-",)
     assert history.time.tolist() == [0.0, 0.1, 0.2]
-    assert sha256("-") == hashlib.sha256(CSV).hexdigest()
+    assert history.files[0].sha256() == hashlib.sha256(CSV).hexdigest()
 
 
 def test_a_given_format_is_not_second_guessed(file: Write) -> None:

@@ -21,9 +21,10 @@ from d2rpick.histories.names import listing
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.histories.content import Content
     from d2rpick.histories.history import Samples
     from d2rpick.histories.selection import Selection
-    from d2rpick.histories.source import Content, Source
+    from d2rpick.histories.source import Source
 
 __all__ = ["Binout", "open_legs", "recognises"]
 
@@ -33,7 +34,7 @@ _PARTS: Final = "matsum"
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
     """Open the files of each folder as one leg: there a solver continues a binout and spreads its branches."""
-    folders: dict[str, list[tuple[str, Content]]] = {}
+    folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
         folders.setdefault(str(PurePath(source.name).parent), []).append((source.name, source.data))
     return [Binout(family) for family in folders.values()]
@@ -44,7 +45,7 @@ class Binout(SolverFile):
 
     Parameters
     ----------
-    files : sequence of (str, bytes-like)
+    files : sequence of (str, bytes or Content)
         Name and content of each file, those of a family in their order.
 
     Raises
@@ -55,7 +56,7 @@ class Binout(SolverFile):
 
     format = "binout"
 
-    def __init__(self, files: Sequence[tuple[str, Content]]) -> None:
+    def __init__(self, files: Sequence[tuple[str, bytes | Content]]) -> None:
         self._files = [Lsda(content, name, (_GLOBAL, _PARTS)) for name, content in files]
         self.source = ", ".join(name for name, _ in files)
         self._glstat = Branch(_GLOBAL, self._files, by_part=False)

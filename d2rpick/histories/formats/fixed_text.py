@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from d2rpick.errors import FormatError
+from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.formats.fortran import decode
 
 if TYPE_CHECKING:
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.source import Content
-
 Bytes = NDArray[np.uint8]
 Addresses = NDArray[np.int64]
 
@@ -88,8 +87,8 @@ class Blocks:
 
     Parameters
     ----------
-    data : bytes or mmap
-        The file.  Nothing of it is copied but the numbers that are asked for.
+    data : bytes or Content
+        The file.
     source : str
         Its name, for messages.
     begin : int
@@ -111,16 +110,15 @@ class Blocks:
         The last block, when the file stops inside it: it is no state unless ``admit_rest`` makes it one.
     """
 
-    def __init__(self, data: Content, source: str, begin: int, grammar: Grammar) -> None:
+    def __init__(self, data: bytes | Content, source: str, begin: int, grammar: Grammar) -> None:
         self.source = source
-        self._data = data
+        self._data = content_of(data)
         self._grammar = grammar
-        self._bytes: Bytes = np.frombuffer(data, np.uint8) if len(data) else np.empty(0, np.uint8)
         self._end = self._end_of_last_line()
         self._begin = begin
         # Addresses as packed integers: a file whose blocks all differ must not fill the memory.
         self._runs = array("q")
-        self.layout = lru_cache(maxsize=16)(self._describe)
+        self.layout = lru_cache(maxsize=16)(partial(_described, self._data, self._end, grammar))
         self._compared = grammar.compare_all
         self.states, self.complete = 0, True
         self.notes: tuple[str, ...] = ()
@@ -185,11 +183,10 @@ class Blocks:
         addresses = values.view(np.int64)
         if not values.size:
             return
-        # Every address of the file seen as the start of a field: fetching is then plain indexing.
-        fields = np.ndarray((self._end - grammar.width + 1,), f"S{grammar.width}", self._data, strides=(1,))
         for at in range(0, values.size, _BATCH):
             where = addresses[at : at + _BATCH].copy()
-            found = decode(fields[where], grammar.decimals)
+            fields = self._data.fields(where, grammar.width).view(f"S{grammar.width}").ravel()
+            found = decode(fields, grammar.decimals)
             values[at : at + _BATCH] = found
             if np.isnan(found).any():
                 bad = int(np.argmax(np.isnan(found)))
@@ -280,12 +277,12 @@ class Blocks:
     def _like_example(self, run: Run, offset: int, literal: Bytes) -> int:
         """Count the blocks of ``run`` that have, from ``offset`` on, the literal bytes of its example."""
         size = literal.size
-        template = self._bytes[run.example + offset : run.example + offset + size] & literal
+        template = self._data.view(run.example + offset, run.example + offset + size) & literal
         done, step = 0, 1
         while done < run.repeats:
             step = min(step, run.repeats - done)
             first = run.start + done * run.stride + offset
-            rows: Bytes = np.ndarray((step, size), np.uint8, self._data, first, (run.stride, 1))
+            rows = self._rows(first, run.stride, step, size)
             if step < _FOLD or not _all_like(template, literal, rows):
                 differs = (rows & literal != template).any(axis=1)
                 if differs.any():
@@ -294,6 +291,13 @@ class Blocks:
             if 2 * step * size <= _CHUNK:
                 step *= 2
         return done
+
+    def _rows(self, first: int, stride: int, count: int, size: int) -> Bytes:
+        """``size`` bytes of each of ``count`` blocks, shape (count, size)."""
+        if 2 * size < stride:
+            return self._data.fields(first + stride * np.arange(count), size)
+        span = self._data.view(first, first + (count - 1) * stride + size)
+        return np.ndarray((count, size), np.uint8, span, strides=(stride, 1))
 
     def _alike(self, run: Run, layout: Layout, offsets: Addresses, anchors: Sequence[Hashable]) -> bool:
         """Tell whether in all blocks of ``run`` the text from anchors to numbers is that of its example."""
@@ -330,9 +334,6 @@ class Blocks:
         if self.states != states:
             raise FormatError(f"{self.source}: states overlap, the file is damaged")
 
-    def _describe(self, start: int, size: int) -> Layout:
-        return self._grammar.describe(self.text(start, size))
-
     def _find(self, position: int) -> int | None:
         """Address of the next line that begins a block."""
         start = self._grammar.start
@@ -351,6 +352,10 @@ class Blocks:
             if found >= 0:
                 return first + found + 1
         return 0
+
+
+def _described(data: Content, end: int, grammar: Grammar, start: int, size: int) -> Layout:
+    return grammar.describe(data[start : min(start + size, end)])
 
 
 def _all_like(template: Bytes, literal: Bytes, rows: Bytes) -> bool:
@@ -382,7 +387,7 @@ def _spoken(name: Hashable) -> str:
     return f"{name[1]} of part {name[0]}" if isinstance(name, tuple) else f"{name!r}"
 
 
-def head(data: Content) -> tuple[str, str, int]:
+def head(data: bytes | Content) -> tuple[str, str, int]:
     """Read the head of an LS-DYNA text database.
 
     Returns

@@ -21,9 +21,10 @@ from d2rpick.histories.formats.written_head import written_head
 if TYPE_CHECKING:
     from collections.abc import Hashable, Mapping, Sequence
 
+    from d2rpick.histories.content import Content
     from d2rpick.histories.history import Part, Samples
     from d2rpick.histories.selection import Selection
-    from d2rpick.histories.source import Content, Source
+    from d2rpick.histories.source import Source
 
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
@@ -63,13 +64,15 @@ class Glstat(SolverFile):
     parts: tuple[Part, ...] = ()
     digits = 6
 
-    def __init__(self, data: Content, source: str, needed: Sequence[str] = ()) -> None:
+    def __init__(self, data: bytes | Content, source: str, needed: Sequence[str] = ()) -> None:
         self.source = source
         self.title, self.version, begin = head(data)
         self._blocks = Blocks(data, source, begin, _GRAMMAR)
         self.channels = self._names()
+        names = [_TIME]
         with suppress(FormatError):  # that there is no such line is said when it is read
-            self._blocks.admit_rest([_TIME, *(self.find(name) for name in needed or self.channels)])
+            names += [self.find(name) for name in needed or self.channels]
+            self._blocks.admit_rest(names)
         if not self.version and not self._blocks.states:
             raise FormatError(
                 f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is no glstat; "
@@ -81,7 +84,8 @@ class Glstat(SolverFile):
             self.notes += ("the file stops before the time of its next state",)
         if not self.version:
             self.notes += ("the file has no head; what stands before its first time line was left out",)
-        self.time = self._blocks.numbers([_TIME])[:, 0]
+        self._columns = self._read(names)
+        self.time = self._columns[_TIME]
 
     @property
     def part_time(self) -> Samples:
@@ -90,11 +94,21 @@ class Glstat(SolverFile):
 
     def channel(self, name: str) -> Samples:
         """Values of the line ``name``, shape (n,); FormatError unless every state has a number in one such line."""
-        return self._blocks.numbers([name])[:, 0]
+        if name not in self._columns:
+            self._columns[name] = self._blocks.numbers([name])[:, 0]
+        return self._columns[name]
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> NoReturn:  # noqa: ARG002  as a Database
         """Refused: a glstat knows the model as a whole only."""
         raise self._no_parts()
+
+    def _read(self, names: list[str]) -> dict[str, Samples]:
+        """Columns read in one pass; where one cannot be, the time alone, and why is said when it is asked for."""
+        try:
+            columns = self._blocks.numbers(names)
+        except FormatError:
+            names, columns = [_TIME], self._blocks.numbers([_TIME])
+        return dict(zip(names, columns.T, strict=True))
 
     def _no_parts(self) -> FormatError:
         return FormatError(f"{self.source}: a glstat has no parts; add the matsum of the run")

@@ -7,7 +7,6 @@ only ones that fit are taken, and the candidates listed where more than one does
 from __future__ import annotations
 
 import io
-import mmap
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
@@ -49,7 +48,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]
 
 
 def _opened_leg(source: Source, selection: Selection) -> Database:
-    file = Path(source.name) if isinstance(source.data, mmap.mmap) else io.BytesIO(source.data)
+    file = io.BytesIO(source.data) if isinstance(source.data, bytes) else Path(source.data.path)
     branches = {} if selection.time or selection.energy else _branches(file, source.name)
     return SavedBinout(source.name, branches) if branches else Columns(file, source.name, selection)
 

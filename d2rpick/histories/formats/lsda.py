@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
+from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.formats.repeat import Pattern, repeats
 
 if TYPE_CHECKING:
@@ -30,14 +31,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.source import Content
-
 DIRECTORY: Final = 2
 VARIABLE: Final = 3
 _COMMANDS: Final = range(1, 8)
 
 _FIELDS: Final = {1: "B", 2: "H", 4: "I", 8: "Q"}
 _TYPES: Final = {1: "i1", 2: "i2", 3: "i4", 4: "i8", 5: "u1", 6: "u2", 7: "u4", 8: "u8", 9: "f4", 10: "f8"}
+
+# Head, type and name of a variable are not longer than this; more around them is read with them.
+_HEAD: Final = 1 << 9
+_AROUND: Final = 1 << 16
 
 # Fewer repetitions than these are walked faster than they are compared by arrays.
 _WORTH: Final = 64
@@ -115,7 +118,7 @@ class Lsda:
 
     Parameters
     ----------
-    content : bytes-like
+    content : bytes or Content
         The whole file.
     source : str
         Name of the file, for messages.
@@ -142,8 +145,8 @@ class Lsda:
         If the file does not begin with an LSDA header.
     """
 
-    def __init__(self, content: Content, source: str, branches: Collection[str]) -> None:
-        self.data = memoryview(content).cast("B")
+    def __init__(self, content: bytes | Content, source: str, branches: Collection[str]) -> None:
+        self.data = content_of(content)
         self.source = source
         self.visits = {branch: Visits() for branch in branches}
         self.metadata: dict[str, list[tuple[int, int]]] = {branch: [] for branch in branches}
@@ -157,31 +160,33 @@ class Lsda:
 
     def read(self, positions: NDArray[np.int64], dtype: np.dtype[Any]) -> NDArray[Any]:
         """Values at any bytes of the file, in the shape of ``positions``."""
-        places = max(0, len(self.data) - dtype.itemsize + 1)
-        # A view with one, mostly unaligned, element for each byte: no copy of the file is made.
-        anywhere: NDArray[Any] = np.ndarray((places,), dtype, buffer=self.data, strides=(1,))
-        return np.asarray(anywhere[positions])
+        found = self.data.fields(positions.ravel(), dtype.itemsize)
+        return np.asarray(found.view(dtype).reshape(positions.shape))
 
     def raw(self, start: int, variable: Variable) -> bytes:
         """Bytes of one variable in the directory that starts at byte ``start``."""
         begin = start + variable.offset
-        return bytes(self.data[begin : begin + variable.count * variable.dtype.itemsize])
+        return self.data[begin : begin + variable.count * variable.dtype.itemsize]
 
     def _walk(self, position: int) -> None:
         data, unpack, head = self.data, self._head.unpack_from, self._head.size
         size, name_length = len(data), head + self._type.size
+        near, base = b"", 0  # the bytes around the position
         path: tuple[str, ...] = ()
         number, start, records, command = -1, position, list[bytes](), 0
         anchors: dict[tuple[str, ...], int] = {}  # where the last state of each branch began
         while position + head <= size:
-            length, command = unpack(data, position)
+            at = position - base
+            if at + _HEAD > len(near):
+                near, base, at = data[position : position + _AROUND], position, 0
+            length, command = unpack(near, at)
             end = position + length
             if length < head or end > size or command not in _COMMANDS:
                 break
             if command == DIRECTORY:
                 self._leave(path, number, start, records)
                 records = []
-                text = bytes(data[position + head : end])
+                text = data[position + head : end]
                 if not text.isascii() or not text.decode().isprintable():
                     break
                 entered = _resolved(path, text.decode())
@@ -201,10 +206,9 @@ class Lsda:
                     records, command = list(form.heads), VARIABLE
                     end = start + form.length
             elif command == VARIABLE and length > name_length:
-                name_at = position + name_length
-                records.append(bytes(data[position : min(end, name_at + 1 + data[name_at])]))
+                records.append(near[at : min(at + length, at + name_length + 1 + near[at + name_length])])
             else:
-                records.append(bytes(data[position : position + head]))
+                records.append(near[at : at + head])
             position = end
         self._leave(path, number, start, records)
         if position < size:
@@ -296,18 +300,19 @@ class Lsda:
         """Which bytes from one record to another are structure, and where states are numbered."""
         fixed = np.zeros(end - begin, dtype=np.uint8)
         numbers = []
+        block = self.data[begin:end]
         head, position = self._head.size, begin
         while position < end:
-            length, command = self._head.unpack_from(self.data, position)
             at = position - begin
+            length, command = self._head.unpack_from(block, at)
             kept = head
             if command == DIRECTORY:
                 kept = length
             elif command == VARIABLE and length > head + self._type.size:
-                kept = head + self._type.size + 1 + self.data[position + head + self._type.size]
+                kept = head + self._type.size + 1 + block[at + head + self._type.size]
             fixed[at : at + min(kept, length)] = 0xFF
             if command == DIRECTORY:
-                state = _STATE.search(bytes(self.data[position + head : position + length]))
+                state = _STATE.search(block[at + head : at + length])
                 if state:
                     numbers.append((at + head + state.start(1), len(state[1])))
                     fixed[at + head + state.start(1) : at + length] = 0
@@ -315,9 +320,9 @@ class Lsda:
         return Pattern(fixed, tuple(numbers))
 
 
-def _header(data: memoryview, source: str) -> tuple[int, str, struct.Struct, struct.Struct]:
+def _header(data: Content, source: str) -> tuple[int, str, struct.Struct, struct.Struct]:
     """Where the records begin, the byte order, how a record begins and how a type is written."""
-    header = bytes(data[:8])
+    header = data[:8]
     if not recognises(header):
         raise FormatError(
             f"{source}: begins with {header.hex(' ')}, the header of a binout was expected; name another file"

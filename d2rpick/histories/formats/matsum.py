@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple, NoReturn
 
 import numpy as np
@@ -23,9 +24,10 @@ from d2rpick.histories.history import Part
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from d2rpick.histories.content import Content
     from d2rpick.histories.history import Samples
     from d2rpick.histories.selection import Selection
-    from d2rpick.histories.source import Content, Source
+    from d2rpick.histories.source import Source
 
 QUANTITIES: Final[Mapping[str, str]] = {
     "internal_energy": "inten",
@@ -77,11 +79,18 @@ class Matsum(SolverFile):
     channels: tuple[str, ...] = ()
     digits = 5
 
-    def __init__(self, data: Content, source: str) -> None:
+    def __init__(self, data: bytes | Content, source: str) -> None:
         self.title, self.version, begin = head(data)
         self.source = source
         self._legend = _legend(data)
-        grammar = Grammar(_START, self._describe, self._is_whole, width=13, decimals=4, compare_all=False)
+        grammar = Grammar(
+            _START,
+            partial(_describe, self._legend),
+            partial(_is_whole, self._legend),
+            width=13,
+            decimals=4,
+            compare_all=False,
+        )
         self._blocks = Blocks(data, source, begin, grammar)
         if not self.version and not self._blocks.states:
             raise FormatError(
@@ -147,54 +156,11 @@ class Matsum(SolverFile):
             remarks.append("parts whose number is damaged or too wide for its columns were left out")
         return tuple(remarks)
 
-    def _is_whole(self, layout: Layout) -> bool:
-        """Judge a state that stands alone: only the legend can tell."""
-        return bool(self._legend) and all((id_, _MAT) in layout.fields for id_ in self._legend)
 
-    def _describe(self, block: bytes) -> Layout:
-        literal = np.full(len(block), 255, np.uint8)
-        behind = 0
-        fields: dict[tuple[int | None, str], int] = {}
-        part: int | None = None
-        doubled = False
-        name = _TIME
-        for line in _LINE.finditer(block):
-            release(literal, block, _CHANGING, behind, line.start())
-            first, behind = line.span()
-            if line[1] is not None:
-                part = self._part_number(line[1], block)
-                doubled = (part, _MAT) in fields
-                if doubled:  # two groups of lines: neither is sure
-                    fields.update({field: UNSURE for field in fields if field[0] == part})
-                fields[part, _MAT] = UNSURE if doubled else first - 1  # with the line end before it
-            for field in _FIELD.finditer(block, first, behind):
-                name = (part, field[1].decode())
-                if field[2] is None or doubled or name in fields:
-                    fields[name] = UNSURE
-                else:
-                    literal[field.start(2) : field.end(2)] = 0
-                    fields[name] = field.start(2)
-        release(literal, block, _CHANGING, behind, len(block))
-        return Layout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
-
-    def _part_number(self, text: bytes, block: bytes) -> int:
-        """Find the number of the part whose line goes on with ``text``.
-
-        A single overflowed number is the single one of the legend that is too wide; of several, it could
-        not be told which is which.
-        """
-        if match := _ID.match(text):
-            return int(match[1])
-        wide = [id_ for id_ in self._legend if id_ > _WIDEST]
-        if _OVERFLOW.match(text) and len(wide) == 1 and block.count(b"\n mat.#=*") == 1:
-            return wide[0]
-        return _UNREADABLE
-
-
-def _legend(data: Content) -> dict[int, str]:
+def _legend(data: bytes | Content) -> dict[int, str]:
     """Titles of the parts by number, in the order of the legend."""
-    first_state = data.find(b"\n" + _START, 0, _LONGEST)
-    match = _LEGEND.search(data, 0, first_state if first_state >= 0 else _LONGEST)
+    first_state = data.find(b"\n" + _START)
+    match = _LEGEND.search(data[: min(first_state, _LONGEST) if first_state >= 0 else _LONGEST])
     entries = _ENTRY.findall(match[1]) if match else []
     return {int(id_): title.decode("latin-1").strip() for id_, title in entries}
 
@@ -230,3 +196,49 @@ def _written(number: int, internal: float, kinetic: float, x_momentum: float, z_
         f" x-rbv={0:13.4E}     y-rbv={0:13.4E}     z-rbv={0:13.4E}\n"
         f"                         hgeng={0:13.4E}     +mass={0:13.4E}     eroded_he={0:13.4E}\n"
     )
+
+
+def _is_whole(legend: Mapping[int, str], layout: Layout) -> bool:
+    """Judge a state that stands alone: only the legend can tell."""
+    return bool(legend) and all((id_, _MAT) in layout.fields for id_ in legend)
+
+
+def _describe(legend: Mapping[int, str], block: bytes) -> Layout:
+    literal = np.full(len(block), 255, np.uint8)
+    behind = 0
+    fields: dict[tuple[int | None, str], int] = {}
+    part: int | None = None
+    doubled = False
+    name = _TIME
+    for line in _LINE.finditer(block):
+        release(literal, block, _CHANGING, behind, line.start())
+        first, behind = line.span()
+        if line[1] is not None:
+            part = _part_number(legend, line[1], block)
+            doubled = (part, _MAT) in fields
+            if doubled:  # two groups of lines: neither is sure
+                fields.update({field: UNSURE for field in fields if field[0] == part})
+            fields[part, _MAT] = UNSURE if doubled else first - 1  # with the line end before it
+        for field in _FIELD.finditer(block, first, behind):
+            name = (part, field[1].decode())
+            if field[2] is None or doubled or name in fields:
+                fields[name] = UNSURE
+            else:
+                literal[field.start(2) : field.end(2)] = 0
+                fields[name] = field.start(2)
+    release(literal, block, _CHANGING, behind, len(block))
+    return Layout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
+
+
+def _part_number(legend: Mapping[int, str], text: bytes, block: bytes) -> int:
+    """Find the number of the part whose line goes on with ``text``.
+
+    A single overflowed number is the single one of the legend that is too wide; of several, it could
+    not be told which is which.
+    """
+    if match := _ID.match(text):
+        return int(match[1])
+    wide = [id_ for id_ in legend if id_ > _WIDEST]
+    if _OVERFLOW.match(text) and len(wide) == 1 and block.count(b"\n mat.#=*") == 1:
+        return wide[0]
+    return _UNREADABLE

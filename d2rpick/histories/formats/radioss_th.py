@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
+from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.database import DIGITS, SolverFile
 from d2rpick.histories.history import Part
 from d2rpick.histories.names import listing, plain_text
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
     from d2rpick.histories.selection import Selection
-    from d2rpick.histories.source import Content, Source
+    from d2rpick.histories.source import Source
 
 _INT: Final = struct.Struct(">i")
 _WIDTH: Final = 4  # bytes of a number, and of the length before and behind a record
@@ -84,7 +85,7 @@ class TimeHistory(SolverFile):
 
     Parameters
     ----------
-    content : bytes-like
+    content : bytes or Content
         The whole file.
     source : str
         Name of the file, for messages.
@@ -98,8 +99,8 @@ class TimeHistory(SolverFile):
     format = "radioss-th"
     digits = DIGITS[_WIDTH]
 
-    def __init__(self, content: Content, source: str) -> None:
-        self._data = memoryview(content).cast("B")
+    def __init__(self, content: bytes | Content, source: str) -> None:
+        self._data = content_of(content)
         self.source = source
         self._head = _Records(self._data, source).head()
         self._states, stop = self._whole_states()
@@ -130,13 +131,13 @@ class TimeHistory(SolverFile):
     @cached_property
     def time(self) -> Samples:
         """Times of all states, shape (n,) [time]."""
-        return self._column(0, 0)
+        return self._columns(0, [0])[:, 0]
 
     def channel(self, name: str) -> Samples:
         """One global variable, shape (n,)."""
         if name not in self._head.globals:
             raise FormatError(f"{self.source}: no global {name}, there are {listing(self._head.globals, most=30)}")
-        return self._column(1, self._head.globals.index(name))
+        return self._columns(1, [self._head.globals.index(name)])[:, 0]
 
     @property
     def part_time(self) -> Samples:
@@ -151,11 +152,8 @@ class TimeHistory(SolverFile):
         FormatError
             If a part is not in the file, or without this variable.
         """
-        columns = np.empty((self._states, len(ids)))
         record = 1 + bool(self._head.globals)
-        for column, id_ in enumerate(ids):
-            columns[:, column] = self._column(record, self._place(id_, quantity))
-        return columns
+        return self._columns(record, [self._place(id_, quantity) for id_ in ids])
 
     def _place(self, id_: int, quantity: str) -> int:
         place = self._head.columns.get((id_, quantity))
@@ -166,36 +164,38 @@ class TimeHistory(SolverFile):
             raise FormatError(f"{self.source}: no {quantity} of part {id_}, {there}; ask for it with /TH/PART")
         return place
 
-    def _column(self, record: int, place: int) -> Samples:
-        lengths = self._head.lengths
-        before = sum(length + 2 * _WIDTH for length in lengths[:record]) + _WIDTH * (1 + place)
-        return self._strided(">f4", before, self._states).astype(np.float64)
+    def _columns(self, record: int, places: Sequence[int]) -> Samples:
+        """Some numbers of one record of each state, shape (n, places)."""
+        before = sum(length + 2 * _WIDTH for length in self._head.lengths[:record]) + _WIDTH
+        return self._numbers(">f4", [before + _WIDTH * place for place in places], self._states).astype(np.float64)
 
-    def _strided(self, dtype: str, offset: int, states: int) -> NDArray[Any]:
-        """One number of each state, as a view of the file."""
+    def _numbers(self, dtype: str, offsets: Sequence[int], states: int) -> NDArray[Any]:
+        """Numbers at some bytes of each of the first states, shape (states, offsets)."""
         stride = sum(length + 2 * _WIDTH for length in self._head.lengths)
-        if not states:
-            return np.empty(0, dtype)
-        return np.ndarray((states,), dtype, buffer=self._data, offset=self._head.size + offset, strides=(stride,))
+        starts = self._head.size + stride * np.arange(states)
+        addresses = np.add.outer(starts, np.array(offsets, np.int64))
+        return self._data.fields(addresses.ravel(), _WIDTH).view(dtype).reshape(addresses.shape)
 
     def _whole_states(self) -> tuple[int, tuple[str, ...]]:
         """Count the states; the file may stop inside one, but nothing else may stand between them.
 
         Records carry no name or number: where one is lost or put in, no state of the file is above suspicion.
         """
-        stride = sum(length + 2 * _WIDTH for length in self._head.lengths)
+        lengths = np.array(self._head.lengths)
+        ends = np.cumsum(lengths + 2 * _WIDTH)
+        stride = int(ends[-1])
         states, rest = divmod(len(self._data) - self._head.size, stride)
-        place = 0
-        for length in self._head.lengths:
-            for mark in (place, place + _WIDTH + length):
-                seen = states + (mark + _WIDTH <= rest)
-                bad = np.flatnonzero(self._strided(">i4", mark, seen) != length)
-                if bad.size:
-                    begin = self._head.size + int(bad[0]) * stride
-                    where = f"{self.source}: state {bad[0] + 1}: a record of {length} bytes was expected"
-                    cure = f"if the states before are good, cut the file to {begin} bytes"
-                    raise FormatError(f"{where} at byte {begin + place}; {cure}")
-            place += length + 2 * _WIDTH
+        marks = np.stack([ends - lengths - 2 * _WIDTH, ends - _WIDTH], axis=1).ravel()
+        places = np.add.outer(self._head.size + stride * np.arange(states + 1), marks).ravel()
+        places = places[places + _WIDTH <= len(self._data)]
+        found = self._data.fields(places, _WIDTH).view(">i4").ravel()
+        bad = np.flatnonzero(found != np.resize(np.repeat(lengths, 2), found.size))
+        if bad.size:
+            state, mark = divmod(int(bad[0]), marks.size)
+            begin = self._head.size + state * stride
+            where = f"{self.source}: state {state + 1}: a record of {lengths[mark // 2]} bytes was expected"
+            cure = f"if the states before are good, cut the file to {begin} bytes"
+            raise FormatError(f"{where} at byte {begin + marks[2 * (mark // 2)]}; {cure}")
         stop = f"{self.source}: the file stops inside state {states + 1}, which was left out"
         return states, (stop,) if rest else ()
 
@@ -209,7 +209,7 @@ class TimeHistory(SolverFile):
 class _Records:
     """The records of the head, taken one after the other."""
 
-    def __init__(self, data: memoryview, source: str) -> None:
+    def __init__(self, data: Content, source: str) -> None:
         self._data = data
         self._source = source
         self._at = 0
@@ -300,14 +300,14 @@ class _Records:
     def _next(self, length: int | None = None) -> bytes:
         """Take one record, of a known length if it is given."""
         begin = self._at + _WIDTH
-        found = _INT.unpack_from(self._data, self._at)[0] if begin <= len(self._data) else -1
+        found = _INT.unpack(self._data[self._at : begin])[0] if begin <= len(self._data) else -1
         end = begin + found
-        if found < 0 or end + _WIDTH > len(self._data) or _INT.unpack_from(self._data, end)[0] != found:
+        if found < 0 or end + _WIDTH > len(self._data) or _INT.unpack(self._data[end : end + _WIDTH])[0] != found:
             raise self._broken("a whole record")
         if length is not None and found != length:
             raise self._broken(f"a record of {length} bytes")
         self._at = end + _WIDTH
-        return bytes(self._data[begin:end])
+        return self._data[begin:end]
 
     def _broken(self, expected: str) -> FormatError:
         return FormatError(

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from d2rpick.histories.content import Content
+
 # A block longer than this is left to the walk, and no more than this is compared at a time.
 _LONGEST: Final = 1 << 22
 _CHUNK: Final = 1 << 18
@@ -29,7 +31,7 @@ class Pattern:
     numbers: tuple[tuple[int, int], ...]
 
 
-def repeats(data: memoryview, begin: int, pattern: Pattern) -> tuple[int, list[int]]:
+def repeats(data: Content, begin: int, pattern: Pattern) -> tuple[int, list[int]]:
     """Count the whole repetitions that follow the block at ``begin`` without a gap.
 
     Returns
@@ -41,7 +43,8 @@ def repeats(data: memoryview, begin: int, pattern: Pattern) -> tuple[int, list[i
 
     Examples
     --------
-    >>> blocks = memoryview(b"[d01:x][d02:y][d03:z][d05:x]")
+    >>> from d2rpick.histories.content import Content
+    >>> blocks = Content(b"[d01:x][d02:y][d03:z][d05:x]")
     >>> fixed = np.frombuffer(b"~~00~0~", dtype=np.uint8) // 126 * 255
     >>> repeats(blocks, 0, Pattern(fixed, ((2, 2),)))
     (2, [1])
@@ -50,15 +53,16 @@ def repeats(data: memoryview, begin: int, pattern: Pattern) -> tuple[int, list[i
     total = (len(data) - begin) // stride
     if stride > _LONGEST or total < 2:
         return 0, []
-    blocks = np.frombuffer(data, dtype=np.uint8, count=total * stride, offset=begin).reshape(total, stride)
-    first = _decimals(blocks[:1], pattern.numbers)
-    steps = _decimals(blocks[1:2], pattern.numbers) - first
+    example, following = data.view(begin, begin + 2 * stride).reshape(2, stride).copy()
+    first = _decimals(example[None], pattern.numbers)
+    steps = _decimals(following[None], pattern.numbers) - first
     if steps.min(initial=1) < 1:
         return 0, []
     done, rows = 1, 1
     while done < total:
-        chunk = blocks[done : done + rows]
-        differs = ((chunk ^ blocks[0]) & pattern.fixed).max(axis=1) > 0
+        rows = min(rows, total - done)
+        chunk = data.view(begin + done * stride, begin + (done + rows) * stride).reshape(rows, stride)
+        differs = ((chunk ^ example) & pattern.fixed).max(axis=1) > 0
         expected = first + steps * np.arange(done, done + len(chunk))[:, None]
         differs |= (_decimals(chunk, pattern.numbers) != expected).any(axis=1)
         if differs.any():

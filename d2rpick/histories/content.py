@@ -1,0 +1,262 @@
+"""The bytes of one file as they were when it was opened, whatever becomes of the file meanwhile.
+
+A running solver appends to its files, and one that is started again cuts them and writes them anew.  Bytes behind the
+size seen at opening do not count; a file that was cut or written anew while it was read is an error.  Files are not
+mapped into memory: where a mapped page is cut off, the system ends the process.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+import time
+from array import array
+from io import FileIO
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.errors import FormatError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Bytes = NDArray[np.uint8]
+    Addresses = NDArray[np.int64]
+
+_BLOCK: Final = 1 << 19  # bytes read at a time where many are wanted: they stay in the cache while they are used
+_NEAR: Final = 1 << 13  # bytes between two that are read together: a call of the system costs more than these
+_WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, mostly behind them
+_HELD: Final = 1 << 24  # a file up to this size is held in memory
+_TRIES: Final = 5  # readings of a small file that changes all the time
+_TICK: Final = 50_000_000  # [ns] above the resolution of any file's times: later changes show in them
+
+
+class Content:
+    """Bytes held in memory."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+
+    def __len__(self) -> int:
+        return len(self._data)
+
+    def __bytes__(self) -> bytes:
+        return self._data
+
+    def __getitem__(self, where: slice) -> bytes:
+        return self._data[where]
+
+    def find(self, wanted: bytes, begin: int = 0) -> int:
+        """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
+        return self._data.find(wanted, begin)
+
+    def view(self, begin: int, end: int) -> Bytes:
+        """Bytes from one address to another, shape (end - begin,)."""
+        return np.frombuffer(self._data, np.uint8)[begin:end]
+
+    def fields(self, addresses: Addresses, width: int) -> Bytes:
+        """Bytes at many addresses, ``width`` of each, shape (n, width)."""
+        return _gathered(self.view(0, len(self)), addresses, width)
+
+
+def content_of(data: bytes | Content) -> Content:
+    """Content of bytes, whether they are held in memory or not."""
+    return Content(data) if isinstance(data, bytes) else data
+
+
+class OnDisk(Content):
+    """Bytes of a file that are read when they are asked for.
+
+    What was read is remembered by sums: where the file has changed since, all of it is read again and compared, so
+    that no numbers of two different states of the file come together.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, for messages.
+    file : int
+        Its descriptor, which is closed with this object.
+    """
+
+    def __init__(self, name: str, file: int) -> None:
+        self._name, self._number = name, file
+        self._file = FileIO(file, closefd=False)
+        self._seen = _State.of(self._file)
+        self._size = self._seen.size
+        self._views = array("Q")  # begin, end and sum of what was looked at
+        self._fields: list[tuple[Addresses, int, int]] = []  # addresses, width and sum of what was taken
+        self._window, self._begin = b"", 0
+        self._buffer = np.empty(2 * _BLOCK, np.uint8)  # used again and again: fresh memory costs more than reading
+        self._digest = ""
+
+    def __del__(self) -> None:
+        os.close(self._number)
+
+    def __len__(self) -> int:
+        return self._size
+
+    def __bytes__(self) -> bytes:
+        data = self.view(0, self._size).tobytes()
+        self._check()
+        return data
+
+    def __getitem__(self, where: slice) -> bytes:
+        begin, end, _ = where.indices(self._size)
+        at = begin - self._begin
+        if begin < end and (at < 0 or end > self._begin + len(self._window)):
+            if end - begin > _WINDOW:
+                return self.view(begin, end).tobytes()
+            self._window = self.view(begin, min(begin + _WINDOW, self._size)).tobytes()
+            self._begin, at = begin, 0
+        return self._window[at : at + end - begin] if begin < end else b""
+
+    @property
+    def path(self) -> str:
+        """Name under which another reader opens this very file, even if another one has taken its name."""
+        path = f"/proc/{os.getpid()}/fd/{self._number}"
+        return path if os.path.exists(path) else self._name  # noqa: PTH110  start-up
+
+    def find(self, wanted: bytes, begin: int = 0) -> int:
+        """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
+        for at in range(begin, self._size, _BLOCK):
+            found = self[at : at + _BLOCK + len(wanted) - 1].find(wanted)
+            if found >= 0:
+                return at + found
+        return -1
+
+    def view(self, begin: int, end: int) -> Bytes:
+        """Bytes from one address to another, shape (end - begin,); valid up to the next call."""
+        data = self._near(begin, end)
+        self._views.extend((begin, end, _sum(data)))
+        return data
+
+    def fields(self, addresses: Addresses, width: int) -> Bytes:
+        """Bytes at many addresses, ``width`` of each, shape (n, width); FormatError when the file has changed."""
+        if np.any(addresses[1:] < addresses[:-1]):
+            order = np.argsort(addresses, kind="stable")
+            found = np.empty((addresses.size, width), np.uint8)
+            found[order] = self.fields(addresses[order], width)
+            return found
+        found = self._in_order(addresses, width)
+        self._fields.append((addresses, width, _sum(found.ravel())))
+        self._check()
+        return found
+
+    def _near(self, begin: int, end: int) -> Bytes:
+        fits = end - begin <= self._buffer.size
+        data = self._buffer[: end - begin] if fits else np.empty(end - begin, np.uint8)
+        self._fill(data.data, begin)
+        return data
+
+    def _in_order(self, addresses: Addresses, width: int) -> Bytes:
+        """Read what lies close together in one piece, and what lies alone by itself."""
+        found = np.empty((addresses.size, width), np.uint8)
+        apart = (np.diff(addresses) > _NEAR) | (np.diff(addresses // _BLOCK) > 0)
+        firsts = np.flatnonzero(np.append(True, apart)) if addresses.size else np.empty(0, np.int64)
+        ends = np.append(firsts[1:], addresses.size)
+        several = ends - firsts > 1
+        for first, end in zip(firsts[several].tolist(), ends[several].tolist(), strict=True):
+            low = int(addresses[first])
+            near = self._near(low, int(addresses[end - 1]) + width)
+            found[first:end] = _gathered(near, addresses[first:end] - low, width)
+        alone, room = firsts[~several], found.reshape(-1).data
+        for place, address in zip((alone * width).tolist(), addresses[alone].tolist(), strict=True):
+            self._fill(room[place : place + width], address)
+        return found
+
+    def sha256(self) -> str:
+        """SHA-256 of the bytes, of which those that were used are the same as then; FormatError where they are not."""
+        if not self._digest:
+            import hashlib
+
+            digest = hashlib.sha256()
+            for begin in range(0, self._size, _BLOCK):
+                digest.update(self.view(begin, min(begin + _BLOCK, self._size)).data)
+            self._check()
+            self._digest = digest.hexdigest()
+        return self._digest
+
+    def _fill(self, room: memoryview, begin: int) -> None:
+        """Read as many bytes as there is room."""
+        self._file.seek(begin)
+        done = self._file.readinto(room)
+        while done < len(room):  # a single call gives 2 GB at most
+            more = self._file.readinto(room[done:])
+            if not more:
+                raise FormatError(
+                    f"{self._name}: the file was {self._size} bytes long and became shorter while it was read; "
+                    "is a solver writing it anew? Read it again when it has"
+                )
+            done += more
+
+    def _check(self) -> None:
+        """Make sure that what was read so far is all of one state of the file."""
+        now = _State.of(self._file)
+        if now == self._seen and now.settled:
+            return
+        if now.size < self._size or not self._is_as_before():
+            raise FormatError(
+                f"{self._name}: the file was written anew while it was read; read it again when it is whole"
+            )
+        self._seen = now
+
+    def _is_as_before(self) -> bool:
+        """Whether everything that was read is still the same."""
+        views = zip(*(self._views[part::3] for part in range(3)), strict=True)
+        return all(_sum(self._near(begin, end)) == known for begin, end, known in views) and all(
+            _sum(self._in_order(addresses, width).ravel()) == known for addresses, width, known in self._fields
+        )
+
+
+def stored(name: str) -> bytes | OnDisk:
+    """Content of a file: as bytes where it is small or no regular file.
+
+    Raises
+    ------
+    FormatError
+        If a small file changes all the time.
+    """
+    with open(name, "rb", buffering=0) as file:  # noqa: PTH123
+        found = os.fstat(file.fileno())
+        if not stat.S_ISREG(found.st_mode):
+            return file.read()
+        if found.st_size > _HELD:
+            return OnDisk(name, os.dup(file.fileno()))
+        for _ in range(_TRIES):
+            file.seek(0)
+            before, data = _State.of(file), file.read()
+            if before.settled and before == _State.of(file):
+                return data
+            file.seek(0)
+            if file.read(len(data)) == data:
+                return data
+    raise FormatError(f"{name}: the file changes all the time while it is read; read it again when it is whole")
+
+
+class _State(NamedTuple):
+    """What tells whether a file has changed; ``settled`` when a change after it would have shown."""
+
+    size: int
+    modified: int
+    changed: int
+    settled: bool
+
+    @classmethod
+    def of(cls, file: FileIO) -> _State:
+        found = os.fstat(file.fileno())
+        latest = max(found.st_mtime_ns, found.st_ctime_ns)
+        return cls(found.st_size, found.st_mtime_ns, found.st_ctime_ns, time.time_ns() - latest > _TICK)
+
+
+def _sum(data: Bytes) -> int:
+    """Sum of the 64-bit words and of the bytes behind the last one."""
+    behind = data.size % 8
+    words = data[: data.size - behind].view(np.uint64)
+    return (int(words.sum()) + int.from_bytes(data[data.size - behind :].tobytes())) % 2**64
+
+
+def _gathered(data: Bytes, addresses: Addresses, width: int) -> Bytes:
+    # every address seen as the start of a field: fetching is then plain indexing
+    fields = np.ndarray((max(0, data.size - width + 1),), f"V{width}", data, strides=(1,))
+    return fields[addresses].view(np.uint8).reshape(-1, width)

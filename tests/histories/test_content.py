@@ -1,0 +1,172 @@
+"""The bytes of files that are appended to, cut, replaced or written anew while they are read."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from itertools import cycle
+from threading import Event, Thread
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.errors import FormatError
+from d2rpick.histories import content
+from d2rpick.histories.content import Content, OnDisk, stored
+from d2rpick.histories.opening import Selection, open_run, read_history
+from tests.histories.test_source import CONTENTS
+from tests.text_files import glstat_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+STATES = np.arange(400)
+ONE, OTHER = (glstat_text(STATES / 8, energy + STATES) for energy in (1000.0, 2000.0))
+
+
+@pytest.fixture
+def on_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Treat every file as a big one, and read it in small pieces."""
+    for name, size in (("_HELD", 0), ("_BLOCK", 256), ("_NEAR", 32), ("_WINDOW", 64)):
+        monkeypatch.setattr(content, name, size)
+
+
+def opened(file: Path) -> OnDisk:
+    found = stored(str(file))
+    assert isinstance(found, OnDisk)
+    return found
+
+
+@pytest.mark.usefixtures("on_disk")
+@given(
+    st.binary(min_size=8, max_size=3000),
+    st.lists(st.integers(0, 2995), max_size=60),
+    st.integers(1, 8),
+    st.integers(-5, 3005),
+    st.integers(0, 3005),
+)
+def test_bytes_on_a_disk_are_those_in_memory(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes, places: list[int], width: int, begin: int, size: int
+) -> None:
+    file = tmp_path_factory.getbasetemp() / "bytes"
+    file.write_bytes(data)
+    held, there = Content(data), opened(file)
+    addresses = np.array([place % (len(data) - width + 1) for place in places], dtype=np.int64)
+    assert there.fields(addresses, width).tolist() == held.fields(addresses, width).tolist()
+    assert (len(there), bytes(there), there[begin:size]) == (len(held), data, held[begin:size])
+    assert there.view(0, len(data)).tobytes() == data
+    assert there.find(data[-5:], len(data) // 3) == data.find(data[-5:], len(data) // 3)
+    assert there.find(b"not there") == -1
+    assert there.sha256() == hashlib.sha256(data).hexdigest()
+
+
+@pytest.mark.parametrize("kind", CONTENTS)
+def test_every_format_is_read_alike_from_a_disk_and_from_memory(
+    kind: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    file = tmp_path / "run"
+    file.write_bytes(CONTENTS[kind])
+    held = open_run([str(file)])
+    request.getfixturevalue("on_disk")
+    there = open_run([str(file)])
+    assert (held.notes, held.parts) == (there.notes, there.parts)
+    for found, expected in zip(there.databases, held.databases, strict=True):
+        assert found.channels == expected.channels
+        for name in expected.channels:
+            assert found.channel(name).tolist() == expected.channel(name).tolist()
+        ids = [part.id for part in expected.parts]
+        for wanted in (ids, ids[::-1]) if ids else ():
+            columns = [one.part_channel("internal_energy", wanted).tolist() for one in (found, expected)]
+            assert columns[0] == columns[1]
+    assert there.files[0].sha256() == hashlib.sha256(CONTENTS[kind]).hexdigest()
+
+
+@pytest.mark.usefixtures("on_disk")
+def test_what_is_appended_does_not_count(tmp_path: Path) -> None:
+    file = tmp_path / "glstat"
+    file.write_bytes(ONE)
+    run = open_run([str(file)])
+    with file.open("ab") as more:
+        more.write(OTHER)
+    history = run.history(Selection())
+    assert history.energy.tolist() == (1000.0 + STATES).tolist()
+    assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()
+
+
+@pytest.mark.usefixtures("on_disk")
+def test_a_file_replaced_by_another_is_read_as_it_was(tmp_path: Path) -> None:
+    file, newer = tmp_path / "glstat", tmp_path / "newer"
+    file.write_bytes(ONE)
+    run = open_run([str(file)])
+    newer.write_bytes(OTHER)
+    newer.replace(file)
+    history = run.history(Selection())
+    assert history.energy.tolist() == (1000.0 + STATES).tolist()
+    assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()
+
+
+@pytest.mark.usefixtures("on_disk")
+@pytest.mark.parametrize(("rest", "reason"), [(b"", "became shorter|written anew"), (OTHER, "written anew")])
+def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, rest: bytes, reason: str) -> None:
+    file = tmp_path / "glstat"
+    file.write_bytes(ONE)
+    run = open_run([str(file)])
+    file.write_bytes(rest)
+    with pytest.raises(FormatError, match=reason):
+        run.databases[0].channel("kinetic energy")
+    with pytest.raises(FormatError, match=reason):
+        run.files[0].sha256()
+
+
+@pytest.mark.parametrize("kept", [True, False], ids=["in memory", "on disk"])
+def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_an_error(
+    kept: bool, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    if not kept:
+        request.getfixturevalue("on_disk")
+    file, done = tmp_path / "glstat", Event()
+    file.write_bytes(ONE)
+
+    def write() -> None:
+        for data in cycle((OTHER, ONE, b"", ONE)):
+            mode = "r+b" if data else "wb"
+            with file.open(mode, buffering=0) as target:
+                target.write(data)
+            if done.wait(0.0005):
+                return
+
+    writer = Thread(target=write)
+    writer.start()
+    try:
+        for _ in range(60):
+            try:
+                energy = read_history([str(file)]).energy
+            except FormatError as error:
+                assert "\n" not in str(error)  # noqa: PT017
+            else:
+                assert energy.tolist() in [(offset + STATES[: energy.size]).tolist() for offset in (1000.0, 2000.0)]
+    finally:
+        done.set()
+        writer.join()
+
+
+def test_a_small_file_that_changes_later_is_signed_as_it_was_read(tmp_path: Path) -> None:
+    file = tmp_path / "glstat"
+    file.write_bytes(ONE)
+    history = read_history([str(file)])
+    file.write_bytes(OTHER)
+    assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()
+
+
+def test_a_named_pipe_is_read_once_and_signed(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = Thread(target=lambda: pipe.write_bytes(ONE))
+    writer.start()
+    history = read_history([str(pipe)])
+    writer.join()
+    assert history.energy.tolist() == (1000.0 + STATES).tolist()
+    assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()
