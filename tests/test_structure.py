@@ -142,7 +142,7 @@ UNNEEDED = {
     for name in (
         "choice.suggest_td", "vibration.part_signs", "vibration.envelope", "choice.lock_in_profile", "vibration.modes",
         "vibration.fit_several", "flight.momentum", "choice.health", "histories.energy_balance", "choice.judged_card",
-        "deck.printing.cards", "report.figures", "report.page", "report.health", "histories.formats.fixed_text",
+        "deck.printing.common", "report.figures", "report.page", "report.health", "histories.formats.fixed_text",
         "histories.formats.lsda",
     )
 } | {"pathlib", "json", "csv", "tempfile", "hashlib", "numpy.typing", "numpy.polynomial", "numpy.random"}  # fmt: skip

@@ -2,41 +2,65 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.verify import verify
-from d2rpick.deck.printing.cards import ls_dyna
+from d2rpick.deck.printing import SOLVERS, cards, solver_of
+from d2rpick.deck.printing.common import Printing
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.verify import Verdict
-    from d2rpick.deck.printing.cards import PrintedCard
+    from d2rpick.deck.printing.common import PrintedCard, Times
     from d2rpick.histories.history import History
 
 
-def judged(
-    write: Callable[[Sequence[str]], PrintedCard], history: History, settings: Settings
-) -> tuple[PrintedCard, Verdict]:
-    """Write a card, judge its times as printed, and write it again with what was found as comments."""
-    plain = write(())
-    verdict = verify(history, plain.tr, plain.td, settings)
-    return write(tuple(_remarks(verdict))), verdict
+@dataclass(frozen=True)
+class CardWish:
+    """What is known of a card before its times: ``solver`` None is the one that wrote the history.
+
+    What ``printing`` leaves open the history fills in: its chosen parts, and its end for that of the run.
+    """
+
+    solver: str | None = None
+    printing: Printing = field(default_factory=Printing)
+
+    def of(self, history: History) -> tuple[str, Printing]:
+        """Name the solver, and say what its card needs."""
+        ids = self.printing.part or tuple(part.id for part in history.parts or ())
+        end = float(history.time[-1]) if self.printing.end is None else self.printing.end
+        return self.solver or solver_of(history.format), replace(self.printing, part=ids, end=end)
 
 
-def of_parts(history: History, times: tuple[float, float], settings: Settings) -> tuple[PrintedCard, Verdict] | None:
-    """Write the LS-DYNA card of the parts that were chosen for (tr, td), judged; None where none were."""
-    if not history.parts:
+def judged_card(
+    windows: Sequence[Times], history: History, settings: Settings, wish: CardWish
+) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
+    """Print the card of windows, judge each as printed, and print it with what was found as comments.
+
+    None where nobody says whom the card switches: the chosen parts, or main nodes for a solver that asks for these.
+    """
+    solver, printing = wish.of(history)
+    if not getattr(printing, SOLVERS[solver].SWITCHES):
         return None
-    ids = [part.id for part in history.parts]
-    return judged(lambda remarks: ls_dyna(*times, ids, remarks=remarks), history, settings)
+    plain = cards(windows, printing, solver)
+    verdicts = tuple(verify(history, tr, td, settings) for tr, td in plain.windows)
+    return cards(windows, printing, solver, tuple(_remarks(verdicts))), verdicts
 
 
-def _remarks(verdict: Verdict) -> Iterator[str]:
+def _remarks(verdicts: Sequence[Verdict]) -> Iterator[str]:
+    for verdict in verdicts:
+        which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}" if len(verdicts) > 1 else ""
+        yield from _judgement(verdict, which)
+    yield from dict.fromkeys(f"{caution.code}: {caution.message}." for one in verdicts for caution in one.cautions)
+
+
+def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
     candidate, history = verdict.candidate, verdict.situation.history
     result = "verified" if verdict.verified else f"NOT verified ({'; '.join(verdict.reasons)})"
-    yield f"Judged by {', '.join(history.source)}, {history.channel}: {result}."
+    yield f"Judged by {', '.join(history.source)}, {history.channel}:{which} {result}."
     measures = [
         f"{name} {value:.3f}"
         for name, value in (
@@ -49,4 +73,3 @@ def _remarks(verdict: Verdict) -> Iterator[str]:
     ]
     if measures:
         yield f"{', '.join(measures).capitalize()}."
-    yield from (f"{caution.code}: {caution.message}." for caution in verdict.cautions)

@@ -2,161 +2,132 @@
 
 from __future__ import annotations
 
-import re
-from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli.card_options import (
+    all_cautions,
+    card_options,
+    card_wish,
+    check_solver,
+    energy_of,
+    need_ids,
+    needed,
+    numbers,
+    printing,
+)
 from d2rpick.cli.output import Output, finish
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from d2rpick.choice.settings import Settings
-    from d2rpick.choice.verify import Verdict
-    from d2rpick.choice.warnings import Caution
-    from d2rpick.deck.printing.cards import PrintedCard
+    from d2rpick.deck.printing.common import PrintedCard, Printing, Times
     from d2rpick.histories.opening import Run
-
-    Writer = Callable[[Sequence[str]], PrintedCard]
 
 EXAMPLES = """\b
 Examples:
   d2rpick card --tr 0.0135867 --td 0.0687534 --part 11,12 --merge 11
   d2rpick card --tr 0.0135867 --td 0.0687534 --part 1 --history sample_data/energy.csv
+  d2rpick card --tr 0.02 --td 0.09 --tr 0.2 --td 0.3 --part 11
   d2rpick card --solver radioss --tr 0.0135867 --td 0.0687534 --node 1001 --end 0.15
 """
 
-_RANGE: Final = re.compile(r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?", re.ASCII)
-_MOST_IDS: Final = 100_000
-_OF_SOLVER: Final = {"ls-dyna": ("merge", "swset"), "radioss": ("node", "end", "name")}
+_ONLY_JUDGED = "--part chooses by whose energy a card for {} is judged; give a --history with parts"
 
 
 @click.command("card", epilog=EXAMPLES)
-@click.option(
-    "--solver",
-    type=click.Choice(list(_OF_SOLVER)),
-    default="ls-dyna",
-    show_default=True,
-    help="Whose input is printed.",
-)
-@click.option("--tr", type=shared.TIME, required=True, metavar="T", help="Switch to rigid at this time.")
-@click.option("--td", type=shared.TIME, required=True, metavar="T", help="Switch back to deformable at this time.")
+@click.option("--tr", type=shared.TIME, multiple=True, metavar="T", help="Switch to rigid at this time; repeatable.")
+@click.option("--td", type=shared.TIME, multiple=True, metavar="T", help="Switch back at this time, one for each --tr.")
+@click.option("--windows", type=shared.FILE, metavar="FILE", help="Instead of both: a file with lines 'tr td'.")
 @click.option(
     "--part",
     metavar="IDS",
     multiple=True,
+    type=shared.NAMES,
     help="Parts to be switched, by number (3,7) or range (10-19); with --history by title too.",
 )
-@click.option(
-    "--merge", type=click.IntRange(min=1), metavar="ID", help="Lead part that all others are merged into (LRB)."
-)
-@click.option("--swset", type=click.IntRange(min=1), nargs=2, metavar="ID ID", help="Switch sets.  [default: 901 902]")
-@click.option("--step-cap", type=shared.POSITIVE, metavar="DT", help="Largest time step while rigid (DTMAX, /DTIX).")
-@click.option("--node", metavar="IDS", multiple=True, help="Radioss: main nodes of the rigid bodies.")
-@click.option(
-    "--end", type=shared.TIME, metavar="T", help="Radioss: end of the run.  [default: the end of the history]"
-)
-@click.option("--name", metavar="NAME", help="Radioss: name of the run.  [default: Root]")
+@card_options
 @shared.reference_options
 @shared.file_options
 @shared.EXIT_ZERO
 @click.pass_context
-def command(ctx: click.Context, /, solver: str, exit_zero: bool, **options: Any) -> None:
-    """Print solver input for one switch window, ready to be pasted.
+def command(ctx: click.Context, /, exit_zero: bool, **options: Any) -> None:
+    """Print solver input for switching windows, ready to be pasted.
 
     With a history the times are judged once more as they are printed, and the verdict stands in the comments.
     """
-    for other, names in _OF_SOLVER.items():
-        strange = [name for name in names if options[name] not in (None, ()) and other != solver]
-        if strange:
-            raise click.UsageError(f"--{strange[0]} is an option of --solver {other}")
+    from d2rpick.deck.printing import DEFAULT, cards
+
+    if options["solver"]:
+        check_solver(options, options["solver"])
+    windows = _windows(options)
     reference = shared.reference(options)
-    run = reference[0] if reference else None
-    output = Output.of(options, *(run.sources if run else ()))
-    write = _radioss(options, run) if solver == "radioss" else _ls_dyna(options, run)
+    output = Output.of(options, *_inputs(options), *(reference[0].sources if reference else ()))
     if reference is None:
-        card, verified = write(()), True
+        solver = options["solver"] or DEFAULT
+        card, verified = cards(windows, _alone(options, solver), solver), True
     else:
-        card, verified = _judged(write, reference, options, output)
+        card, verified = _judged(windows, reference, options, output)
     output.notes(card.notes, ())
     output.content(card.text.encode())
     finish(ctx, objection=not verified, exit_zero=exit_zero)
 
 
+def _windows(options: dict[str, Any]) -> Sequence[Times]:
+    """Pair the times, or read them from the file; UsageError where they do not say windows."""
+    tr, td = options["tr"], options["td"]
+    if options["windows"] is not None:
+        if tr or td:
+            raise click.UsageError("--windows excludes --tr and --td")
+        from d2rpick.deck.printing.common import read_windows
+
+        with click.open_file(options["windows"], encoding="utf-8", errors="replace") as stream:
+            return read_windows(stream.read(), options["windows"])
+    if not tr or not td:
+        raise click.UsageError(f"a card needs {'--td' if tr else '--tr'}; or --windows, a file with lines 'tr td'")
+    if len(tr) != len(td):
+        raise click.UsageError(f"{len(tr)} --tr and {len(td)} --td were given, a --td for each --tr was expected")
+    return list(zip(tr, td, strict=True))
+
+
+def _inputs(options: dict[str, Any]) -> tuple[str, ...]:
+    return () if options["windows"] in (None, "-") else (options["windows"],)
+
+
+def _alone(options: dict[str, Any], solver: str) -> Printing:
+    """Say what the card needs where no history says anything; UsageError where something is missing."""
+    from d2rpick.deck.printing import SOLVERS
+
+    check_solver(options, solver)
+    module = SOLVERS[solver]
+    if not options[module.SWITCHES]:
+        raise click.UsageError(needed(module))
+    if options["part"] and module.SWITCHES != "part":
+        raise click.UsageError(_ONLY_JUDGED.format(module.TITLE))
+    if "end" in module.TAKES and options["end"] is None:
+        raise click.UsageError(f"a card for {module.TITLE} needs --end, the end of the run, or a --history")
+    return printing(options, numbers("--part", options["part"]))
+
+
 def _judged(
-    write: Writer, reference: tuple[Run, Settings], options: dict[str, Any], output: Output
+    windows: Sequence[Times], reference: tuple[Run, Settings], options: dict[str, Any], output: Output
 ) -> tuple[PrintedCard, bool]:
     """Write the card with the verdict of the history in its comments, and tell it on stderr too."""
-    from d2rpick.choice.judged_card import judged
+    from d2rpick.choice.judged_card import judged_card
+    from d2rpick.deck.printing import SOLVERS
 
     run, settings = reference
-    parts = () if options["energy"] or not run.parts else options["part"]
-    history = run.history(shared.selection({**options, "part": ()})._replace(parts=parts), with_momenta=True)
-    card, verdict = judged(write, history, settings)
-    output.notes(history.notes, all_cautions(verdict))
-    return card, verdict.verified
-
-
-def all_cautions(verdict: Verdict) -> tuple[Caution, ...]:
-    """Cautions of a verdict, and the verdict itself where it is an objection."""
-    from d2rpick.choice.warnings import Caution
-
-    if verdict.verified:
-        return verdict.cautions
-    return (*verdict.cautions, Caution("not-verified", f"the times as printed: {'; '.join(verdict.reasons)}"))
-
-
-def _ls_dyna(options: dict[str, Any], run: Run | None) -> Writer:
-    from d2rpick.deck.printing.cards import ls_dyna
-
-    known = run.parts if run and not options["energy"] else ()
-    if known:
-        from d2rpick.histories.selection import select_parts
-
-        ids = [part.id for part in select_parts(options["part"], known, run.name if run else "")]
-    else:
-        ids = _numbers("--part", options["part"])
-    if not ids:
-        raise click.UsageError("--solver ls-dyna needs --part, the parts to be switched")
-    write = partial(ls_dyna, options["tr"], options["td"], ids, merge=options["merge"])
-    write = partial(write, step_cap=options["step_cap"] or 0.0)
-    if options["swset"]:
-        write = partial(write, sets=options["swset"])
-    return lambda remarks: write(remarks=remarks)
-
-
-def _radioss(options: dict[str, Any], run: Run | None) -> Writer:
-    from d2rpick.deck.printing.cards import radioss
-
-    nodes = _numbers("--node", options["node"])
-    if not nodes:
-        raise click.UsageError("--solver radioss needs --node, the main nodes of the rigid bodies")
-    if options["part"] and (run is None or not run.parts or options["energy"]):
-        raise click.UsageError("--part chooses by whose energy --solver radioss is judged; give a --history with parts")
-    end = options["end"]
-    if end is None and run is not None:
-        end = max(float(database.time[-1]) for database in run.databases)
-    if end is None:
-        raise click.UsageError("--solver radioss needs --end, the end of the run, or a --history")
-    write = partial(radioss, options["tr"], options["td"], end, nodes, step_cap=options["step_cap"])
-    if options["name"] is not None:
-        write = partial(write, name=options["name"])
-    return lambda remarks: write(remarks=remarks)
-
-
-def _numbers(option: str, texts: Sequence[str]) -> list[int]:
-    """Numbers and ranges as they are typed; without a history nobody knows which of a range exist."""
-    ids: list[int] = []
-    for piece in (piece.strip() for text in texts for piece in text.split(",")):
-        found = _RANGE.fullmatch(piece)
-        if not found:
-            hint = "; titles need a --history that has parts" if option == "--part" else ""
-            raise click.UsageError(f"{option}: {piece!r} is no number (7) or range (10-19){hint}")
-        low, high = int(found[1]), int(found[2] or found[1])
-        if not low <= high < low + _MOST_IDS:
-            raise click.UsageError(f"{option}: {piece!r} is no range of 1 to {_MOST_IDS} numbers")
-        ids += range(low, high + 1)
-    return ids
+    history = energy_of(run, options, prints=True)
+    wish = card_wish(run, options, history)
+    module = SOLVERS[wish.of(history)[0]]
+    if wish.printing.part and module.SWITCHES != "part":
+        raise click.UsageError(_ONLY_JUDGED.format(module.TITLE))
+    found = judged_card(windows, history, settings, wish)
+    if found is None:
+        raise click.UsageError(need_ids(wish, history))
+    card, verdicts = found
+    output.notes(history.notes, dict.fromkeys(caution for verdict in verdicts for caution in all_cautions(verdict)))
+    return card, all(verdict.verified for verdict in verdicts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -44,15 +45,15 @@ Examples:
     show_default=True,
     help="Lightest finding that is an objection.",
 )
-@shared.output_options("table", "json", "github", "junit", "sarif")
+@shared.output_options("table", "json", "ndjson", "github", "junit", "sarif")
 @click.pass_context
 def command(
     ctx: click.Context, /, deck: tuple[str, ...], fail_on: str, output_format: str, exit_zero: bool, **options: Any
 ) -> None:
     """Find the switching cards of LS-DYNA decks and check them against deck and history.
 
-    Each DECK is read with its includes.  `d2rpick rule` lists the rules; a comment line `$ d2rpick: ignore D2R104`
-    before a card silences one for it.
+    Each DECK is read with its includes; a folder stands for its main decks, `-` for standard input.  `d2rpick rule`
+    lists the rules; a comment line `$ d2rpick: ignore D2R104` before a card silences one for it.
     """
     from d2rpick.rules import Severity
 
@@ -89,22 +90,40 @@ def _checked(
 
     A deck that cannot be read, or whose configuration cannot, does not hide the others.
     """
+    from d2rpick.deck.source import STDIN
     from d2rpick.rules import RULES, Unreadable, check_deck
     from d2rpick.rules.configuration import Configuration
 
     asked = Configuration(_ids(options["select"]), _ids(options["ignore"]))
     asked.verify(RULES)
-    results, failed, inputs = [], [], []
-    first = {os.path.realpath(name): name for name in reversed(decks)}  # of several spellings
-    for name in (name for name in dict.fromkeys(decks) if name in first.values()):
+    results, inputs = [], []
+    named, failed = _main_decks(decks)
+    first = {os.path.realpath(name): name for name in reversed(named)}  # of several spellings
+    for name in (name for name in dict.fromkeys(named) if name in first.values()):
         try:
             configuration = _configuration(name, asked)
             inputs.append(configuration.source)
-            results.append(check_deck(name, configuration, judge))
+            content = sys.stdin.buffer.read() if name == STDIN else None
+            results.append(check_deck(name, configuration, judge, content))
             inputs += results[-1].files
         except (ConfigurationError, DeckError) as error:
             failed.append(Unreadable(name, str(error)))
     return results, failed, inputs
+
+
+def _main_decks(named: Sequence[str]) -> tuple[list[str], list[Unreadable]]:
+    """Replace folders by their main decks; those without any are told."""
+    from d2rpick.deck.folder import main_decks
+    from d2rpick.rules import Unreadable
+
+    decks: list[str] = []
+    failed: list[Unreadable] = []
+    for name in named:
+        try:
+            decks += main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
+        except DeckError as error:
+            failed.append(Unreadable(name, str(error)))
+    return decks, failed
 
 
 def _configuration(deck: str, asked: Configuration) -> Configuration:
@@ -150,6 +169,7 @@ def _text(
     texts = {
         "table": lambda: report.as_table(results, root, failed),
         "json": lambda: report.as_json(results, root, ctx.meta["d2rpick.command"], warnings, sources),
+        "ndjson": lambda: report.as_ndjson(results, root, ctx.meta["d2rpick.command"], warnings, sources),
         "github": lambda: report.as_github(results, root, failed),
         "junit": lambda: report.as_junit(results, root, limit, failed),
         "sarif": lambda: report.as_sarif(results, root, failed),

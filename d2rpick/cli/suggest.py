@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli.card_options import all_cautions, card_options, card_wish, energy_of, need_ids, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
@@ -22,7 +23,7 @@ Examples:
   d2rpick suggest --td-window 0.06 0.07 sample_data/energy.csv
   d2rpick suggest --td 0.37 --energy boxIE_J sample_data/rollover.csv
   d2rpick suggest --td 0.064 -f json sample_data/energy.glstat
-  d2rpick suggest --td 0.37 --part box -f card sample_data/rolloverT01.gz
+  d2rpick suggest --td 0.37 --part box -f card --node 1001 sample_data/rolloverT01.gz
   d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
 """
 
@@ -41,6 +42,7 @@ Examples:
 )
 @shared.history_options
 @shared.choosing_options
+@card_options
 @shared.output_options("table", "json", "csv", "markdown", "value", "card")
 @click.pass_context
 def command(
@@ -66,11 +68,12 @@ def command(
         td = None
     if _only_in_environment(ctx, "td_window", overruled_by="td"):
         td_window = None
-    _check_usage(td, td_window, card=output_format == "card", parts=options["part"])
+    _check_usage(td, td_window, card=output_format == "card", ids=(*options["part"], *options["node"]))
+    prints = prints_card(options, output_format)
     with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run(options)
+        run = shared.open_run({**options, "part": ()})
         output = Output.of(options, *run.sources)
-        history = run.history(shared.selection(options), with_momenta=True)
+        history = energy_of(run, options, prints=prints)
     answer = _answer(history, td, td_window, shared.settings(options))
     if balance := balance_of(run, history.parts, answer.situation.td):
         answer = with_health(answer, balance)
@@ -82,7 +85,7 @@ def command(
     if options["report"]:
         output.write(options["report"], text_bytes(_page(answer, run, options)))
     if output_format == "card":
-        written = _card(answer, output)
+        written = _card(answer, run, options, output)
         finish(ctx, objection=not written, exit_zero=exit_zero)
         return
     texts = {
@@ -102,14 +105,14 @@ def _only_in_environment(ctx: click.Context, option: str, *, overruled_by: str) 
     return sources == [click.core.ParameterSource.ENVIRONMENT, click.core.ParameterSource.COMMANDLINE]
 
 
-def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: bool, parts: tuple[str, ...]) -> None:
+def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: bool, ids: tuple[str, ...]) -> None:
     """Raise UsageError where what is asked for makes no sense, before a file is opened."""
     if td is not None and window:
         raise click.UsageError("--td and --td-window exclude each other")
     if window and not window[0] < window[1]:
         raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
-    if card and not parts:
-        raise click.UsageError("-f card needs --part, the parts that are switched")
+    if card and not ids:
+        raise click.UsageError("-f card needs --part, the parts that are switched (Radioss: --node, their main nodes)")
 
 
 def _answer(history: History, td: float | None, window: tuple[float, float] | None, settings: Settings) -> Suggestion:
@@ -135,20 +138,23 @@ def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
     drawn = {caption: figures.both_widths(figures.draw_suggestion, answer, "choice")}
     if better_pair(answer):
         drawn["The better pair"] = figures.both_widths(figures.draw_better, answer, "better")
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn))
+    wish = card_wish(run, options, answer.situation.history)
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, wish))
 
 
-def _card(answer: Suggestion, output: Output) -> bool:
+def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:
     """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
-    from d2rpick.choice.judged_card import of_parts
-    from d2rpick.cli.card import all_cautions
+    from d2rpick.choice.judged_card import judged_card
 
     pair, situation = answer.recommended, answer.situation
-    found = of_parts(situation.history, (pair.tr, pair.td), situation.settings) if pair else None
-    if found is None:
+    if pair is None:
         output.content(b"")
         return False
-    card, verdict = found
+    wish = card_wish(run, options, situation.history)
+    found = judged_card([(pair.tr, pair.td)], situation.history, situation.settings, wish)
+    if found is None:
+        raise click.UsageError(need_ids(wish, situation.history))
+    card, (verdict,) = found
     said = set(answer.cautions)
     output.notes(card.notes, [caution for caution in all_cautions(verdict) if caution not in said])
     output.content(card.text.encode())

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli.card_options import card_options, card_wish, energy_of, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
@@ -53,6 +54,7 @@ class _Verify(click.Command):
 )
 @shared.history_options
 @shared.choosing_options
+@card_options
 @shared.output_options("table", "json", "csv", "markdown")
 @click.pass_context
 def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exit_zero: bool, **options: Any) -> None:
@@ -62,11 +64,12 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
     from d2rpick.histories.balance_terms import balance_of
     from d2rpick.report import verdict as report
 
+    prints = prints_card(options, output_format)
     with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run(options)
+        run = shared.open_run({**options, "part": ()})
         switched = _switched(options)
         output = Output.of(options, *run.sources, *(switched.sources if switched else ()))
-        history = run.history(shared.selection(options), with_momenta=True)
+        history = energy_of(run, options, prints=prints)
     answer = verify(history, tr, td, shared.settings(options))
     if balance := balance_of(run, history.parts, td):
         answer = with_health(answer, balance)
@@ -98,7 +101,8 @@ def _page(answer: Verdict, run: Run, switched: Run | None, options: dict[str, An
 
     caption = "Internal energy with its level at td, and the pair"
     drawn = {caption: figures.both_widths(figures.draw_verdict, answer, "pair")}
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, switched))
+    wish = card_wish(run, options, answer.situation.history)
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, wish, switched))
 
 
 def _switched(options: dict[str, Any]) -> Run | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.deck.rows import LONG
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Collection, Iterator, Mapping
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.reader import Deck
@@ -52,6 +52,16 @@ def first_shared_nodes(deck: Deck, bodies: Mapping[int, int]) -> dict[tuple[int,
                 if other != part and bodies[other] != bodies[part]:
                     shared.setdefault((min(part, other), max(part, other)), node)
     return shared
+
+
+def nodes_of(deck: Deck, parts: Collection[int]) -> dict[int, int]:
+    """Nodes of some parts, each with the first of these parts that has it."""
+    bodies = dict.fromkeys(parts, 0)
+    found: dict[int, int] = {}
+    for card in _elements(deck, read=True):
+        for part, nodes in _connectivity(card, _NODES[card.name.split("_")[1]], bodies):
+            found.update((node, part) for node in nodes if node not in found)
+    return found
 
 
 def unread_elements(deck: Deck) -> list[Card]:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.deck.rows import Value
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from d2rpick.deck.card import Card
     from d2rpick.deck.reader import Deck
     from d2rpick.deck.rows import Problem, Row
@@ -44,7 +46,7 @@ class PartSet:
 
 @dataclass(eq=False)
 class Parts:
-    """Parts by id with the name of their material, part sets by id (None: of a kind that is not read).
+    """Parts by id with material, title and section; part sets by id (None: of a kind that is not read).
 
     ``all_known`` is False when an include was not read, a block is encrypted, or a keyword makes parts in a
     way that is not followed: then a part that is missing here may still exist.  ``problems`` are ids of parts
@@ -52,6 +54,8 @@ class Parts:
     """
 
     materials: dict[int, str] = field(default_factory=dict)
+    titles: dict[int, str] = field(default_factory=dict)
+    sections: dict[int, int] = field(default_factory=dict)
     sets: dict[int, PartSet | None] = field(default_factory=dict)
     rigid_materials: set[str] = field(default_factory=set)
     problems: list[Problem] = field(default_factory=list)
@@ -116,7 +120,7 @@ def _take_parts(card: Card, parts: Parts) -> None:
         options = (options - {"ATTACHMENT", "NODES"}) | {"PRINT"}  # one line more, like _PRINT
     if "COMPOSITE" in options:  # one part, and a material for every ply: none of them makes it rigid
         if len(card.rows) > 1:
-            _add(card, card.rows[1], "", parts)
+            _add(card, card.rows[:2], "", parts)
         return
     if not options <= _EXTRA_LINES.keys() | _WITHOUT_LINES:
         parts.all_known = False
@@ -124,19 +128,24 @@ def _take_parts(card: Card, parts: Parts) -> None:
     rows = list(card.rows)
     while len(rows) > 1:  # a title, the ids, and what the options add
         _, ids, *rest = rows
-        _add(card, ids, _material(card, ids, 2), parts)
+        _add(card, rows[:2], _material(card, ids, 2), parts)
         skip = sum(_EXTRA_LINES.get(option, 0) for option in options)
         if "INERTIA" in options and rest and card.integer(rest[0], 4).value == _ROTATED:
             skip += 1
         rows = rest[skip:]
 
 
-def _add(card: Card, row: Row, material: str, parts: Parts) -> None:
-    part = card.integer(row, 0)
+def _add(card: Card, lines: Sequence[Row], material: str, parts: Parts) -> None:
+    """Take the title and the ids of a part."""
+    title, row = lines
+    part, section = card.integer(row, 0), card.integer(row, 1)
     if part.problem:
         parts.problems.append((part.field, part.problem))
     elif part.value > 0:
-        parts.materials[part.value + card.transform.part] = material
+        number = part.value + card.transform.part
+        parts.materials[number], parts.titles[number] = material, title.text.strip()
+        if material and not section.problem and section.value:
+            parts.sections[number] = section.value + card.transform.rest
 
 
 def _take_set(card: Card, parts: Parts) -> None:

@@ -19,7 +19,8 @@ from d2rpick.errors import DeckError
 
 _KEPT: Final = (
     *("DEFORMABLE_TO_RIGID", "RIGID_DEFORMABLE", "CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM"),
-    *("PART", "SET_PART", "MAT_RIGID", "MAT_020", "MAT_20", "ELEMENT_"),
+    *("PART", "SET_PART", "MAT_RIGID", "MAT_020", "MAT_20", "ELEMENT_", "SECTION_SOLID", "CONTACT_", "RIGIDWALL_"),
+    *("SET_NODE", "CONSTRAINED_NODAL_RIGID_BODY", "CONSTRAINED_EXTRA_NODES", "CONSTRAINED_JOINT"),
 )
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
 _PATHS: Final = ("INCLUDE_PATH", "INCLUDE_PATH_RELATIVE")
@@ -74,13 +75,15 @@ class Deck:
         return found
 
 
-def read_deck(path: str) -> Deck:
+def read_deck(path: str, content: bytes | None = None) -> Deck:
     """Find the cards of a deck and of all its includes.
 
     Parameters
     ----------
     path : str
         The main deck; messages show file names relative to it as it is given here.
+    content : bytes, optional
+        What the main deck holds, where it does not lie in a file; its includes are looked for beside ``path``.
 
     Returns
     -------
@@ -93,9 +96,13 @@ def read_deck(path: str) -> Deck:
         If the deck itself cannot be read or is none, or includes multiply without end.
     """
     deck = Deck(path)
-    if next(SourceFile(path).blocks(), None) is None:
-        raise DeckError(f"{path}: no keyword was found (a line that begins with *), an LS-DYNA deck was expected")
-    _Reader(deck).read(path, _Context(deck.scope))
+    main = SourceFile(path, content)
+    if next(main.blocks(), None) is None:
+        ended = any(line.upper().startswith(b"*END") for line in main.lines_from(0))
+        found = "only *END was found, no keyword before it" if ended else "no keyword was found"
+        wanted = "*KEYWORD and the cards were expected" if ended else "an LS-DYNA deck was expected"
+        raise DeckError(f"{path}: {found} (a line that begins with *), {wanted}")
+    _Reader(deck).read(main, _Context(deck.scope))
     return deck
 
 
@@ -114,12 +121,14 @@ class _Reader:
         self.deck = deck
         self.folders = Folders(deck.path)
 
-    def read(self, path: str, context: _Context) -> None:
-        self.deck.files.append(path)
+    def read(self, source: SourceFile, context: _Context) -> None:
+        self.deck.files.append(source.name)
         if len(self.deck.files) > _MOST_FILES:
-            raise DeckError(f"{path}: more than {_MOST_FILES} includes were read; do the files include each other?")
+            raise DeckError(
+                f"{source.name}: more than {_MOST_FILES} includes were read; do the files include each other?"
+            )
         width = context.width
-        for block in SourceFile(path).blocks():
+        for block in source.blocks():
             if block.encrypted:
                 self.deck.encrypted.append(block)
                 continue
@@ -162,7 +171,7 @@ class _Reader:
                 reason = "no permission to read it"
             else:
                 chain = (*context.chain, os.path.realpath(card.file))
-                self.read(path, _Context(Scope(context.scope), width, asked.transform, chain))
+                self.read(SourceFile(path), _Context(Scope(context.scope), width, asked.transform, chain))
                 continue
             self.deck.unread.append(Unread(asked.name, reason))
 

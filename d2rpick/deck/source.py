@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from bisect import bisect_right
 from dataclasses import dataclass
@@ -12,9 +13,9 @@ from typing import TYPE_CHECKING
 from d2rpick.errors import DeckError
 
 if TYPE_CHECKING:
-    import io
     from collections.abc import Iterator
 
+STDIN = "-"  # name of what was read from standard input
 _CHUNK = 256 * 1024
 _LOOKBACK = 32  # bytes of the chunk before, so that what stands in front of a hit is always at hand
 _PGP = b"-----BEGIN PGP MESSAGE"
@@ -26,14 +27,15 @@ _SILENCE = re.compile(r"\$\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)", 
 
 
 class SourceFile:
-    """One deck file, read as bytes and shown as Latin-1; nothing of it is kept in memory.
+    """One deck file, read as bytes and shown as Latin-1; nothing that lies in a file is kept in memory.
 
-    ``name`` is the path as messages show it.  Line numbers are counted when they are asked for: in a large
-    deck counting costs more than finding the keywords.
+    ``name`` is the path as messages show it; ``content`` is given for what does not lie in a file.  Line
+    numbers are counted when they are asked for: in a large deck counting costs more than finding the keywords.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, content: bytes | None = None) -> None:
         self.name = name
+        self._content = content
         self._counted = [(0, 1)]  # (offset, number of the line that holds it), ascending
 
     def blocks(self) -> Iterator[Block]:
@@ -98,7 +100,9 @@ class SourceFile:
         if buffer.find(b"\r", _LOOKBACK, end) >= 0 > buffer.find(b"\n", _LOOKBACK, end):
             raise DeckError(f"{self.name}: lines end in CR alone, line ends LF or CR LF were expected")
 
-    def _open(self) -> io.BufferedReader:
+    def _open(self) -> io.BufferedReader | io.BytesIO:
+        if self._content is not None:
+            return io.BytesIO(self._content)
         try:
             return Path(self.name).open("rb")
         except (OSError, ValueError) as error:  # ValueError: a zero byte in the name

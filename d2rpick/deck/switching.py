@@ -34,6 +34,9 @@ _KINDS: Final[dict[str, Kind]] = {
     "RIGID_DEFORMABLE_R2D": "restart",
 }
 _HEADER_ROWS = 2
+_COUNTS_FIELD = 4  # of the second line: D2R
+_PTYPES: Final = {"PART", "PSET"}
+_INERTIA_ROWS: Final = ("the first line (PID)", "the second line (XC to TM)", "the third line (IXX to IZZ)")
 _REALS: Final = {"automatic": (4, 0), "inertia": (4, 6), "restart": (0, 0), "plain": (0, 0)}
 
 
@@ -59,14 +62,18 @@ class Header:
     paired: Value[int]
     to_rigid: Value[int]
     to_deformable: Value[int]
-    others: tuple[Value[float], ...]
+    time2: Value[float]
+    time3: Value[float]
+    nrbf: Value[int]
+    ncsf: Value[int]
+    others: tuple[Value[float], ...]  # RWF, DTMAX, OFFSET
 
     @property
     def values(self) -> tuple[Value[int] | Value[float], ...]:
         """All fields, in the order of the card."""
         return (
             *(self.swset, self.code, self.time1, self.entno, self.relsw, self.paired),
-            *(self.to_rigid, self.to_deformable),
+            *(self.to_rigid, self.to_deformable, self.time2, self.time3, self.nrbf, self.ncsf),
             *self.others,
         )
 
@@ -85,6 +92,7 @@ class SwitchSet:
     switched: tuple[Switched, ...]
     values: tuple[Value[int] | Value[float] | Value[str], ...]
     count_problem: str = ""
+    part: Value[int] | None = None  # of *DEFORMABLE_TO_RIGID_INERTIA
 
     @cached_property
     def time(self) -> float | None:
@@ -132,9 +140,10 @@ def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
 def _simple(card: Card, kind: Kind) -> SwitchSet:
     rows = [row for row in card.rows if not row.blank]
     if kind == "inertia":
-        part = [card.integer(rows[0], 0)] if rows else []
+        part = [_moved(card.integer(rows[0], 0), card.transform.part)] if rows else []
         reals = [card.real(row, at) for row, count in zip(rows[1:], _REALS[kind], strict=False) for at in range(count)]
-        return SwitchSet(card, kind, None, (), (*part, *reals))
+        missing = " and ".join(_INERTIA_ROWS[len(rows) :])
+        return SwitchSet(card, kind, None, (), (*part, *reals), missing and f"{missing} missing", *part)
     if card.name.endswith("_CONTROL"):
         values = [card.real(row, at) for row in rows[:1] for at in range(4)]
         return SwitchSet(card, kind, None, (), tuple(values))
@@ -146,9 +155,8 @@ def _automatic(card: Card) -> SwitchSet:
     rows = list(card.rows)
     while rows and rows[-1].blank:
         rows.pop()
-    if len(rows) < _HEADER_ROWS:
-        problem = f"{_lines(len(rows))} below the keyword, at least {_HEADER_ROWS} were expected"
-        return SwitchSet(card, "automatic", None, (), (), problem)
+    if missing := _missing(rows):
+        return SwitchSet(card, "automatic", None, (), (), missing)
     header = _header(card, rows[0], rows[1])
     lines = rows[_HEADER_ROWS:]
     if header.to_rigid.problem or header.to_deformable.problem:
@@ -159,8 +167,11 @@ def _automatic(card: Card) -> SwitchSet:
         problem = f"D2R is {rigid} and R2D is {deformable}, counts from 0 on were expected"
     elif len(lines) != rigid + deformable:
         problem = f"D2R is {rigid} and R2D is {deformable}, but {_lines(len(lines))} of parts follow"
+        problem += "" if lines else ": the third line, with the first part, is missing"
     elif not lines:
-        problem = "D2R and R2D are 0, so the card switches nothing"
+        short = sum(bool(rows[1].field(at).text) for at in range(_COUNTS_FIELD + 1)) <= _COUNTS_FIELD
+        lost = "; is the second line (NRBF to OFFSET) missing?" if short else ""
+        problem = f"D2R and R2D are 0, so the card switches nothing{lost}"
     elif any(row.blank for row in lines):
         problem = "an empty line stands where a part was expected"
     rigid, deformable = max(rigid, 0), max(deformable, 0)
@@ -168,6 +179,24 @@ def _automatic(card: Card) -> SwitchSet:
     back = lines[rigid : rigid + deformable]
     switched += [_line(card, row, to_rigid=False, ptype=True) for row in back if not row.blank]
     return _with(card, "automatic", header, switched, problem)
+
+
+def _missing(rows: Sequence[Row]) -> str:
+    """Say which of the two first lines are missing: they are, too, where a line of a part stands in their place."""
+    both = "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing"
+    if not rows:
+        return both
+    if _is_of_part(rows[0]):
+        return f"{both}, {rows[0].text.strip()!r} stands in their place"
+    if len(rows) < _HEADER_ROWS:
+        return "the second line (NRBF to OFFSET) is missing"
+    if _is_of_part(rows[1]):
+        return f"the second line (NRBF to OFFSET) is missing, {rows[1].text.strip()!r} stands in its place"
+    return ""
+
+
+def _is_of_part(row: Row) -> bool:
+    return not _PTYPES.isdisjoint(row.field(at).text.upper() for at in (1, 2))
 
 
 def _lines(count: int) -> str:
@@ -185,7 +214,6 @@ def _header(card: Card, first: Row, second: Row) -> Header:
     if code.value == BY_TIME and not time1.problem and _runs_over(first):
         problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.field(3).text})"
         time1 = Value(time1.value, time1.field, problem)
-    others = [card.real(first, 3), card.real(first, 4), *(card.real(second, at) for at in (0, 1, 2, 3, 6))]
     return Header(
         swset=_moved(swset, card.transform.rest),
         code=code,
@@ -195,7 +223,11 @@ def _header(card: Card, first: Row, second: Row) -> Header:
         paired=card.integer(first, 7),
         to_rigid=card.integer(second, 4),
         to_deformable=card.integer(second, 5),
-        others=tuple(others),
+        time2=card.real(first, 3),
+        time3=card.real(first, 4),
+        nrbf=card.integer(second, 0),
+        ncsf=card.integer(second, 1),
+        others=tuple(card.real(second, at) for at in (2, 3, 6)),
     )
 
 
@@ -213,7 +245,7 @@ _Line = tuple[Switched, Value[str]]
 def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
     """Part, LRB where the line has it, and PTYPE: column 21 of a D2R line, column 11 of an R2D line."""
     kind = card.word(row, 2 if to_rigid else 1, "PART") if ptype else Value("PART", card.here)
-    if kind.value not in {"PART", "PSET"}:
+    if kind.value not in _PTYPES:
         kind = Value("PART", kind.field, f"PTYPE is {kind.field.text!r}, PART or PSET was expected")
     by_set = kind.value == "PSET"
     part = _moved(card.integer(row, 0), card.transform.set_ if by_set else card.transform.part)

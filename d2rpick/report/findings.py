@@ -1,4 +1,4 @@
-"""Findings of ``check`` as table, JSON, GitHub annotations, JUnit XML and SARIF."""
+"""Findings of ``check`` as table, JSON, one JSON line per deck, GitHub annotations, JUnit XML and SARIF."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
 from d2rpick import __version__
+from d2rpick.deck.source import STDIN
 from d2rpick.rules import RULES, Severity
 from d2rpick.rules.base import name_units
 
@@ -54,7 +55,30 @@ def as_json(
 
     ``history`` are the files the windows were judged by, None without any.
     """
-    content = {
+    content = _content(results, root, command, warnings, history)
+    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
+
+
+def as_ndjson(
+    results: Sequence[Checked],
+    root: Path,
+    command: Sequence[str],
+    warnings: Sequence[Mapping[str, str]] = (),
+    history: Sequence[str] | None = None,
+) -> str:
+    """Give a line for each deck, by the same schema as ``as_json``."""
+    contents = (_content([result], root, command, warnings, history) for result in results)
+    return "\n".join(json.dumps(content, allow_nan=False, ensure_ascii=False) for content in contents)
+
+
+def _content(
+    results: Sequence[Checked],
+    root: Path,
+    command: Sequence[str],
+    warnings: Sequence[Mapping[str, str]],
+    history: Sequence[str] | None,
+) -> dict[str, Any]:
+    return {
         "schema": SCHEMA,
         "tool_version": __version__,
         "command": list(command),
@@ -65,7 +89,6 @@ def as_json(
         "findings": [_finding(finding, root) for result in results for finding in result.findings],
         "summary": {**_counts(results), "decks": len(results)},
     }
-    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
 
 
 def as_github(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable] = ()) -> str:
@@ -221,6 +244,8 @@ def _summary_line(results: Sequence[Checked]) -> str:
 
 def _shown(path: str, root: Path) -> str:
     """Path relative to the working folder where it lies below it, with ``/``; bytes that are no text replaced."""
+    if path == STDIN:
+        return path
     absolute = os.path.abspath(root / path)  # noqa: PTH100 - resolve() would follow links to elsewhere
     shown = os.path.relpath(absolute, root) if Path(absolute).is_relative_to(root) else absolute
     return os.fsencode(shown).decode("utf-8", "replace").replace(os.sep, "/")

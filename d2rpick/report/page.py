@@ -6,7 +6,8 @@ import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.judged_card import of_parts
+from d2rpick.choice.judged_card import judged_card
+from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.errors import D2RPickError
 from d2rpick.report.health import measures_of
 from d2rpick.report.html import Markup, document, pairs, resource, section, table, tag
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.health import Health
+    from d2rpick.choice.judged_card import CardWish
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
@@ -30,13 +32,14 @@ class Record:
 
     ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the
     options of ``card`` that judge by the same history.  ``figures`` are SVG elements by caption, for a wide and for a
-    narrow page, with ids of their own.
+    narrow page, with ids of their own.  ``wish`` says how the card is printed.
     """
 
     run: Run
     command: Sequence[str]
     judging: Sequence[str]
     figures: Mapping[str, tuple[str, str]]
+    wish: CardWish
     switched: Run | None = None
 
 
@@ -86,20 +89,19 @@ def evidence(situation: Situation, health: Health | None, record: Record) -> Ite
 
 
 def solver_input(situation: Situation, times: tuple[float, float], record: Record) -> Markup:
-    """Give LS-DYNA's card where the parts are known, else the command that prints the solver's input."""
+    """Give the solver's card where it is known whom it switches, else the command that prints it."""
     history, title = situation.history, "For the solver's input"
-    radioss = history.format.startswith("radioss")
-    command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
-    command += ["--solver", "radioss", "--node", "IDS"] if radioss else ["--part", "IDS"]
-    line = tag("pre", shlex.join([*command, *record.judging]), class_="wrap")
-    printed = (tag("p", "Printed, and judged once more as printed, by"), line)
-    if radioss:
-        return section(title, *printed)
     try:
-        found = of_parts(history, times, situation.settings)
+        found = judged_card([times], history, situation.settings, record.wish)
     except D2RPickError as error:
         return section(title, tag("p", f"There is no card for these times: {error}"))
-    return section(title, tag("pre", found[0].text)) if found else section(title, *printed)
+    if found:
+        return section(title, tag("pre", found[0].text))
+    solver, _ = record.wish.of(history)
+    command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
+    command += [] if solver == DEFAULT else ["--solver", solver]
+    line = tag("pre", shlex.join([*command, f"--{SOLVERS[solver].SWITCHES}", "IDS", *record.judging]), class_="wrap")
+    return section(title, tag("p", "Printed, and judged once more as printed, by"), line)
 
 
 def _read(situation: Situation, run: Run) -> Markup:

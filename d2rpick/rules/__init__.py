@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck import read_deck
 from d2rpick.errors import ConfigurationError
-from d2rpick.rules import energy, pairs, reading, scope, switched_parts, times
+from d2rpick.rules import constraints, energy, force, formats, pairs, reading, scope, switched_parts, times
 from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, Severity, Unreadable
 from d2rpick.rules.configuration import Configuration, expected_instead
 
@@ -30,7 +30,7 @@ __all__ = [
     "find_rules",
 ]
 
-_MODULES = (reading, pairs, times, switched_parts, energy, scope)
+_MODULES = (reading, pairs, force, times, formats, switched_parts, constraints, energy, scope)
 
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted((rule for module in _MODULES for rule in module.RULES), key=lambda rule: rule.id)
@@ -43,7 +43,7 @@ def find_rules(name: str) -> tuple[Rule, ...]:
     Examples
     --------
     >>> [rule.id for rule in find_rules("d2r30")]
-    ['D2R301', 'D2R302', 'D2R303', 'D2R304']
+    ['D2R301', 'D2R302', 'D2R303', 'D2R304', 'D2R305', 'D2R306']
     """
     found = tuple(rule for rule in RULES.values() if name and rule.id.startswith(name.upper()))
     if not found:
@@ -66,7 +66,12 @@ class Checked:
     remarks: tuple[str, ...] = ()
 
 
-def check_deck(path: str, configuration: Configuration | None = None, judge: Judge | None = None) -> Checked:
+def check_deck(
+    path: str,
+    configuration: Configuration | None = None,
+    judge: Judge | None = None,
+    content: bytes | None = None,
+) -> Checked:
     """Read a deck with its includes and apply the rules.
 
     Parameters
@@ -77,6 +82,8 @@ def check_deck(path: str, configuration: Configuration | None = None, judge: Jud
         Which rules count, and how much; default: all, as they are.
     judge : Judge, optional
         Judges the windows by an energy history; without one the energy rules find nothing.
+    content : bytes, optional
+        What the deck holds, where it does not lie in a file.
 
     Returns
     -------
@@ -92,11 +99,11 @@ def check_deck(path: str, configuration: Configuration | None = None, judge: Jud
     """
     configuration = configuration or Configuration()
     configuration.verify(RULES)
-    case = Case(read_deck(path), judge)
+    case = Case(read_deck(path, content), judge)
     findings = [
         Finding(
             rule.id,
-            Severity(configuration.severity.get(rule.id, rule.severity)),
+            Severity(configuration.severity.get(rule.id, weight[0] if weight else rule.severity)),
             message,
             path,
             place.file,
@@ -105,7 +112,7 @@ def check_deck(path: str, configuration: Configuration | None = None, judge: Jud
         )
         for rule in RULES.values()
         if configuration.selects(rule.id)
-        for place, message in rule.check(case)
+        for place, message, *weight in rule.check(case)
         if not case.deck.silences(rule.id, place.file, place.line)
     ]
     order = {path: 0}  # the deck itself first, its includes as they come

@@ -112,8 +112,8 @@ class Case:
         return tuple((card, card.real(card.rows[0], 0)) for card in cards)
 
 
-Objection = tuple["Field", str]
-"""Where, and what is wrong there."""
+Objection = tuple["Field", str] | tuple["Field", str, Severity]
+"""Where, what is wrong there, and how much it weighs where that is more than the rule says."""
 
 
 @dataclass(frozen=True)
@@ -121,13 +121,14 @@ class Example:
     """A deck, and the files it includes by name.
 
     ``history`` are arguments of ``d2rpick replay`` that write the energy history it is checked with, ``options``
-    further ones of ``d2rpick check``.
+    further ones of ``d2rpick check``.  ``stdin`` tells that it is read from standard input.
     """
 
     deck: str
     files: Mapping[str, str] = field(default_factory=dict)
     history: str = ""
     options: str = ""
+    stdin: bool = False
 
 
 @dataclass(frozen=True)

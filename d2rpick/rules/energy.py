@@ -1,4 +1,4 @@
-"""D2R201-206: the windows held against the energy history of a run without switching."""
+"""D2R201-207: the windows held against the energy history of a run without switching."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.rules.base import Example, Rule, Severity, name_units
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, automatic
+from d2rpick.rules.formats import factor_of, told
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,6 +48,17 @@ def _units(case: Case) -> Iterator[Objection]:
                 f"{'earlier' if power > 0 else 'later'}: different units of time? give both in the same"
             ),
         )
+
+
+def _thousand(case: Case) -> Iterator[Objection]:
+    windows = case.windows.windows
+    times = [time for one in windows for time in (one.tr, one.td) if time is not None and time > 0]
+    if case.judge is None or not times or not case.judge.end > 0:
+        return
+    factor = factor_of(times, case.judge.end)
+    if factor != 1:
+        found = f"the switching times reach {max(times):g} but the history ends at {case.judge.end:g}"
+        yield windows[0].opened.by.time_field, f"{found}, {told(factor)} give both in the same unit"
 
 
 _HISTORY: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
@@ -123,5 +135,16 @@ RULES: Final = (
         _units,
         (*_PASSING, Example(GOOD)),
         (_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")),),
+    ),
+    Rule(
+        "D2R207",
+        Severity.WARNING,
+        "the switching times are about 1000 times those of the history, or a thousandth of them",
+        "A deck in milliseconds and a history in seconds, or the other way round: the windows would lie in the history "
+        "if their times were divided, or multiplied, by 1000. Files name no units, so this is a guess by size; "
+        "D2R205 tells of times outside the history.",
+        _thousand,
+        (*_PASSING, Example(GOOD)),
+        (_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")), _pair("1.0e-5", "6.0e-5")),
     ),
 )

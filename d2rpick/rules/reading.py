@@ -14,16 +14,18 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.card import Card
+    from d2rpick.deck.rows import Problem
     from d2rpick.rules.base import Case, Objection
 
 
 def _counts(case: Case) -> Iterator[Objection]:
     for card in case.sets:
         if card.count_problem:
-            yield (
-                card.card.here,
-                f"{card.count_problem}; write one line per part and count them on the second line",
+            lost = "missing" in card.count_problem
+            cure = (
+                "write all lines of the card" if lost else "write a line per part, and their count on the second line"
             )
+            yield card.card.here, f"{card.count_problem}; {cure}"
 
 
 def _fields(case: Case) -> Iterator[Objection]:
@@ -41,7 +43,7 @@ def _fields(case: Case) -> Iterator[Objection]:
                 yield value.field, f"{value.problem}; *{support.name} is needed to judge the switching times"
 
 
-def _unreadable_members(case: Case) -> Iterator[Objection]:
+def _unreadable_members(case: Case) -> Iterator[Problem]:
     used = dict.fromkeys(line.part.value for card in case.sets for line in card.switched if line.by_set)
     for set_id in dict.fromkeys(reached for one in used for reached in case.parts.reached(one)):
         content = case.parts.sets.get(set_id)
@@ -122,7 +124,8 @@ RULES: Final = (
         "the rows after a card do not match its D2R/R2D counts",
         "The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC counts the D2R and R2D lines that follow it, "
         "one per part. With wrong counts the solver reads a part from the wrong line, or a line as the "
-        "next card. A card whose counts are both 0 switches nothing.",
+        "next card. A card whose counts are both 0 switches nothing. A line that is missing is named: the solver takes "
+        "the next one in its place.",
         _counts,
         (Example(GOOD),),
         (
@@ -130,6 +133,9 @@ RULES: Final = (
             Example("*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1\n"),
             Example(HEAD + PARTS + automatic(1, "0.02", rigid=["1"], counts=(2, -1)) + BACK + END),
             Example(HEAD + PARTS + automatic(1, "0.02") + END),
+            Example(HEAD + PARTS + "\n".join(THERE.split("\n")[:3] + THERE.split("\n")[5:]) + BACK + END),
+            Example(HEAD + PARTS + "\n".join(THERE.split("\n")[:5]) + "\n" + BACK + END),
+            Example("*DEFORMABLE_TO_RIGID_INERTIA\n         1\n"),
         ),
     ),
     Rule(

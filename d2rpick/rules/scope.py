@@ -1,12 +1,13 @@
-"""D2R301, D2R302, D2R304: what the check looked at but does not judge."""
+"""D2R301, D2R302, D2R304-306: what the check looked at but does not judge."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.elements import unread_elements
+from d2rpick.deck.source import STDIN
 from d2rpick.rules.base import Example, Rule, Severity
-from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,6 +48,25 @@ def _unread(case: Case) -> Iterator[Objection]:
         yield card.here, f"nodes that parts share were not looked for in *{card.name}, whose lines are not followed"
 
 
+def _inertias(case: Case) -> Iterator[Objection]:
+    made = {event.unit.id for event in case.windows.events if event.line.to_rigid and not event.unit.is_set}
+    unknown = any(event.unit.is_set for event in case.windows.events)
+    for card in case.sets:
+        if card.kind != "inertia" or card.part is None:
+            continue
+        part = card.part.value
+        used = "" if part in made or unknown else f"; no card of this deck makes part {part} rigid"
+        yield card.card.here, f"gives mass and inertia of part {part} for when a switch makes it rigid{used}"
+
+
+def _without_parts(case: Case) -> Iterator[Objection]:
+    if case.deck.path == STDIN and case.sets and not case.parts.materials and case.parts.all_known:
+        yield (
+            case.sets[0].card.here,
+            "the parts are unknown: no *PART came with the cards, so their ids were not checked",
+        )
+
+
 def _reason(card: SwitchSet) -> str:
     if card.kind == "restart":
         return "acts at the restart, whose time is the end of the run before"
@@ -55,6 +75,14 @@ def _reason(card: SwitchSet) -> str:
     if card.header is None or card.header.code.problem or card.header.code.value not in _CODES:
         return ""
     return "switches " + _CODES[card.header.code.value].format(card.header.entno.value)
+
+
+_INERTIA: Final = """\
+*DEFORMABLE_TO_RIGID_INERTIA
+         1
+       0.0       0.0       0.0      12.5
+       1.0       0.0       0.0       1.0       0.0       1.0
+"""
 
 
 def _elements(keyword: str) -> Example:
@@ -97,5 +125,25 @@ RULES: Final = (
         _unread,
         (Example(GOOD), _elements("*ELEMENT_SHELL_COMPOSITE"), Example(GOOD.replace(END, "*ELEMENT_SHELL_DOF\n"))),
         (_elements("*ELEMENT_SHELL_DOF"), _elements("*ELEMENT_BEAM_PID")),
+    ),
+    Rule(
+        "D2R305",
+        Severity.INFO,
+        "*DEFORMABLE_TO_RIGID_INERTIA: mass and inertia given for a switch",
+        "The card replaces the mass properties that the solver computes from the mesh when the part is made rigid; "
+        "left over from another state of the model they are wrong without a word. Source: vendor keyword data.",
+        _inertias,
+        (Example(GOOD),),
+        (Example(HEAD + PARTS + _INERTIA + THERE + BACK + END), Example(HEAD + PARTS + _INERTIA + END)),
+    ),
+    Rule(
+        "D2R306",
+        Severity.INFO,
+        "switching cards on standard input without parts: ids are not checked",
+        "A file of cards alone is for another deck to include, which is checked with it. Cards on standard input, as "
+        "in d2rpick card ... | d2rpick check -, have no deck around them: that their parts exist is not known.",
+        _without_parts,
+        (Example(THERE + BACK), Example(GOOD, stdin=True)),
+        (Example(THERE + BACK, stdin=True),),
     ),
 )

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.windows import Event, Unit
     from d2rpick.rules.base import Case, Objection
 
+_NEAREST = 3  # ids that are named in place of one that the deck does not have
+
 
 def _by_card(events: Iterable[Event]) -> dict[SwitchSet, list[Event]]:
     found: dict[SwitchSet, list[Event]] = {}
@@ -79,7 +81,9 @@ def _exists(case: Case) -> Iterator[Objection]:
                 missing.setdefault("lead part", []).append(line.lead.value)
         for kind, ids in missing.items():
             if ids:
-                yield card.card.here, f"{name_units(ids, kind)} not in the deck; check the ids and include offsets"
+                near = "" if kind == "part set" else _nearest(ids[0], case.parts)
+                what = f"{name_units(ids, kind)} not in the deck{near}"
+                yield card.card.here, f"{what}; check the ids and include offsets"
         empty = [
             line.part.value
             for line in card.switched
@@ -87,6 +91,13 @@ def _exists(case: Case) -> Iterator[Objection]:
         ]
         if empty:
             yield card.card.here, f"{name_units(empty, 'part set')} without a part in the deck, so nothing is switched"
+
+
+def _nearest(number: int, parts: Parts) -> str:
+    """List the nearest ids of the deck, with their titles."""
+    near = sorted(sorted(parts.materials, key=lambda part: abs(part - number))[:_NEAREST])
+    listed = (f"{part} {parts.titles[part]!r}" if parts.titles[part] else str(part) for part in near)
+    return f" (nearest to {number}: {', '.join(listed)})"
 
 
 def _absent(line: Switched, parts: Parts) -> dict[str, list[int]]:
@@ -125,13 +136,18 @@ def _torn(case: Case) -> Iterator[Objection]:
     for (low, high), node in first_shared_nodes(case.deck, bodies).items():
         if _together(case, first[low].unit, first[high].unit):
             place = (first[high].line.lead or first[high].line.part).field
+            named = " and ".join(f"part {part}{_of_set(first[part])}" for part in (low, high))
             yield (
                 place,
                 (
-                    f"parts {low} and {high} share node {node} but become separate rigid bodies that both own "
-                    f"it; merge them: LRB {low} on the line of part {high}"
+                    f"{named} share node {node} but become separate rigid bodies that both own "
+                    f"it; merge them: LRB {low} on the line of part {high}{_of_set(first[high])}"
                 ),
             )
+
+
+def _of_set(event: Event) -> str:
+    return f" (of part set {event.line.part.value})" if event.line.by_set else ""
 
 
 def _body(part: int, first: dict[int, Event]) -> int:

@@ -35,7 +35,7 @@ def _in_run(case: Case) -> Iterator[Objection]:
                     "correct one of them"
                 ),
             )
-        latest = header.others[0]  # TIME2
+        latest = header.time2
         if header.code.value != BY_TIME and not latest.problem and 0 < latest.value < header.time1.value:
             problem = f"TIME2 is {latest.value:g}, before TIME1 ({header.time1.value:g}), so nothing is ever switched"
             yield latest.field, f"{problem}; a later time was expected, or 0 for no end"

@@ -73,13 +73,13 @@ def test_the_times_are_judged_as_they_are_printed() -> None:
 def test_a_rounded_time_is_told_and_judged() -> None:
     tr = paper.CROSSINGS[2][0] / 1e3
     result = run("card", "--tr", repr(tr), "--td", "0.064", "--part", "1", "--history", ENERGY)
-    assert "note: tr is printed as .012885279, " in result.stderr
-    assert pasted(result) == [(1, 0.012885279, 0.064)]
+    assert "note: tr is printed as .01288528, " in result.stderr
+    assert pasted(result) == [(1, 0.01288528, 0.064)]
     assert result.exit_code == 0
 
 
 def test_parts_are_those_of_the_history() -> None:
-    result = run("card", "--tr", "0.0886", "--td", "0.37", "--part", "box", "--history", BOX)
+    result = run("card", "--tr", "0.0886", "--td", "0.37", "--part", "box", "--history", BOX, "--solver", "ls-dyna")
     box = next(part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box")
     assert pasted(result) == [(box, 0.0886, 0.37)]
     assert "internal energy of box" in comments(result.stdout)
@@ -141,9 +141,15 @@ def test_what_a_real_solver_does_at_the_switches_is_told(solver: str) -> None:
     [
         ("--part 1 --tr 0.09 --td 0.02", "0 <= tr < td was expected"),
         ("--tr 0.01 --td 0.02", "needs --part"),
+        ("--part 1 --td 0.02", "a card needs --tr"),
+        ("--part 1 --tr 0.02 --td 0.09 --tr 0.2", "2 --tr and 1 --td"),
+        ("--part 1 --tr 0.02 --td 0.09 --windows w.txt", "--windows excludes"),
+        ("--part 1 --windows absent.txt", "absent.txt"),
+        ("--part 1 --tr 0.02 --td 0.09 --tr 0.05 --td 0.2", "overlaps"),
+        ("--part 1 --tr 0.2 --td 0.3 --tr 0.05 --td 0.09", "lies before"),
         ("--part door --tr 0.01 --td 0.02", "titles need a --history"),
-        ("--part 1-99999999 --tr 0.01 --td 0.02", "no range"),
-        ("--part 9-3 --tr 0.01 --td 0.02", "no range"),
+        ("--part 1-99999999 --tr 0.01 --td 0.02", "is not a range"),
+        ("--part 9-3 --tr 0.01 --td 0.02", "is not a range"),
         ("--part 0 --tr 0.01 --td 0.02", "does not fit"),
         ("--part 1 --node 3 --tr 0.01 --td 0.02", "--node is an option of --solver radioss"),
         ("--solver radioss --part 1 --tr 0.01 --td 0.02", "needs --node"),
@@ -175,14 +181,58 @@ def test_what_is_no_card_says_why(line: str, message: str) -> None:
 def test_suggest_prints_the_card_of_its_pair() -> None:
     args = ("suggest", "--td", "0.37", "--part", "box", BOX)
     pair = answer(*args)["recommended"]
-    result = run(*args, "-f", "card")
+    result = run(*args, "-f", "card", "--solver", "ls-dyna", "--step-cap", "1e-5", "--swset", "7", "8", "--merge", "3")
     assert result.exit_code == 0
     ((part, tr, td),) = pasted(result)
-    assert tr == pytest.approx(pair["tr"], abs=1e-9)
+    assert tr == pytest.approx(pair["tr"], abs=1e-8)
+    assert re.findall(r"^ +([78]) ", result.stdout, flags=re.MULTILINE) == ["7", "8"]
+    assert f"{part:10d}         3      PART" in result.stdout
+    assert "    1.0e-5         1         0" in result.stdout
     assert td == 0.37
     assert f"--part {part} " not in result.stdout
     assert "verified" in comments(result.stdout)
     assert result.stderr.count("energy-only") == 1
+
+
+def test_the_card_is_that_of_the_solver_that_wrote_the_history() -> None:
+    args = ("suggest", "--td", "0.37", "--part", "box", BOX, "-f", "card")
+    engine = run(*args, "--node", "1001", "--name", "box")
+    assert engine.exit_code == 0
+    assert re.findall(r"^/RUN/box/(\d)", engine.stdout, flags=re.MULTILINE) == ["1", "2", "3"]
+    without = run(*args)
+    assert (without.exit_code, without.stdout) == (2, "")
+    assert "a card for Radioss needs --node" in without.stderr
+    lead = run(*args, "--node", "1001", "--merge", "3")
+    assert "--merge is an option of --solver ls-dyna" in lead.stderr
+    card = ("card", "--tr", "0.0886", "--td", "0.37", "--part", "box", "--history", BOX, "--node", "1001")
+    assert "/RBODY/ON" in run(*card).stdout
+
+
+def test_a_table_takes_the_parts_of_the_card() -> None:
+    args = ("suggest", "--td", "0.0687534", ENERGY, "--part", "11,12")
+    assert [part for part, _, _ in pasted(run(*args, "-f", "card", "--merge", "11"))] == [11, 12]
+    assert run(*args).exit_code == 2
+    assert run(*args, "-q", "--report", "page.html", "--step-cap", "1e-5").exit_code == 0
+    page = Path("page.html").read_text()
+    assert "*DEFORMABLE_TO_RIGID_AUTOMATIC" in page
+    assert "1.0e-5" in page
+    assert "is about the card" in run("suggest", "--td", "0.0687534", ENERGY, "--merge", "11").stderr
+
+
+def test_several_windows_are_one_card() -> None:
+    asked = [(0.02, 0.09), (0.2, 0.3), (0.5, 0.75)]
+    pairs = [text for tr, td in asked for text in ("--tr", str(tr), "--td", str(td))]
+    result = run("card", *pairs, "--part", "11")
+    assert [(tr, td) for _, tr, td in pasted(result)] == asked
+    Path("switches.txt").write_text("".join(f"{tr} {td}\n" for tr, td in asked))
+    assert run("card", "--windows", "switches.txt", "--part", "11").stdout == result.stdout
+    assert (
+        run("card", "--windows", "-", "--part", "11", stdin=Path("switches.txt").read_bytes()).stdout == result.stdout
+    )
+    judged = run("card", *pairs, "--part", "1", "--history", ENERGY)
+    assert judged.exit_code == 2  # 0.3 lies outside the record
+    two = ("--tr", "0.0135867", "--td", "0.0687534", "--tr", "0.0939", "--td", "0.119")
+    assert comments(run("card", *two, "--part", "1", "--history", ENERGY).stdout).count("Judged by") == 2
 
 
 def test_suggest_without_a_pair_prints_no_card() -> None:

@@ -155,6 +155,48 @@ def test_no_readable_deck_is_no_answer(form: str) -> None:
     assert [line.split(": ")[1] for line in result.stderr.splitlines()] == ["absent.k", "run.rad"]
 
 
+@pytest.mark.parametrize("form", [*FORMATS, "ndjson"])
+def test_standard_input_is_a_deck(form: str) -> None:
+    card = run("card", "--tr", "0.02", "--td", "0.09", "--part", "11")
+    result = run("check", "-", "-f", form, stdin=card.stdout_bytes)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert form == "junit" or "D2R306" in result.stdout
+    valid(form, result.stdout)
+    assert run("check", "-", stdin=LATE.encode()).exit_code == 1
+    assert run("check", "-", stdin=b"").exit_code == 2
+
+
+def test_includes_of_standard_input_are_looked_for_here() -> None:
+    place("inner.k", THERE)
+    found = json.loads(run("check", "-", "-f", "json", stdin=f"{HEAD}{PARTS}*INCLUDE\ninner.k\n".encode()).stdout)
+    assert [window["file"] for window in found["windows"]] == ["inner.k"]
+
+
+def test_a_folder_stands_for_its_main_decks() -> None:
+    place("runs/a/main.k", HEAD + PARTS + "*INCLUDE\ninner.k\n" + END)
+    place("runs/a/inner.k", "*KEYWORD\n" + THERE)
+    place("runs/b/other.key", "$ a title\n" + LATE)
+    place("runs/notes.txt", "nothing")
+    place("runs/.git/main.k", LATE)
+    assert answer("check", "runs")["decks"] == ["runs/a/main.k", "runs/b/other.key"]
+    assert answer("check", "runs", "runs/a/main.k")["summary"]["decks"] == 2
+    Path("empty").mkdir()
+    result = run("check", "empty")
+    assert result.exit_code == 2
+    assert "no main deck in this folder" in result.stderr
+    assert run("check", "empty", "runs/b/other.key").exit_code == 1
+
+
+def test_ndjson_is_a_line_for_each_deck() -> None:
+    decks = [place("a.k", LATE), place("b.k", GOOD)]
+    lines = run("check", *decks, "-f", "ndjson").stdout.splitlines()
+    found = [json.loads(line) for line in lines]
+    assert [one["decks"] for one in found] == [["a.k"], ["b.k"]]
+    assert [one["summary"]["errors"] for one in found] == [1, 0]
+    for line in lines:
+        valid("json", line)
+
+
 # Which rules count.
 
 

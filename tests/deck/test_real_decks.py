@@ -18,8 +18,8 @@ FOUND: dict[str, dict[str, int]] = {
     "batmac_nail_main.k": {"D2R003": 5, "D2R301": 1},
     "jr_pendulum.k": {"D2R104": 2, "D2R302": 2},
     "k2rad_plain_lrb.k": {"D2R104": 2, "D2R302": 2},
-    "koo_pair_code24.k": {"D2R302": 2},
-    "koo_pair_code42_wrong.k": {"D2R005": 1, "D2R302": 2},
+    "koo_pair_code24.k": {"D2R009": 2, "D2R302": 2},
+    "koo_pair_code42_wrong.k": {"D2R005": 1, "D2R009": 2, "D2R302": 2},
     "koo_plan_doc_snippet.txt": {"D2R001": 2, "D2R002": 12},
     "lstc_pendulum_restart.k": {"D2R302": 2},
     "nodes.k": {},
@@ -78,6 +78,7 @@ def test_the_snippet_is_not_in_legal_columns() -> None:
 def test_swapped_codes_are_named() -> None:
     (finding,) = (finding for finding in check("koo_pair_code42_wrong.k").findings if finding.rule == "D2R005")
     assert "seem to be swapped" in finding.message
+    assert finding.severity == "error"
 
 
 @pytest.mark.parametrize("name", ["jr_pendulum.k", "k2rad_plain_lrb.k"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from functools import cache
@@ -40,7 +41,11 @@ def findings(folder: Path, rule: Rule, example: Example) -> list[dict[str, Any]]
     if example.history:
         (folder / "energy.csv").write_bytes(history(example.history))
         options += ["--history", str(folder / "energy.csv")]
-    found = answer("check", write(folder, example.deck, example.files), *options)["findings"]
+    path = write(folder, example.deck, example.files)
+    if example.stdin:
+        found = json.loads(run("check", "-", "-f", "json", stdin=example.deck.encode()).stdout)["findings"]
+    else:
+        found = answer("check", path, *options)["findings"]
     return [finding for finding in found if finding["rule"] == rule.id]
 
 
@@ -162,3 +167,61 @@ def before_the_second(comment: str) -> str:
     """A deck with one fault, and a comment before the card that has it."""
     second = SWAPPED.rindex("*DEFORMABLE_TO_RIGID_AUTOMATIC")
     return f"{SWAPPED[:second]}{comment}\n{SWAPPED[second:]}"
+
+
+def message(folder: Path, rule: str, deck: str) -> str:
+    """The only finding of a rule."""
+    (finding,) = (one for one in check_deck(write(folder, deck)).findings if one.rule == rule)
+    return finding.message
+
+
+@pytest.mark.parametrize("paired", [True, False])
+@pytest.mark.parametrize(("codes", "weight"), [((4, 2), {"error"}), ((2, 4), set()), ((3, 1), {"error"})])
+def test_rigid_in_the_impact_and_deformable_in_flight_is_an_error(
+    tmp_path: Path, codes: tuple[int, int], weight: set[str], paired: bool
+) -> None:
+    pairs = ((2, 1), (1, -1)) if paired else ((0, 0), (0, 0))
+    there = automatic(1, "0.0", rigid=["1"], code=codes[0], pair=pairs[0])
+    deck = HEAD + PARTS + there + automatic(2, "0.0", deformable=["1"], code=codes[1], pair=pairs[1]) + END
+    findings = check_deck(write(tmp_path, deck)).findings
+    assert {finding.severity for finding in findings if finding.rule == "D2R005"} == weight
+    weighed = check_deck(write(tmp_path, deck), Configuration(severity={"D2R005": "info"})).findings
+    assert {finding.severity for finding in weighed if finding.rule == "D2R005"} <= {"info"}
+
+
+def test_an_unknown_part_lists_its_neighbours_with_their_titles(tmp_path: Path) -> None:
+    told = message(tmp_path, "D2R106", HEAD + PARTS + automatic(1, "0.02", rigid=["7"]) + END)
+    assert told.startswith("part 7 not in the deck (nearest to 7: 1 'door', 2 'frame')")
+
+
+def test_shared_nodes_of_a_part_set_name_the_set(tmp_path: Path) -> None:
+    mesh = "*ELEMENT_SHELL\n" + "".join(f"{one:8d}{one:8d}{one:8d}{3:8d}{8:8d}{9:8d}\n" for one in (1, 2))
+    sets = "*SET_PART\n         3\n         1         2\n"
+    line = "         3         0      PSET"
+    deck = HEAD + PARTS + mesh + sets + automatic(1, "0.02", rigid=[line]) + END
+    assert "part 1 (of part set 3) and part 2 (of part set 3) share node 3" in message(tmp_path, "D2R108", deck)
+
+
+def test_missing_lines_of_a_card_are_named(tmp_path: Path) -> None:
+    lines = THERE.split("\n")
+    without = {
+        "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing;": lines[:1],
+        "the second line (NRBF to OFFSET) is missing": lines[:3],
+        "is missing, '1         0      PART' stands": lines[:3] + lines[5:],
+        "are missing, '1         0      PART' stands in their place": [lines[0], lines[5], lines[5]],
+        "the third line, with the first part, is missing": lines[:5],
+    }
+    for told, kept in without.items():
+        deck = HEAD + PARTS + "\n".join(kept) + "\n" + END
+        assert told in message(tmp_path, "D2R001", deck)
+        assert not found(tmp_path, deck)["D2R002"]
+
+
+def test_contacts_are_listed_where_none_has_the_number(tmp_path: Path) -> None:
+    deck = next(iter(RULES["D2R007"].failing)).deck
+    assert "the deck has 7 (*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID 'floor')" in message(tmp_path, "D2R007", deck)
+
+
+def test_a_file_with_nothing_but_its_end_says_what_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(DeckError, match=r"only \*END was found.*\*KEYWORD and the cards were expected"):
+        check_deck(write(tmp_path, "$ title\n*END\n"))

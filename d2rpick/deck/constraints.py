@@ -1,0 +1,98 @@
+"""Nodal rigid bodies, extra nodes and joints of a deck: constraints that stay when their parts become rigid.
+
+Columns: the vendor's keyword data as published in its Python library.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.deck.card import Card
+    from d2rpick.deck.reader import Deck
+    from d2rpick.deck.rows import Field, Row
+
+Kind = Literal["nodal rigid body", "extra nodes", "joint"]
+_PER_LINE = 8
+_JOINT_NODES = 6
+_LISTS = {"LIST", "TITLE", "GENERATE", "COLUMN"}
+
+
+class Constraint(NamedTuple):
+    """A constraint: what it is, where it stands, its id (0: none), its nodes and the rigid part it belongs to."""
+
+    kind: Kind
+    place: Field
+    id: int
+    nodes: frozenset[int]
+    part: int | None = None
+
+
+def read_constraints(deck: Deck) -> list[Constraint]:
+    """Collect the constraints of a deck; one whose nodes cannot be known has none."""
+    sets = _node_sets(deck)
+    found: list[Constraint] = []
+    for card in deck.named("CONSTRAINED_NODAL_RIGID_BODY"):
+        found += _nodal_rigid_bodies(card, sets)
+    for card in deck.named("CONSTRAINED_EXTRA_NODES"):
+        found += _extra_nodes(card, sets)
+    for card in deck.named("CONSTRAINED_JOINT"):
+        found += _joints(card)
+    return found
+
+
+def _nodal_rigid_bodies(card: Card, sets: dict[int, frozenset[int]]) -> Iterator[Constraint]:
+    options = set(card.name.removeprefix("CONSTRAINED_NODAL_RIGID_BODY").split("_")) - {""}
+    rows = [row for row in card.rows if not row.blank]
+    if options - {"TITLE"}:  # further lines follow the first: one body per keyword
+        rows = rows[:2] if "TITLE" in options else rows[:1]
+    for row in rows[1::2] if "TITLE" in options else rows:
+        body, nodes = card.integer(row, 0), card.integer(row, 2)
+        members = sets.get(nodes.value + card.transform.set_, frozenset()) if nodes.value else frozenset()
+        yield Constraint("nodal rigid body", body.field, body.value, members)
+
+
+def _extra_nodes(card: Card, sets: dict[int, frozenset[int]]) -> Iterator[Constraint]:
+    for row in card.rows:
+        part, other = card.integer(row, 0), card.integer(row, 1)
+        if row.blank or part.problem or other.problem:
+            continue
+        if card.name.endswith("_SET"):
+            nodes = sets.get(other.value + card.transform.set_, frozenset())
+        else:
+            nodes = frozenset({other.value + card.transform.node})
+        yield Constraint("extra nodes", part.field, 0, nodes, part.value + card.transform.part)
+
+
+def _joints(card: Card) -> Iterator[Constraint]:
+    if card.name.startswith(("CONSTRAINED_JOINT_STIFFNESS", "CONSTRAINED_JOINT_COOR", "CONSTRAINED_JOINT_USER_FORCE")):
+        return
+    rows = [row for row in card.rows if not row.blank]
+    number = card.integer(rows[0], 0).value if rows and card.name.endswith("_ID") else 0
+    for row in rows[1:2] if card.name.endswith("_ID") else rows[:1]:
+        values = [card.integer(row, at) for at in range(_JOINT_NODES)]
+        nodes = frozenset(value.value + card.transform.node for value in values if value.value > 0)
+        yield Constraint("joint", values[0].field, number, nodes)
+
+
+def _node_sets(deck: Deck) -> dict[int, frozenset[int]]:
+    """Members of the node sets whose lines are followed."""
+    found: dict[int, frozenset[int]] = {}
+    for card in deck.named("SET_NODE"):
+        options = set(card.name.split("_")[2:])
+        rows = [row for row in (card.rows[1:] if "TITLE" in options else card.rows) if not row.blank]
+        if rows and options <= _LISTS:
+            members = _members(card, rows[1:], options)
+            found[card.integer(rows[0], 0).value + card.transform.set_] = members
+    return found
+
+
+def _members(card: Card, rows: Sequence[Row], options: set[str]) -> frozenset[int]:
+    per_line = 1 if "COLUMN" in options else _PER_LINE
+    ids = [card.integer(row, at).value for row in rows for at in range(per_line)]
+    ids = [number + card.transform.node for number in ids if number > 0]
+    if "GENERATE" not in options:
+        return frozenset(ids)
+    return frozenset(node for low, high in zip(ids[::2], ids[1::2], strict=False) for node in range(low, high + 1))

@@ -1,0 +1,58 @@
+"""Main decks of a folder: those that begin as one and that no other file includes."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from d2rpick.deck.reader import read_deck
+from d2rpick.errors import DeckError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_HEAD = 64 * 1024  # bytes in which a deck shows what it is: titles and comments come before
+
+
+def main_decks(folder: str) -> list[str]:
+    """Find the main decks in a folder and below it.
+
+    A main deck holds ``*KEYWORD`` (LS-DYNA) or ``/BEGIN`` (Radioss) near its beginning, and no other deck of the
+    folder includes it.  Hidden files and folders are passed over.
+
+    Raises
+    ------
+    DeckError
+        If there is none, with what to do.
+    """
+    decks = [path for path in _files(folder) if _begins(path)]
+    included: set[str] = set()
+    for path in decks:
+        try:
+            included.update(map(os.path.realpath, read_deck(path).files[1:]))
+        except DeckError:
+            continue  # said when it is checked
+    found = [path for path in decks if os.path.realpath(path) not in included]
+    if not found:
+        what = "every one is included by another" if decks else "no file with *KEYWORD or /BEGIN"
+        raise DeckError(f"{folder}: no main deck in this folder ({what}); name the deck itself")
+    return found
+
+
+def _files(folder: str) -> Iterator[str]:
+    for root, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        yield from (str(Path(root) / name) for name in sorted(names) if not name.startswith("."))
+
+
+def _begins(path: str) -> bool:
+    """Whether a file says near its beginning that it is a main deck."""
+    try:
+        with Path(path).open("rb") as stream:
+            head = stream.read(_HEAD)
+    except OSError:
+        return False
+    lines = (line.strip().upper() for line in head.removeprefix(b"\xef\xbb\xbf").splitlines())
+    first = next((line for line in lines if line[:1] in {b"*", b"/"}), b"")
+    return first.startswith((b"*KEYWORD", b"/BEGIN")) and b"\0" not in head

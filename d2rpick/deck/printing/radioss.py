@@ -1,0 +1,93 @@
+"""Radioss: engine files whose legs end at the switching times, with /RBODY/ON and /RBODY/OFF."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+from d2rpick import __version__
+from d2rpick.deck.printing.common import PHYSICS, PrintedCard, check_ids, check_windows, comments
+from d2rpick.errors import DeckError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.deck.printing.common import Printing, Times
+
+TITLE = "Radioss"
+HISTORIES: tuple[str, ...] = ("radioss-th",)
+SWITCHES = "node"
+TAKES: tuple[str, ...] = ("step_cap", "end", "name")
+
+_RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
+_NODES_PER_LINE = 10
+_CAP_SHARE = 1000  # of the rigid window, per step: the release is at most a thousandth of it late
+_MOST_LEGS = 99  # the solver numbers them with two digits where it matters, in the names of time histories
+_SOLVER = (
+    "Ids are main nodes of /RBODY, not bodies; an unknown one is skipped silently.",
+    "Gravity and damping act on a rigid body only if its main node is in their",
+    "  node groups; no warning is given.",
+    "The energy reported for rigid solids can be wrong until the release.",
+    "The starter looks for /RBODY/OFF in the engine files; keep all of them.",
+    "Repeat your output keywords (/TFILE, /ANIM, ...) in every file.",
+)
+
+
+class Leg(NamedTuple):
+    """An engine run: its number, its end, and whether the bodies are rigid in it; ``cap`` is its largest step."""
+
+    number: int
+    stop: float
+    rigid: bool
+    cap: float | None
+
+
+def cards(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+    """Print the engine files, a leg up to each switch and one to the end.
+
+    The main nodes are those of /RBODY in the starter file, of bodies without sensor.  Without a cap the step is
+    held below a thousandth of the shortest rigid window while the bodies are rigid.
+
+    Raises
+    ------
+    DeckError
+        If windows do not follow each other, an id does not fit, or the run does not end after the last window.
+    """
+    windows, ids = check_windows(windows), check_ids(printing.node)
+    name = printing.name
+    if not _RUN_NAME.fullmatch(name):
+        raise DeckError(f"the name of the run is {name!r}, letters, digits, '.', '_' and '-' were expected")
+    if printing.end is None or not windows[-1][1] < printing.end < math.inf:
+        found = "the end of the run is not given" if printing.end is None else f"the run ends at {printing.end:g}"
+        raise DeckError(f"{found}, a time after td = {windows[-1][1]:g} was expected")
+    listed = [" ".join(map(str, ids[i : i + _NODES_PER_LINE])) for i in range(0, len(ids), _NODES_PER_LINE)]
+    files = {
+        f"{name}_{leg.number:04d}.rad": "\n".join(_engine(leg, name, listed)) + "\n"
+        for leg in legs(windows, printing.end, printing.step_cap)
+    }
+    spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
+    head = comments([f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *_SOLVER, *remarks])
+    text = "".join(f"# {line}\n" for line in head)
+    text += "".join(f"# ---- {file}\n{content}" for file, content in files.items())
+    return PrintedCard(text, windows, files)
+
+
+def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[Leg]:
+    """Give the engine runs that the windows ask for; a window from 0 on needs none before it."""
+    cap = step_cap or float(f"{min(td - tr for tr, td in windows) / _CAP_SHARE:.2g}")
+    stops = [(time, rigid) for tr, td in windows for time, rigid in ((tr, False), (td, True)) if time > 0]
+    if len(stops) >= _MOST_LEGS:
+        raise DeckError(f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected")
+    numbered = enumerate([*stops, (end, False)], start=1)
+    return [Leg(number, stop, rigid, cap if rigid else None) for number, (stop, rigid) in numbered]
+
+
+def _engine(leg: Leg, name: str, listed: Sequence[str]) -> Iterator[str]:
+    yield f"/RUN/{name}/{leg.number}"
+    yield f"{leg.stop!r:>20}"
+    yield "/RBODY/ON" if leg.rigid else "/RBODY/OFF"
+    yield from listed
+    if leg.cap is not None:
+        yield from ("# with nothing deformable left the step would grow without limit", "/DTIX")
+        yield f"{leg.cap!r} {leg.cap!r}"
