@@ -4,33 +4,33 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.verify import verify
+from d2rpick.choice.verify import verify_at
 from d2rpick.deck.printing.cards import ls_dyna
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Situation
     from d2rpick.choice.verify import Verdict
     from d2rpick.deck.printing.cards import PrintedCard
-    from d2rpick.histories.history import History
 
 
 def judged(
-    write: Callable[[Sequence[str]], PrintedCard], history: History, settings: Settings
+    write: Callable[[Sequence[str]], PrintedCard], judge: Callable[[float, float], Verdict]
 ) -> tuple[PrintedCard, Verdict]:
-    """Write a card, judge its times as printed, and write it again with what was found as comments."""
+    """Write a card, let ``judge`` judge its tr and td as printed, and write it again with what it found as comments."""
     plain = write(())
-    verdict = verify(history, plain.tr, plain.td, settings)
+    verdict = judge(plain.tr, plain.td)
     return write(tuple(_remarks(verdict))), verdict
 
 
-def of_parts(history: History, times: tuple[float, float], settings: Settings) -> tuple[PrintedCard, Verdict] | None:
+def of_parts(situation: Situation, times: tuple[float, float]) -> tuple[PrintedCard, Verdict] | None:
     """Write the LS-DYNA card of the parts that were chosen for (tr, td), judged; None where none were."""
-    if not history.parts:
+    parts = situation.history.parts
+    if not parts:
         return None
-    ids = [part.id for part in history.parts]
-    return judged(lambda remarks: ls_dyna(*times, ids, remarks=remarks), history, settings)
+    ids = [part.id for part in parts]
+    return judged(lambda remarks: ls_dyna(*times, ids, remarks=remarks), lambda tr, td: verify_at(situation.at(td), tr))
 
 
 def _remarks(verdict: Verdict) -> Iterator[str]:

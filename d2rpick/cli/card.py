@@ -91,12 +91,13 @@ def _judged(
 ) -> tuple[PrintedCard, bool]:
     """Write the card with the verdict of the history in its comments, and tell it on stderr too."""
     from d2rpick.choice.judged_card import judged
+    from d2rpick.choice.of_run import Reference, verify_of
 
     run, settings = reference
     parts = () if options["energy"] or not run.parts else options["part"]
-    history = run.history(shared.selection({**options, "part": ()})._replace(parts=parts), with_momenta=True)
-    card, verdict = judged(write, history, settings)
-    output.notes(history.notes, all_cautions(verdict))
+    asked = Reference.of(run, shared.selection({**options, "part": ()})._replace(parts=parts))
+    card, verdict = judged(write, partial(verify_of, asked, settings=settings))
+    output.notes(asked.history.notes, all_cautions(verdict))
     return card, verdict.verified
 
 

@@ -11,9 +11,9 @@ from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
+    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.suggest import Suggestion
-    from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
 
 EXAMPLES = """\b
@@ -58,8 +58,7 @@ def command(
     A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
-    from d2rpick.choice.suggest import with_health
-    from d2rpick.histories.balance_terms import balance_of
+    from d2rpick.choice.of_run import Reference
     from d2rpick.report import suggestion as report
 
     if _only_in_environment(ctx, "td", overruled_by="td_window"):
@@ -70,11 +69,9 @@ def command(
     with reading(options["history"], quiet=options["quiet"]):
         run = shared.open_run(options)
         output = Output.of(options, *run.sources)
-        history = run.history(shared.selection(options), with_momenta=True)
-    answer = _answer(history, td, td_window, shared.settings(options))
-    if balance := balance_of(run, history.parts, answer.situation.td):
-        answer = with_health(answer, balance)
-    output.notes(history.notes, answer.cautions)
+        reference = Reference.of(run, shared.selection(options))
+    answer = _answer(reference, td_window if td is None else td, shared.settings(options))
+    output.notes(reference.history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick.report import figures
 
@@ -112,17 +109,15 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
         raise click.UsageError("-f card needs --part, the parts that are switched")
 
 
-def _answer(history: History, td: float | None, window: tuple[float, float] | None, settings: Settings) -> Suggestion:
-    """Choose tr for ``td``, or both in ``window``; UsageError with what the record tells when neither is given."""
-    from d2rpick.choice.suggest import suggest
+def _answer(reference: Reference, td: float | tuple[float, float] | None, settings: Settings) -> Suggestion:
+    """Choose tr for td, or both in a window; UsageError with what the record tells when neither is given."""
+    from d2rpick.choice.of_run import suggest_of
 
-    if td is not None:
-        return suggest(history, td, settings)
-    from d2rpick.choice.suggest_td import advice, suggest_in_window
+    if td is None:
+        from d2rpick.choice.suggest_td import advice
 
-    if window is None:
-        raise click.UsageError(advice(history, settings))
-    return suggest_in_window(history, window, settings)
+        raise click.UsageError(advice(reference.history, settings))
+    return suggest_of(reference, td, settings)
 
 
 def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
@@ -143,8 +138,8 @@ def _card(answer: Suggestion, output: Output) -> bool:
     from d2rpick.choice.judged_card import of_parts
     from d2rpick.cli.card import all_cautions
 
-    pair, situation = answer.recommended, answer.situation
-    found = of_parts(situation.history, (pair.tr, pair.td), situation.settings) if pair else None
+    pair = answer.recommended
+    found = of_parts(answer.situation, (pair.tr, pair.td)) if pair else None
     if found is None:
         output.content(b"")
         return False

@@ -95,7 +95,7 @@ def solver_input(situation: Situation, times: tuple[float, float], record: Recor
     if radioss:
         return section(title, *printed)
     try:
-        found = of_parts(history, times, situation.settings)
+        found = of_parts(situation, times)
     except D2RPickError as error:
         return section(title, tag("p", f"There is no card for these times: {error}"))
     return section(title, tag("pre", found[0].text)) if found else section(title, *printed)
