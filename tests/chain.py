@@ -6,7 +6,8 @@ import csv
 from functools import cache
 from typing import TYPE_CHECKING
 
-from d2rpick.histories.opening import Selection, read_history
+from d2rpick.histories.opening import Selection
+from tests.reading import read_history
 from tests.shared import shared
 
 if TYPE_CHECKING:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from d2rpick.choice.of_run import read
 from d2rpick.histories.database import Legs
 from d2rpick.histories.opening import Run, Selection
 from d2rpick.histories.source import Source
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Reader
 
@@ -27,6 +30,11 @@ def history_of(
     """Read the history that is selected, by default the internal energy."""
     selection = selection or Selection()
     return run_of(reader, *contents, selection=selection, name=name).history(selection)
+
+
+def read_history(names: Sequence[str], selection: Selection | None = None, input_format: str = "auto") -> History:
+    """Read the history that is selected of a run, by default the internal energy."""
+    return read(names, selection or Selection(), input_format).history
 
 
 def states_of(history: History) -> list[tuple[float, float]]:

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.verify import verify
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
 from d2rpick.deck.printing.common import Printing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
-    from d2rpick.choice.settings import Settings
     from d2rpick.choice.verify import Verdict
     from d2rpick.deck.printing.common import PrintedCard, Times
     from d2rpick.histories.history import History
@@ -36,9 +34,9 @@ class CardWish:
 
 
 def judged_card(
-    windows: Sequence[Times], history: History, settings: Settings, wish: CardWish
+    windows: Sequence[Times], history: History, judge: Callable[[float, float], Verdict], wish: CardWish
 ) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
-    """Print the card of windows, judge each as printed, and print it with what was found as comments.
+    """Print the card of windows, let ``judge`` judge each tr and td as printed, and print it with what it found.
 
     None where nobody says whom the card switches: the chosen parts, or main nodes for a solver that asks for these.
     """
@@ -46,7 +44,7 @@ def judged_card(
     if not getattr(printing, SOLVERS[solver].SWITCHES):
         return None
     plain = cards(windows, printing, solver)
-    verdicts = tuple(verify(history, tr, td, settings) for tr, td in plain.windows)
+    verdicts = tuple(judge(tr, td) for tr, td in plain.windows)
     return cards(windows, printing, solver, tuple(_remarks(verdicts))), verdicts
 
 

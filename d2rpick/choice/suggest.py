@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.candidates import Candidate, find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import Expectation, expectation
 from d2rpick.choice.ranking import best_of, over_limits, rank
-from d2rpick.choice.verify import Verdict
 from d2rpick.choice.warnings import Caution, cautions_of
 
 if TYPE_CHECKING:
     from d2rpick.choice.health import Health
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
-    from d2rpick.histories.energy_balance import Balance
     from d2rpick.histories.history import History
 
 
@@ -44,12 +42,13 @@ class Suggestion(NamedTuple):
     expected: Expectation | None = None
 
 
-_Answer = TypeVar("_Answer", Suggestion, Verdict)
-
-
 def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     """Rank the candidates for tr at ``td`` and recommend one; RangeError when td lies outside the record."""
-    situation = examine(history, td, settings)
+    return suggest_at(examine(history, td, settings))
+
+
+def suggest_at(situation: Situation) -> Suggestion:
+    """Rank the candidates for tr in a situation that is known, and recommend one."""
     candidates = rank(find_candidates(situation))
     best = best_of(situation, candidates)
     if best:
@@ -60,27 +59,9 @@ def suggest(history: History, td: float, settings: Settings) -> Suggestion:
         cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
     if not better:
         cautions.append(Caution("no-better-td", "no peak of the energy in the flight has an acceptable tr"))
-    recommended = Pair(best.tr, td, best.residual) if best else None
+    recommended = Pair(best.tr, situation.td, best.residual) if best else None
     expected = expectation(situation, best.energy if best else None)
     return Suggestion(situation, candidates, recommended, better, tuple(cautions), expected=expected)
-
-
-def with_health(answer: _Answer, balance: Balance) -> _Answer:
-    """Add how far the reference run can be trusted, above all in the rigid window, else in the flight up to td.
-
-    ``balance`` is that of the reference run up to td: what comes later does not matter for the choice.
-    """
-    from d2rpick.choice.health import assess, cautions_of_health
-
-    history, td = answer.situation.history, answer.situation.td
-    if isinstance(answer, Verdict):
-        start: float | None = answer.candidate.tr
-    else:
-        start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
-    window = None if start is None or start >= td else (start, td)
-    locked = history.mean_energy(*window) if window else None
-    health = assess(balance, window, locked)
-    return answer._replace(health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
 
 
 def better_pair(situation: Situation) -> Pair | None:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import expectation, mean_in_flight, shortfall
 from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, rank
-from d2rpick.choice.suggest import Pair, Suggestion, suggest
+from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
 from d2rpick.flight.momentum import all_flights, to_be_asked
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
+
+    Look = Callable[[float], Situation]
 
 # Peaks of a window that are tried, the highest first: the higher a peak of several modes, the less energy is kinetic.
 _MOST_PEAKS = 12
@@ -33,14 +38,15 @@ def suggest_in_window(history: History, window: tuple[float, float], settings: S
     """
     for time in window:
         history.energy_at(time)
-    situation = _flying(history, window, settings)
+    look = cache(partial(examine, history, settings=settings))  # the record is examined once for each td
+    situation = _flying(look, window)
     window_in_flight = window[0], max(window[0], min(window[1], situation.latest_td))
     if situation.vibration is None:
-        found = _highest(situation, window_in_flight)
+        found = _highest(situation, window_in_flight, look)
     else:
         peaks = situation.peaks(*window_in_flight)
-        td = _best_td(situation, peaks) or _best_td(situation, window_in_flight) or window[1]
-        found = suggest(history, td, settings)
+        best = _best(situation, peaks, look) or _best(situation, window_in_flight, look)
+        found = suggest_at(best or look(window[1]))
     return found._replace(td_window=window)
 
 
@@ -61,37 +67,37 @@ def advice(history: History, settings: Settings) -> str:
     return f"{', '.join(history.source)}: {where}, {last}; give --td or --td-window"
 
 
-def _flying(history: History, window: tuple[float, float], settings: Settings) -> Situation:
+def _flying(look: Look, window: tuple[float, float]) -> Situation:
     """Situation at the start, middle or end of the window: in the flight that is known best, the first of these."""
     low, high = window
-    situations = [examine(history, td, settings) for td in (low, (low + high) / 2, high)]
+    situations = [look(td) for td in (low, (low + high) / 2, high)]
     return min(situations, key=lambda one: (not one.in_flight, _SOURCES.index(one.flight.source)))
 
 
-def _best_td(situation: Situation, times: tuple[float, ...]) -> float | None:
-    """Td of the best pair, of the highest of these times; None where none has an acceptable tr."""
+def _best(situation: Situation, times: tuple[float, ...], look: Look) -> Situation | None:
+    """Situation at the td of the best pair, of the highest of these times; None where none has an acceptable tr."""
     highest = sorted(times, key=lambda t: -situation.energy_at(t))[:_MOST_PEAKS]
     pairs: list[tuple[Situation, Candidate]] = []
     for td in highest:
-        there = examine(situation.history, td, situation.settings)
+        there = look(td)
         best = best_of(there, rank(find_candidates(there)))
         if best and not best.same_swing:
             pairs.append((there, best))
     limit = min((best.error for _, best in pairs), default=0.0) + EQUALLY_GOOD
-    good = [(best.rigid_time, there.td) for there, best in pairs if best.error <= limit]
-    return max(good)[1] if good else None
+    good = [(best.rigid_time, there) for there, best in pairs if best.error <= limit]
+    return max(good, key=lambda one: (one[0], one[1].td))[1] if good else None
 
 
-def _highest(situation: Situation, window: tuple[float, float]) -> Suggestion:
+def _highest(situation: Situation, window: tuple[float, float], look: Look) -> Suggestion:
     """Choose the highest peaks up to twice the mean energy; without them what is best at the end of the window."""
-    history, settings, mean = situation.history, situation.settings, mean_in_flight(situation)
+    history, mean = situation.history, mean_in_flight(situation)
     if mean is not None:
         peaks = [t for t in situation.peaks(*window) if shortfall(history.energy_at(t), mean) < 1]
         peaks_before = set(situation.peaks(float(history.time[0]), window[1]))
         for td in sorted(peaks, key=lambda t: shortfall(history.energy_at(t), mean)):
             if not any(c.acceptable and not c.same_swing for c in find_candidates(situation.at(td))):
                 continue  # an oscillator is not sought again for each peak
-            found = suggest(history, td, settings)
+            found = suggest_at(look(td))
             errors = [
                 (shortfall(c.energy, mean), c)
                 for c in found.candidates
@@ -101,7 +107,7 @@ def _highest(situation: Situation, window: tuple[float, float]) -> Suggestion:
             good = [c for error, c in errors if error <= limit < float("inf")]
             if good:
                 return _recommending(found, min(good, key=lambda c: c.tr))
-    return suggest(history, window[1], settings)
+    return suggest_at(look(window[1]))
 
 
 def _recommending(found: Suggestion, best: Candidate) -> Suggestion:

@@ -39,10 +39,15 @@ class Verdict(NamedTuple):
 
 def verify(history: History, tr: float, td: float, settings: Settings) -> Verdict:
     """Judge one pair; RangeError when a time lies outside the record or tr is not before td."""
-    if not tr < td:
-        raise RangeError(f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td")
-    situation = examine(history, td, settings)
-    history.energy_at(tr)
+    _in_order(tr, td)
+    return verify_at(examine(history, td, settings), tr)
+
+
+def verify_at(situation: Situation, tr: float) -> Verdict:
+    """Judge one pair in a situation that is known; RangeError when tr lies outside the record or is not before td."""
+    settings, td = situation.settings, situation.td
+    _in_order(tr, td)
+    situation.history.energy_at(tr)
     (candidate,) = judge(situation, [Found(tr, "given", None)])
     known = situation.flight.start is not None
     share = situation.kinetic_share
@@ -60,6 +65,11 @@ def verify(history: History, tr: float, td: float, settings: Settings) -> Verdic
         reasons=reasons,
         cautions=tuple(cautions_of(situation)),
     )
+
+
+def _in_order(tr: float, td: float) -> None:
+    if not tr < td:
+        raise RangeError(f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td")
 
 
 def approve(situation: Situation, times: Iterable[float]) -> list[bool]:

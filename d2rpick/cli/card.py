@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -117,6 +118,7 @@ def _judged(
 ) -> tuple[PrintedCard, bool]:
     """Write the card with the verdict of the history in its comments, and tell it on stderr too."""
     from d2rpick.choice.judged_card import judged_card
+    from d2rpick.choice.of_run import Reference, verify_of
     from d2rpick.deck.printing import SOLVERS
 
     run, settings = reference
@@ -125,7 +127,8 @@ def _judged(
     module = SOLVERS[wish.of(history)[0]]
     if wish.printing.part and module.SWITCHES != "part":
         raise click.UsageError(_ONLY_JUDGED.format(module.TITLE))
-    found = judged_card(windows, history, settings, wish)
+    judge = partial(verify_of, Reference(run, history), settings=settings)
+    found = judged_card(windows, history, judge, wish)
     if found is None:
         raise click.UsageError(need_ids(wish, history))
     card, verdicts = found

@@ -12,9 +12,9 @@ from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
+    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.suggest import Suggestion
-    from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
 
 EXAMPLES = """\b
@@ -60,8 +60,7 @@ def command(
     A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
-    from d2rpick.choice.suggest import with_health
-    from d2rpick.histories.balance_terms import balance_of
+    from d2rpick.choice.of_run import Reference
     from d2rpick.report import suggestion as report
 
     if _only_in_environment(ctx, "td", overruled_by="td_window"):
@@ -73,11 +72,9 @@ def command(
     with reading(options["history"], quiet=options["quiet"]):
         run = shared.open_run({**options, "part": ()})
         output = Output.of(options, *run.sources)
-        history = energy_of(run, options, prints=prints)
-    answer = _answer(history, td, td_window, shared.settings(options))
-    if balance := balance_of(run, history.parts, answer.situation.td):
-        answer = with_health(answer, balance)
-    output.notes(history.notes, answer.cautions)
+        reference = Reference(run, energy_of(run, options, prints=prints))
+    answer = _answer(reference, td_window if td is None else td, shared.settings(options))
+    output.notes(reference.history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick.report import figures
 
@@ -115,17 +112,15 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
         raise click.UsageError("-f card needs --part, the parts that are switched (Radioss: --node, their main nodes)")
 
 
-def _answer(history: History, td: float | None, window: tuple[float, float] | None, settings: Settings) -> Suggestion:
-    """Choose tr for ``td``, or both in ``window``; UsageError with what the record tells when neither is given."""
-    from d2rpick.choice.suggest import suggest
+def _answer(reference: Reference, td: float | tuple[float, float] | None, settings: Settings) -> Suggestion:
+    """Choose tr for td, or both in a window; UsageError with what the record tells when neither is given."""
+    from d2rpick.choice.of_run import suggest_of
 
-    if td is not None:
-        return suggest(history, td, settings)
-    from d2rpick.choice.suggest_td import advice, suggest_in_window
+    if td is None:
+        from d2rpick.choice.suggest_td import advice
 
-    if window is None:
-        raise click.UsageError(advice(history, settings))
-    return suggest_in_window(history, window, settings)
+        raise click.UsageError(advice(reference.history, settings))
+    return suggest_of(reference, td, settings)
 
 
 def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
@@ -145,13 +140,14 @@ def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:
     """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
     from d2rpick.choice.judged_card import judged_card
+    from d2rpick.choice.verify import verify_at
 
     pair, situation = answer.recommended, answer.situation
     if pair is None:
         output.content(b"")
         return False
     wish = card_wish(run, options, situation.history)
-    found = judged_card([(pair.tr, pair.td)], situation.history, situation.settings, wish)
+    found = judged_card([(pair.tr, pair.td)], situation.history, lambda tr, td: verify_at(situation.at(td), tr), wish)
     if found is None:
         raise click.UsageError(need_ids(wish, situation.history))
     card, (verdict,) = found

@@ -12,12 +12,8 @@ from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.verify import Verdict
-    from d2rpick.histories.history import Part, Track
-    from d2rpick.histories.opening import Run, Selection
+    from d2rpick.histories.opening import Run
 
 EXAMPLES = """\b
 Examples:
@@ -59,9 +55,7 @@ class _Verify(click.Command):
 @click.pass_context
 def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exit_zero: bool, **options: Any) -> None:
     """Judge one pair of switch times against the HISTORY of a run without switching."""
-    from d2rpick.choice.suggest import with_health
-    from d2rpick.choice.verify import verify, with_comparison
-    from d2rpick.histories.balance_terms import balance_of
+    from d2rpick.choice.of_run import Reference, compare_with, verify_of
     from d2rpick.report import verdict as report
 
     prints = prints_card(options, output_format)
@@ -69,14 +63,12 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
         run = shared.open_run({**options, "part": ()})
         switched = _switched(options)
         output = Output.of(options, *run.sources, *(switched.sources if switched else ()))
-        history = energy_of(run, options, prints=prints)
-    answer = verify(history, tr, td, shared.settings(options))
-    if balance := balance_of(run, history.parts, td):
-        answer = with_health(answer, balance)
+        reference = Reference(run, energy_of(run, options, prints=prints))
+    answer = verify_of(reference, tr, td, shared.settings(options))
     if switched:
         with reading(options["switched"], quiet=options["quiet"]):
-            answer = with_comparison(answer, _comparison(run, switched, answer, shared.selection(options)))
-    output.notes(history.notes, answer.cautions)
+            answer = compare_with(answer, reference, Reference.of(switched, shared.selection(options)))
+    output.notes(reference.history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick.report import figures
 
@@ -112,27 +104,3 @@ def _switched(options: dict[str, Any]) -> Run | None:
     if not options["switched"]:
         return None
     return open_run(options["switched"], shared.selection(options), options["input_format"])
-
-
-def _comparison(run: Run, other: Run, answer: Verdict, selection: Selection) -> Comparison:
-    """Hold the switched run against the reference, read in the same way."""
-    from d2rpick.choice.comparison import compare
-
-    situation = answer.situation
-    flight, parts = situation.flight, situation.history.parts
-    together = flight.parts if flight.source == "momentum" else flight.parts or parts
-    return compare(
-        situation.history,
-        other.history(selection),
-        (answer.candidate.tr, situation.td),
-        situation.latest_td if situation.latest_td > situation.td else float("inf"),
-        situation.settings.tolerance,
-        momenta=(run.momentum(together), _momentum(other, together)),
-        centres=(run.centre(parts), other.centre(parts)) if parts else (None, None),
-    )
-
-
-def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:
-    """Momentum of some parts, None also where the run does not have them all."""
-    missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
-    return None if missing else run.momentum(parts)

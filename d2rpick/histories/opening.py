@@ -20,9 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.database import Database
-    from d2rpick.histories.history import History
 
-__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "read_history", "reader"]
+__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "reader"]
 
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
@@ -93,11 +92,6 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
     )
     check_companions(databases)
     return Run(files, databases, sources)
-
-
-def read_history(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> History:
-    """Read one energy history; arguments and errors as of ``open_run``."""
-    return open_run(names, selection, input_format).history(selection)
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:

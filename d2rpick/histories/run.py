@@ -54,15 +54,12 @@ class Run:
         own = (note for database in self.databases for note in database.notes)
         return tuple(dict.fromkeys([*own, *doubts(self.databases)]))
 
-    def history(self, selection: Selection, *, with_momenta: bool = False) -> History:
+    def history(self, selection: Selection) -> History:
         """Take the selected energy: of parts, of named channels, or by default of the whole model.
 
-        ``with_momenta`` reads the momenta of the parts too, where there are any.  FormatError when something is not
-        there, with what there is.
+        The momenta come with it, where there are any.  FormatError when something is not there, with what there is.
         """
         history = self._energy(selection)
-        if not with_momenta:
-            return history
         flying = select_parts(selection.flying, self.parts, self.name) if selection.flying else None
         return replace(history, momenta=self.momenta(history.parts, flying))
 
@@ -71,24 +68,34 @@ class Run:
 
         ``chosen`` are the parts to be switched (None: all), ``flying`` those known to fly together, if they are.
         """
-        found = []
+        of_parts, of_whole = self._part_momenta, self._whole_momentum
+        if of_parts and of_parts.parts:
+            ids = [part.id for part in of_parts.parts]
+            members = tuple(ids.index(part.id) for part in chosen or of_parts.parts)
+            known = tuple(ids.index(part.id) for part in flying) if flying else None
+            of_parts = replace(of_parts, chosen=members, flying=known)
+        return tuple(one for one in (of_parts, of_whole) if one)
+
+    @cached_property
+    def _part_momenta(self) -> Momenta | None:
+        """Momenta of all parts; None where they are not written, or not for all parts."""
         holder = self._with_parts()
-        if holder:
-            ids = [part.id for part in holder.parts]
-            try:
-                values = np.stack([holder.part_channel(axis, ids) for axis in _AXES], axis=2)
-            except FormatError:
-                pass  # not written, or not for all parts: it cannot say what flies together
-            else:
-                members = tuple(ids.index(part.id) for part in chosen or holder.parts)
-                known = tuple(ids.index(part.id) for part in flying) if flying else None
-                precision = holder.precisions(())[1]
-                found.append(Momenta(holder.part_time, values, holder.parts, precision, members, known))
+        if holder is None:
+            return None
+        try:
+            values = np.stack([holder.part_channel(axis, [part.id for part in holder.parts]) for axis in _AXES], axis=2)
+        except FormatError:
+            return None  # it cannot say what flies together
+        return Momenta(holder.part_time, values, holder.parts, holder.precisions(())[1], ())
+
+    @cached_property
+    def _whole_momentum(self) -> Momenta | None:
+        """Momentum of the whole model; None where it is not written."""
         whole = next((one for one in self.databases if set(_AXES) <= set(one.channels)), None)
-        if whole:
-            values = np.stack([whole.channel(axis) for axis in _AXES], axis=1)[:, np.newaxis]
-            found.append(Momenta(whole.time, values, None, whole.precisions(_AXES)[1], (0,)))
-        return tuple(found)
+        if whole is None:
+            return None
+        values = np.stack([whole.channel(axis) for axis in _AXES], axis=1)[:, np.newaxis]
+        return Momenta(whole.time, values, None, whole.precisions(_AXES)[1], (0,))
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
         """Give the momentum of some parts together, or of the whole model; None where it is not written."""

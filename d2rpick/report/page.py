@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.judged_card import judged_card
+from d2rpick.choice.verify import verify_at
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.errors import D2RPickError
 from d2rpick.report.health import measures_of
@@ -92,7 +93,7 @@ def solver_input(situation: Situation, times: tuple[float, float], record: Recor
     """Give the solver's card where it is known whom it switches, else the command that prints it."""
     history, title = situation.history, "For the solver's input"
     try:
-        found = judged_card([times], history, situation.settings, record.wish)
+        found = judged_card([times], history, lambda tr, td: verify_at(situation.at(td), tr), record.wish)
     except D2RPickError as error:
         return section(title, tag("p", f"There is no card for these times: {error}"))
     if found:

@@ -5,12 +5,12 @@ Not imported by the rules themselves: without a history the check does not need 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.choice.examine import examine
-from d2rpick.choice.suggest import better_pair, suggest
-from d2rpick.choice.verify import Verdict, verify
+from d2rpick.choice.of_run import Reference, verify_of
+from d2rpick.choice.suggest import better_pair, suggest_at
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution
 from d2rpick.rules.base import Fault, name_units
 
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.choice.settings import Settings
+    from d2rpick.choice.verify import Verdict
     from d2rpick.deck import Window
-    from d2rpick.histories.history import History, Momenta
+    from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run, Selection
 
 # What verify warns of and no rule reports.
@@ -37,14 +38,14 @@ class HistoryJudge:
     run: Run
     selection: Selection
     settings: Settings
-    _histories: dict[int | None, History] = field(default_factory=dict)
+    _references: dict[int | None, Reference] = field(default_factory=dict)
     _faults: dict[tuple[int | None, float, float | None], tuple[Fault, ...]] = field(default_factory=dict)
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
     @property
     def end(self) -> float:
         """Last time of the history."""
-        return float(self.history(next(iter(self._known), None)).time[-1])
+        return float(self._reference(next(iter(self._known), None)).history.time[-1])
 
     @property
     def cautions(self) -> list[Caution]:
@@ -57,17 +58,14 @@ class HistoryJudge:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the readers left out or assumed, by what was judged so far."""
-        return tuple(dict.fromkeys(note for history in self._histories.values() for note in history.notes))
+        return tuple(dict.fromkeys(note for one in self._references.values() for note in one.history.notes))
 
-    def history(self, part: int | None) -> History:
-        """Give the energy of a part, or of the whole model."""
-        if part not in self._histories:
+    def _reference(self, part: int | None) -> Reference:
+        """Give the run with the energy of a part, or of the whole model."""
+        if part not in self._references:
             selection = self.selection if part is None else self.selection._replace(parts=(str(part),))
-            known = next(iter(self._histories.values()), None)  # all parts share the momenta, which take long to read
-            history = self.run.history(selection, with_momenta=known is None)
-            momenta = history.momenta if known is None else known.momenta
-            self._histories[part] = replace(history, momenta=tuple(_seen_from(part, one) for one in momenta))
-        return self._histories[part]
+            self._references[part] = Reference.of(self.run, selection)
+        return self._references[part]
 
     def faults(self, window: Window) -> tuple[Fault, ...]:
         """Everything that speaks against a window; of one that is not closed, or inverted, tr alone is judged."""
@@ -89,7 +87,8 @@ class HistoryJudge:
         return [] if self.selection.energy else [part.id for part in self.run.parts]
 
     def _judged(self, part: int | None, tr: float, td: float | None) -> Iterator[Fault]:
-        history = self.history(part)
+        reference = self._reference(part)
+        history = reference.history
         first, last = float(history.time[0]), float(history.time[-1])
         times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
         outside = [(name == "td", name, time) for name, time in times if not first <= time <= last]
@@ -103,7 +102,7 @@ class HistoryJudge:
         if td is None:
             yield from _of_load(history, tr, self.settings)
             return
-        verdict = verify(history, tr, td, self.settings)
+        verdict = verify_of(reference, tr, td, self.settings)
         if part is not None and not history.energy.any():
             # nothing to lock in, as the reader's note says; when it may be switched is known by momentum alone
             yield from _of_flight(verdict) if verdict.situation.flight.start is not None else ()
@@ -113,14 +112,6 @@ class HistoryJudge:
                 parts = self._cautions.setdefault(caution, [])
                 parts += [] if part is None else [part]
         yield from faults_of(verdict)
-
-
-def _seen_from(part: int | None, momenta: Momenta) -> Momenta:
-    """The same momenta, of which a part, or None for all, is to be switched."""
-    if momenta.parts is None:
-        return momenta
-    chosen = tuple(at for at, one in enumerate(momenta.parts) if part in (None, one.id))
-    return replace(momenta, chosen=chosen)
 
 
 def faults_of(verdict: Verdict) -> Iterator[Fault]:
@@ -188,8 +179,7 @@ def _of_error(verdict: Verdict) -> Iterator[Fault]:
 
 def _way_out(verdict: Verdict) -> str:
     """Name a tr that suits the td, or where to look for a pair."""
-    situation = verdict.situation
-    other = suggest(situation.history, situation.td, situation.settings)
+    other = suggest_at(verdict.situation)
     if other.recommended:
         return f"tr = {other.recommended.tr:.6g} suits this td"
     if other.better_td:

@@ -12,12 +12,11 @@ import numpy as np
 
 from d2rpick import __version__
 from d2rpick.choice.acceptable_windows import acceptable_windows, common_windows, coverage
-from d2rpick.choice.suggest import suggest, with_health
+from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import D2RPickError, RangeError
-from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.names import listing
-from d2rpick.histories.opening import Selection, open_run
+from d2rpick.histories.selection import Selection
 from d2rpick.histories.source import expand
 
 if TYPE_CHECKING:
@@ -153,11 +152,8 @@ def ask(question: Question, source: str) -> Row:
         raise D2RPickError(f"d2rpick {question.tool_version} asks d2rpick {__version__}; install the same everywhere")
     files = stamps(source)
     try:
-        run = open_run([source], question.selection, question.input_format)
-        history = run.history(question.selection, with_momenta=True)
-        answer = suggest(history, question.td, question.settings)
-        if balance := balance_of(run, history.parts, question.td):
-            answer = with_health(answer, balance)
+        reference = read([source], question.selection, question.input_format)
+        answer = suggest_of(reference, question.td, question.settings)
     except (D2RPickError, OSError) as error:
         status = OUT_OF_RANGE if isinstance(error, RangeError) else UNREADABLE
         text = f"{source}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)
@@ -171,10 +167,10 @@ def ask(question: Question, source: str) -> Row:
         energy_td=answer.situation.energy_td,
         basis=answer.situation.basis,
         warnings=tuple(code for code in said if code not in _NOT_REPEATED),
-        time_unit=history.time_unit,
+        time_unit=reference.history.time_unit,
         acceptable=acceptable_windows(answer),
         files=files,
-        curve=outline(history) if question.curve else None,
+        curve=outline(reference.history) if question.curve else None,
     )
     if best is None:
         return row

@@ -29,9 +29,9 @@ MOST, MOST_GROWN = 1.25, 25.0
 LOOP = f"""
 import sys
 from d2rpick.choice.suggest import suggest
-from d2rpick.histories.opening import read_history
+from d2rpick.choice.of_run import read
 from d2rpick.choice.settings import Settings
-found = [suggest(read_history([name]), {TD}, Settings()).recommended for name in sys.argv[1:]]
+found = [suggest(read([name]).history, {TD}, Settings()).recommended for name in sys.argv[1:]]
 assert all(found)
 """
 

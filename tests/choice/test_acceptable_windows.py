@@ -14,12 +14,13 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import Suggestion, suggest
 from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
-from d2rpick.histories.opening import Selection, read_history
+from d2rpick.histories.opening import Selection
 from d2rpick.vibration.modes import Modes
 from d2rpick.vibration.one_mode import Mode
 from tests import chain
 from tests.command import ROLLOVER
 from tests.paper import OMEGA_2
+from tests.reading import read_history
 from tests.records import ENERGY, MODE, TIME, noisy
 
 if TYPE_CHECKING:

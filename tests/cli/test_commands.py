@@ -15,9 +15,10 @@ import pytest
 
 from d2rpick import __version__
 from d2rpick.cli import COMMANDS
-from d2rpick.histories.opening import Selection, read_history
+from d2rpick.histories.opening import Selection
 from tests import paper
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, codes, run
+from tests.reading import read_history
 
 if TYPE_CHECKING:
     from subprocess import CompletedProcess

@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.opening import Selection, open_run, read_history
+from d2rpick.histories.opening import Selection, open_run
 from d2rpick.histories.writing import TABLE_WRITERS, format_of
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.reading import read_history
 from tests.shared import shared
 
 if TYPE_CHECKING:

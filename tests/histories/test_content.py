@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from d2rpick.errors import FormatError
 from d2rpick.histories import content
 from d2rpick.histories.content import Content, OnDisk, stored
-from d2rpick.histories.opening import Selection, open_run, read_history
+from d2rpick.histories.opening import Selection, open_run
 from tests.histories.test_source import CONTENTS
+from tests.reading import read_history
 from tests.text_files import glstat_text
 
 if TYPE_CHECKING:

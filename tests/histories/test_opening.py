@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.opening import READERS, Selection, read_history
+from d2rpick.histories.opening import READERS, Selection
+from tests.reading import read_history
 
 CSV = b"time,internal_energy\n0.0,1.0\n0.1,2.0\n0.2,1.5\n"
 GLSTAT = (

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.opening import read_history
+from tests.reading import read_history
 
 FOLDER = Path(os.environ.get("D2RPICK_REAL_FILES", Path(__file__).parents[3] / "shared" / "real")) / "histories"
 

@@ -19,14 +19,13 @@ from d2rpick.histories.opening import (
     Run,
     Selection,
     open_run,
-    read_history,
     reader,
 )
 from d2rpick.histories.source import Source
 from tests.made_binout import binout as made_binout
 from tests.made_binout import values
 from tests.made_t01 import MadePart, t01
-from tests.reading import history_of, run_of, states_of
+from tests.reading import history_of, read_history, run_of, states_of
 from tests.shared import shared
 from tests.text_files import HEAD, glstat_text, matsum_text
 

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.opening import READERS, Selection, open_run, read_history
+from d2rpick.histories.opening import READERS, Selection, open_run
 from d2rpick.histories.source import expand
 from tests.hdf5_files import plain, written
 from tests.made_binout import binout
 from tests.made_t01 import t01
+from tests.reading import read_history
 from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:

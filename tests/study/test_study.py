@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
-from d2rpick.histories.opening import Selection, read_history
+from d2rpick.histories.opening import Selection
 from d2rpick.study.study import OK, Question, Row, ask, failed, find_runs, outline, shortest, summarise
 from tests import studies
 from tests.command import BOX, GLSTAT
+from tests.reading import read_history
 from tests.shared import SHARED, shared
 
 ASKED = Question(studies.TD, Settings())

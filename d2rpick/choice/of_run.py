@@ -1,0 +1,124 @@
+"""From the files of a run to an answer: read, examine, choose or verify, and judge the health of the run.
+
+The command line, ``study``, ``check --history``, ``card`` and Python go this one way, and get the same numbers.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+from d2rpick.choice.suggest import Suggestion, suggest
+from d2rpick.choice.verify import Verdict, verify, with_comparison
+from d2rpick.histories.balance_terms import balance_of
+from d2rpick.histories.opening import Selection, open_run
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.choice.comparison import Comparison
+    from d2rpick.choice.settings import Settings
+    from d2rpick.histories.history import History, Part, Track
+    from d2rpick.histories.run import Run
+
+_DEFAULT = Selection()
+
+
+class Reference(NamedTuple):
+    """A run without switching, and the energy in it that a choice is about."""
+
+    run: Run
+    history: History
+
+    @classmethod
+    def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
+        """Read what is selected of a run that is open; FormatError when it is not there."""
+        return cls(run, run.history(selection))
+
+
+_Answer = TypeVar("_Answer", Suggestion, Verdict)
+
+
+def read(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> Reference:
+    """Open the files of a run and read what is selected; arguments and errors as of `open_run`."""
+    return Reference.of(open_run(names, selection, input_format), selection)
+
+
+def suggest_of(reference: Reference, td: float | tuple[float, float], settings: Settings) -> Suggestion:
+    """Choose tr for ``td``, or both times with td in a window (low, high) [time].
+
+    Raises
+    ------
+    RangeError
+        If td or the window lies outside the record.
+    """
+    if isinstance(td, tuple):
+        from d2rpick.choice.suggest_td import suggest_in_window
+
+        return _with_health(suggest_in_window(reference.history, td, settings), reference.run)
+    return _with_health(suggest(reference.history, td, settings), reference.run)
+
+
+def verify_of(reference: Reference, tr: float, td: float, settings: Settings) -> Verdict:
+    """Judge one pair of switch times.
+
+    Raises
+    ------
+    RangeError
+        If a time lies outside the record or tr is not before td.
+    """
+    return _with_health(verify(reference.history, tr, td, settings), reference.run)
+
+
+def compare_with(verdict: Verdict, reference: Reference, switched: Reference) -> Verdict:
+    """Hold a finished switched run, read in the same way, against the reference by which its times were judged.
+
+    Raises
+    ------
+    RangeError
+        If one of the two runs does not go on after td.
+    """
+    return with_comparison(verdict, _comparison(verdict, reference.run, switched))
+
+
+def _with_health(answer: _Answer, run: Run) -> _Answer:
+    """Add how far the run can be trusted, above all in the rigid window, else in the flight up to td.
+
+    What comes after td does not matter for the choice.
+    """
+    history, td = answer.situation.history, answer.situation.td
+    balance = balance_of(run, history.parts, td)
+    if balance is None:
+        return answer
+    from d2rpick.choice.health import assess, cautions_of_health  # not above: plain tables do without it
+
+    if isinstance(answer, Verdict):
+        start: float | None = answer.candidate.tr
+    else:
+        start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
+    window = None if start is None or start >= td else (start, td)
+    locked = history.mean_energy(*window) if window else None
+    health = assess(balance, window, locked)
+    return answer._replace(health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
+
+
+def _comparison(verdict: Verdict, run: Run, switched: Reference) -> Comparison:
+    from d2rpick.choice.comparison import compare
+
+    situation = verdict.situation
+    flight, parts = situation.flight, situation.history.parts
+    together = flight.parts if flight.source == "momentum" else flight.parts or parts
+    return compare(
+        situation.history,
+        switched.history,
+        (verdict.candidate.tr, situation.td),
+        situation.latest_td if situation.latest_td > situation.td else float("inf"),
+        situation.settings.tolerance,
+        momenta=(run.momentum(together), _momentum(switched.run, together)),
+        centres=(run.centre(parts), switched.run.centre(parts)) if parts else (None, None),
+    )
+
+
+def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:
+    """Momentum of some parts, None also where the run does not have them all."""
+    missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
+    return None if missing else run.momentum(parts)
