@@ -85,7 +85,7 @@ def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> Non
     axes.legend(fontsize="small", loc="best")
 
 
-def draw_rollover(reference: Record, switched: Record | None, window: Window | None) -> Figure:
+def draw_rollover(reference: Record, switched: Record | None, windows: Sequence[Window] = ()) -> Figure:
     """Outlines of the box at even times, with and without switching; beside them roll and height over time."""
     figure = Figure(figsize=(11, 5.5), layout="constrained")
     outlines, roll, height = figure.subplot_mosaic([["o", "r"], ["o", "h"]], width_ratios=(1.4, 1)).values()
@@ -103,8 +103,9 @@ def draw_rollover(reference: Record, switched: Record | None, window: Window | N
     roll.set(ylabel="roll [degrees]")
     height.set(ylabel="height of the centre [m]", xlabel="time [s]")
     for axes in (roll, height):
-        if window:
-            axes.axvspan(window.tr, window.td, color=FLIGHT, alpha=0.2, linewidth=0, label="rigid")
+        for number, window in enumerate(windows):
+            label = "_" if number else "rigid"
+            axes.axvspan(window.tr, window.td, color=FLIGHT, alpha=0.2, linewidth=0, label=label)
         finish(axes)
     return figure
 

@@ -25,7 +25,11 @@ if TYPE_CHECKING:
 
 SMALL = ("--mesh", "4", "--dt", "2e-4")
 SHORT = (*SMALL, "--t-end", "0.12")
-COLUMNS = "time,x,z,roll,vx,vz,omega,internal_energy,kinetic_energy,momentum_x,momentum_z"
+COLUMNS = (
+    "time,x,z,roll,vx,vz,omega,internal_energy,kinetic_energy,momentum_x,momentum_z,step_internal_energy,"
+    "step_kinetic_energy,contact_energy,frictional_contact_energy,stonewall_energy,damping_energy,external_work,"
+    "total_energy,energy_ratio"
+)
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.h5", "run.glstat", "run.matsum"])
@@ -62,10 +66,25 @@ def test_a_switched_run_is_rigid_in_between_and_differs_after_it(tmp_path: Path)
     assert b"<svg" in plot.read_bytes()
 
 
+def test_a_box_that_falls_is_switched_in_several_windows(tmp_path: Path) -> None:
+    file = tmp_path / "tumbling.csv"
+    windows = ("--tr", "0", "--td", "0.28", "--tr", "0.42", "--td", "0.5")
+    assert run("rollover", *SMALL, "--drop", "0.4", "--tilt", "40", *windows, "-o", str(file)).stderr == ""
+    table = np.genfromtxt(file, delimiter=",", names=True)
+    time, energy = table["time"], table["internal_energy"]
+    assert time[-1] == pytest.approx(1.2)
+    for tr, td in ((0, 0.28), (0.42, 0.5)):
+        assert np.ptp(energy[(time > tr + 1e-3) & (time < td - 1e-3)]) < 1e-9
+    assert energy[(time > 0.29) & (time < 0.42)].max() > 1
+    total = table["internal_energy"] + table["kinetic_energy"] + table["step_internal_energy"]
+    total += table["step_kinetic_energy"] + table["contact_energy"] + table["stonewall_energy"]
+    np.testing.assert_allclose(total + table["damping_energy"], table["total_energy"], atol=1e-6)
+
+
 def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
     window = Window(0.05, 0.2)
-    reference, switched = (simulate(Parameters(mesh=4), 0.25, rigid, interval=5e-4) for rigid in (None, window))
-    outlines, roll, height = figures_models.draw_rollover(reference, switched, window).axes
+    reference, switched = (simulate(Parameters(mesh=4), 0.25, *rigid, interval=5e-4) for rigid in ((), (window,)))
+    outlines, roll, height = figures_models.draw_rollover(reference, switched, (window,)).axes
     assert len(outlines.lines) == 16
     corners = np.asarray(outlines.lines[8].get_xydata())
     np.testing.assert_array_equal(corners[0], corners[-1])
@@ -140,6 +159,11 @@ def test_the_progress_of_a_scan_is_told_on_a_terminal_only() -> None:
     [
         (("--tr", "0.1"), "--tr and --td go together"),
         (("--tr", "0.2", "--td", "0.1"), "is not before"),
+        (("--tr", "0.1", "--td", "0.2", "--tr", "0.2", "--td", "0.3"), "--tr 0.2 is not after --td 0.2"),
+        (("--tr", "0.1", "--td", "0.2", "--tr", "0.3"), "as many"),
+        (("--tilt", "10"), "--tilt belongs to --drop"),
+        (("--scan", "--drop", "1"), "--scan and --drop exclude each other"),
+        (("--scan", "--td", "0.3", "--td", "0.4"), "takes one --td"),
         (("--tr", "0.2", "--td", "0.5"), "after the end of the run"),
         (("--tr", "-1", "--td", "0.1"), "at least 0"),
         (("--scan", "--td", "0", "--mesh", "4"), "no time for tr"),

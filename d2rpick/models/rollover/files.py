@@ -17,7 +17,12 @@ _TITLE: Final = "rollover box"
 
 
 def table(record: Record) -> Table:
-    """Columns of the box, time to kinetic_energy, and the momentum of box and step together."""
+    """Columns of the box, time to kinetic_energy; the momentum of box and step together; the balance of the model.
+
+    Internal and kinetic energy are those of the box, so that it can be switched by them; those of the step, the terms
+    of the contacts and walls (see `Record`) and the work done stand beside them, and the total is the sum of all but
+    the work.
+    """
     energies = record.internal_energy.T, record.kinetic_energy.T
     flying = record.momentum.sum(axis=1)
     return {
@@ -25,22 +30,31 @@ def table(record: Record) -> Table:
         "vx": record.velocity.real, "vz": record.velocity.imag, "omega": record.omega,
         "internal_energy": energies[0][0], "kinetic_energy": energies[1][0],
         "momentum_x": flying.real, "momentum_z": flying.imag,
+        "step_internal_energy": energies[0][1], "step_kinetic_energy": energies[1][1],
+        "contact_energy": record.friction_energy, "frictional_contact_energy": record.friction_energy,
+        "stonewall_energy": record.wall_energy, "damping_energy": record.damping_energy,
+        "external_work": record.external_work, "total_energy": record.total_energy,
+        "energy_ratio": record.energy_ratio,
     }  # fmt: skip
 
 
 def as_glstat(record: Record) -> bytes:
-    """Energies of box and step together, what was exchanged with sled, curb and ground, and the mean velocity."""
+    """Energies of box and step together, what was exchanged with sled, curb and ground, and the mean velocity.
+
+    The walls of the model are floor, curb and ground, see `Record`; the friction on them is energy of the contacts and
+    is listed once more by itself, as Radioss does, since health asks for the energy of the contacts without friction.
+    """
     internal, kinetic = record.internal_energy.sum(axis=1), record.kinetic_energy.sum(axis=1)
-    total = kinetic + internal + record.contact_energy + record.damping_energy
-    momentum, zero = record.momentum.sum(axis=1), 0 * record.time
-    speed = momentum / (momentum[0].real / record.velocity[0].real)
+    zero = 0 * record.time
+    speed = record.momentum.sum(axis=1) / record.mass
     return glstat.write(
         _TITLE,
         {
             "time": record.time, "time step": zero + record.dt, "kinetic energy": kinetic, "internal energy": internal,
-            "sliding interface energy": record.contact_energy, "external work": record.external_work,
-            "system damping energy": record.damping_energy, "total energy": total,
-            "total energy / initial energy": total / (kinetic[0] + record.external_work),
+            "stonewall energy": record.wall_energy, "system damping energy": record.damping_energy,
+            "sliding interface energy": record.friction_energy, "frictional contact energy": record.friction_energy,
+            "external work": record.external_work, "total energy": record.total_energy,
+            "total energy / initial energy": record.energy_ratio,
             "global x velocity": speed.real, "global y velocity": zero, "global z velocity": speed.imag,
         },
     )  # fmt: skip

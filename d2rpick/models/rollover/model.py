@@ -22,7 +22,7 @@ Ends = NDArray[np.intp]
 GRAVITY = 9.81
 _POSITIVE = (
     "braking", "stiffness", "yield_strain", "mass", "width", "height", "wall", "step_mass", "step_stiffness",
-    "step_yield_strain",
+    "step_yield_strain", "ground_stiffness",
 )  # fmt: skip
 # The step takes a quarter of the leading side, and at least one cell.
 _COARSEST = 4
@@ -75,10 +75,15 @@ class Parameters:
     """Coefficient, everywhere [-]: steel on steel, dry."""
     ground: float = 0.1855
     """Depth of the ground below the lower edge of the sled [m]: near the 0.23 m of the standard dolly."""
+    ground_stiffness: float = 5e5
+    """Of the ground at one point [N/m]: softer than the box, so that a landing sinks in by centimetres."""
+    drop: float | None = None
+    """Without a sled: height of the lowest point above the ground at the start [m]; ``tilt`` is then that of the box,
+    ``speed`` its velocity along x."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not (np.isfinite(value) and value >= 0):
+            if value is not None and not (np.isfinite(value) and value >= 0):
                 raise RangeError(f"{name} is {value}, a number of at least 0 was expected")
         for name in _POSITIVE:
             if not getattr(self, name) > 0:
@@ -122,7 +127,10 @@ class Structure:
 
 
 def build(parameters: Parameters) -> Structure:
-    """Lay out box and step on the tilted floor of the sled, the lower end of the step at the curb, the origin."""
+    """Lay out box and step on the tilted floor of the sled, the lower end of the step at the curb, the origin.
+
+    For a drop they are raised or lowered to their height above the ground.
+    """
     p = parameters
     ring = _ring(p.mesh)
     outer = _scaled(ring, p.width, p.height)
@@ -131,6 +139,8 @@ def build(parameters: Parameters) -> Structure:
     toes = outer[[0, top]] + p.wall
     upright = np.concatenate([outer, inner, toes]) - toes[0]
     places = upright * np.exp(-1j * np.radians(p.tilt))
+    if p.drop is not None:
+        places += 1j * (p.drop - p.ground - places.imag.min())
     of_box = 2 * cells
     both = of_box + np.arange(toes.size)
     return Structure(

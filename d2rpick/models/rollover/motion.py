@@ -27,13 +27,15 @@ _SAME = 1e-6
 class Accounts:
     """What has been exchanged with the surroundings since time 0.
 
-    ``external_work`` of gravity and the sled, ``contact`` energy (stored, rubbed away, crushed), ``damping`` energy,
-    ``lost`` kinetic energy of the vibration at tr [J]; ``impulse`` [kg m/s] and ``angular_impulse`` about the origin,
+    ``external_work`` of gravity and the sled, ``friction`` work of all contacts, energy of the ``walls`` (stored in
+    floor, curb and ground, and what crushing the cushion took), ``damping`` energy, ``lost`` kinetic energy of the
+    vibration at tr [J]; ``impulse`` [kg m/s] and ``angular_impulse`` about the origin,
     in the sense from x to z [kg m2/s], of gravity, contact and damping.
     """
 
     external_work: float = 0.0
-    contact: float = 0.0
+    friction: float = 0.0
+    walls: float = 0.0
     damping: float = 0.0
     lost: float = 0.0
     impulse: complex = 0.0
@@ -50,7 +52,7 @@ class Motion:
     def __init__(self, parameters: Parameters, interval: float) -> None:
         s = self.structure = build(parameters)
         touching = np.zeros(s.places.size)
-        touching[s.skin] = STIFFNESS
+        touching[s.skin] = max(STIFFNESS, parameters.ground_stiffness)
         limit = 2 / stiffest_rate(s.masses, s.box, s.step, extra=touching)
         self.every = int(np.ceil(interval / (_SAFETY * limit)))
         self.dt = interval / self.every
@@ -129,6 +131,9 @@ class Motion:
         accounts.impulse += dt * complex((outer - drag).sum())
         accounts.angular_impulse += dt * float(np.vdot(self.places, outer - drag).imag)
         if push:
-            by_sled = push.of_sled.real * self.contact.sled.velocity(self.time)
+            speed = self.contact.sled.velocity(self.time)
+            by_sled = float(push.sled.whole.real.sum()) * speed
+            against = float((np.vdot(push.sled.friction, mean - speed) + np.vdot(push.ground.friction, mean)).real)
             accounts.external_work += dt * by_sled
-            accounts.contact += dt * (by_sled - float(np.vdot(push.forces, mean).real))
+            accounts.friction -= dt * against
+            accounts.walls += dt * (by_sled - float(np.vdot(push.forces, mean).real) + against)

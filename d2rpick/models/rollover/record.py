@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 PARTS: Final = ("box", "step")
 BOX: Final = 0
-_REALS, _PLANES = 11, 4
+_REALS, _PLANES = 12, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +23,14 @@ class Record:
 
     Of the box: ``centre`` of mass and its ``velocity`` (n,), ``roll`` forward since time 0 [rad], ``omega`` [rad/s] by
     the angular momentum.  Of box and step: ``internal_energy``, ``kinetic_energy`` and ``momentum`` (n, 2).  Of the
-    whole: ``external_work``, ``contact_energy``, ``damping_energy`` and ``lost_energy`` at tr, each since time 0 (n,).
-    ``outline`` of the box (n, points).  ``released``: the sled pushed last, ``landed``: the ground first; None if not.
-    ``dt`` is the step [s], ``bar_updates`` and ``seconds`` are what the run cost.
+    whole: ``external_work``, ``friction_energy``, ``wall_energy``, ``damping_energy`` and ``lost_energy`` at tr, each
+    since time 0 (n,).  ``outline`` of the box (n, points), ``mass`` of box and step.
+    ``released``: the sled pushed last before the first of ``landings``, None if it never did; these are the times from
+    when to when the ground pushed.  ``dt`` is the step [s], ``bar_updates`` and ``seconds`` are what the run cost.
+
+    Friction is what a solver counts as energy of its contacts.  Floor, curb and ground are softer than the box and
+    yield by centimetres; a solver would model them as rigid walls, as springs or as parts of their own, and so what is
+    stored in them and what crushing the cushion takes is kept apart from the contacts.
     """
 
     time: Values
@@ -37,22 +42,40 @@ class Record:
     kinetic_energy: Values
     momentum: Plane
     external_work: Values
-    contact_energy: Values
+    friction_energy: Values
+    wall_energy: Values
     damping_energy: Values
     lost_energy: Values
     outline: Plane
+    mass: float
     released: float | None
-    landed: float | None
+    landings: tuple[tuple[float, float], ...]
     dt: float
     bar_updates: int
     seconds: float
 
     @property
-    def balance(self) -> Values:
-        """What energy is there and was spent, less the work done, over that of the start; 1 is perfect (n,) [-]."""
+    def landed(self) -> float | None:
+        """When the ground pushed first [s]."""
+        return self.landings[0][0] if self.landings else None
+
+    @property
+    def total_energy(self) -> Values:
+        """What energy is there or was spent, as a solver sums it up: without what was lost at tr (n,) [J]."""
         there = self.internal_energy.sum(axis=1) + self.kinetic_energy.sum(axis=1)
-        spent = self.contact_energy + self.damping_energy + self.lost_energy
-        return np.asarray((there + spent - self.external_work) / there[0])
+        return np.asarray(there + self.friction_energy + self.wall_energy + self.damping_energy)
+
+    @property
+    def energy_ratio(self) -> Values:
+        """Total energy over that of the start and the work done; 1 where both are 0 (n,) [-]."""
+        reference = self.total_energy[0] + self.external_work - self.external_work[0]
+        return np.asarray(np.divide(self.total_energy, reference, out=1 + 0 * reference, where=reference != 0))
+
+    @property
+    def imbalance(self) -> Values:
+        """Energy that came from nowhere, over the largest total energy (n,) [-]."""
+        total = self.total_energy + self.lost_energy
+        return np.asarray((total - total[0] - self.external_work + self.external_work[0]) / np.abs(total).max())
 
 
 class Recorder:
@@ -81,7 +104,8 @@ class Recorder:
         self._reals[self._next] = (
             motion.time, np.angle(np.vdot(arms, self._start)), -spin,
             motion.box.internal_energy(places), motion.step.internal_energy(places), kinetic[:n].sum(),
-            kinetic[n:].sum(), accounts.external_work, accounts.contact, accounts.damping, accounts.lost,
+            kinetic[n:].sum(), accounts.external_work, accounts.friction, accounts.walls, accounts.damping,
+            accounts.lost,
         )  # fmt: skip
         self._planes[self._next] = complex(places[0] - arms[0]), of_box / self._box_mass, of_box, of_step
         self._outline[self._next] = places[: n // 2]
@@ -100,12 +124,14 @@ class Recorder:
             kinetic_energy=real[5:7].T,
             momentum=plane[2:4].T,
             external_work=real[7],
-            contact_energy=real[8],
-            damping_energy=real[9],
-            lost_energy=real[10],
+            friction_energy=real[8],
+            wall_energy=real[9],
+            damping_energy=real[10],
+            lost_energy=real[11],
             outline=self._outline,
+            mass=float(motion.structure.masses.sum()),
             released=motion.contact.released,
-            landed=motion.contact.landed,
+            landings=tuple(motion.contact.landings),
             dt=motion.dt,
             bar_updates=_updates(motion) - self._updates,
             seconds=perf_counter() - self._began,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from d2rpick.errors import RangeError
@@ -31,33 +32,36 @@ class Window:
             raise RangeError(f"tr {self.tr:g} and td {self.td:g} must follow each other after the start at 0")
 
 
-def simulate(
-    parameters: Parameters, t_end: float, window: Window | None = None, *, interval: float = INTERVAL
-) -> Record:
-    """Compute a run from 0 to ``t_end``, with a state every ``interval`` [s]; RangeError when it takes too many steps.
+def simulate(parameters: Parameters, t_end: float, *windows: Window, interval: float = INTERVAL) -> Record:
+    """Compute a run from 0 to ``t_end``, with a state every ``interval`` [s].
+
+    RangeError when it takes too many steps, or when ``windows`` overlap or are not in order.
 
     Examples
     --------
     >>> from d2rpick.models.rollover.model import Parameters
     >>> run = simulate(Parameters(mesh=4), 0.01)
-    >>> run.time.size, bool(abs(run.balance - 1).max() < 0.01)
+    >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
     motion = Motion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
         raise RangeError(f"steps of {motion.dt:.3g} s make more than {MOST_STEPS} until {t_end:g}; take softer bars")
-    return proceed(motion, t_end, window)
+    for one, following in pairwise(windows):
+        if not one.td < following.tr:
+            raise RangeError(f"the window from tr {following.tr:g} begins before the one up to td {one.td:g} is over")
+    return proceed(motion, t_end, *windows)
 
 
-def proceed(motion: Motion, t_end: float, window: Window | None = None) -> Record:
-    """Go on with ``motion`` to ``t_end`` [s], switching at the first step at or after the times of ``window``."""
+def proceed(motion: Motion, t_end: float, *windows: Window) -> Record:
+    """Go on with ``motion`` to ``t_end`` [s], switching at the first step at or after the times of ``windows``."""
     last = motion.every * (motion.step_at(t_end) // motion.every)
-    tr, td = (motion.step_at(window.tr), motion.step_at(window.td)) if window else (None, None)
+    rigid, deformable = {motion.step_at(one.tr) for one in windows}, {motion.step_at(one.td) for one in windows}
     recorder = Recorder(motion, last)
     while True:
-        if motion.count == tr:
+        if motion.count in rigid:
             motion.make_rigid()
-        if motion.count == td:
+        if motion.count in deformable:
             motion.make_deformable()
         mean = motion.advance()
         if motion.count % motion.every == 0:

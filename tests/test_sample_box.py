@@ -1,0 +1,51 @@
+"""The samples of the rollover box are one run in every format, and its energies balance in each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.histories.opening import READERS, Selection, open_run
+from d2rpick.models.rollover.model import Parameters
+from d2rpick.models.rollover.run import simulate
+from tests import sample_box
+from tests.command import ROOT, answer
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from d2rpick.histories.history import History
+
+FRESH = sample_box.files(simulate(Parameters(), sample_box.T_END, interval=sample_box.INTERVAL))
+KEPT = ROOT / "sample_data"
+LARGEST = 320_000  # bytes of one sample
+
+
+def history(path: Path) -> History:
+    """Energy of the box, or of box and step where a file does not tell them apart."""
+    run = open_run([str(path)])
+    return run.history(Selection(parts=("box",) if run.parts else ()))
+
+
+def test_every_format_has_its_sample() -> None:
+    assert {answer("info", str(KEPT / name))["format"] for name in FRESH} == {*READERS}
+
+
+@pytest.mark.parametrize("name", FRESH)
+def test_a_sample_is_what_the_model_gives(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(FRESH[name])
+    kept, fresh = history(KEPT / name), history(tmp_path / name)
+    np.testing.assert_allclose(kept.time, fresh.time, rtol=1e-6)
+    np.testing.assert_allclose(kept.energy, fresh.energy, rtol=1e-3, atol=1e-2)  # rounding grows with every contact
+    assert (KEPT / name).stat().st_size < LARGEST
+
+
+@pytest.mark.parametrize("name", FRESH)
+def test_the_energies_of_a_sample_balance_and_its_health_is_right(name: str) -> None:
+    health = answer("info", str(KEPT / name))["health"]
+    if not name.endswith("matsum"):  # has no energies of the whole model
+        assert health["energy_ratio_min"] > 0.999
+        assert health["energy_ratio_max"] < 1.001
+        assert health["sliding_share"] < 1e-6
