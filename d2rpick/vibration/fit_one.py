@@ -15,11 +15,14 @@ import numpy as np
 from d2rpick.vibration.one_mode import energy_and_jacobian
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
+
+    # Energies (n,) at n times and their derivatives (p, n) by the first p parameters.
+    Model = Callable[[Samples, Samples], tuple[Samples, Samples]]
 
 VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6  # free parameters of the three models
 
@@ -35,26 +38,42 @@ COARSE: Final = 400  # samples on which starts are compared and first refined
 STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
 CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
 _MAX_STEPS: Final = 40  # a good start needs 4 to 8
+_BLOCK: Final = 8192  # samples whose derivatives are held at a time, so that they stay in the processor's cache
 
 
-def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) -> Samples:
-    """Return the least-squares parameters with the first ``size`` of them free, the others zero."""
+def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float = np.inf) -> Samples | None:
+    """Return the least-squares parameters with the first ``size`` of them free, the others zero.
+
+    None where on a few of the samples the fit leaves more than ``worst`` of the variance.
+    """
+
+    def model(parameters: Samples, times: Samples) -> tuple[Samples, Samples]:
+        return energy_and_jacobian(parameters, times, size)
+
     stride = -(-s.size // COARSE)
     coarse_s, coarse_e = s[::stride], e[::stride]
-    enough = CERTAIN * float(np.sum((coarse_e - np.mean(coarse_e)) ** 2))
-    best, least = np.zeros(6), np.inf
-    for start in _starts(poles, coarse_s, coarse_e, size):
-        found, cost = minimise(start, lambda p: energy_and_jacobian(p, coarse_s, size), coarse_e)
-        if cost < least:
-            best, least = found, cost
-        if least < enough:
-            break
+    best = refine(_starts(poles, coarse_s, coarse_e, size), model, coarse_s, coarse_e, worst)
+    if best is None:
+        return None
     if stride > 1:
-        best = minimise(best, lambda p: energy_and_jacobian(p, s, size), e)[0]
+        best = minimise(best, model, s, e)[0]
     if best[5] < 0:  # q and -q make the same energy; the preload is taken positive
         best[[2, 3, 5]] *= -1
     if best[0] < 0:
         best[[0, 3]] *= -1
+    return best
+
+
+def refine(starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float) -> Samples | None:
+    """Return the best end of the starts; None without one that leaves no more than ``worst`` of the variance."""
+    variance = float(np.sum((e - np.mean(e)) ** 2))
+    best, least = None, worst * variance
+    for start in starts:
+        found, cost = minimise(start, model, s, e, worst * variance)
+        if cost <= least:
+            best, least = found, cost
+        if least < CERTAIN * variance:
+            break
     return best
 
 
@@ -68,7 +87,7 @@ def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[
     dense records.
     """
     integral = np.concatenate(([0.0], np.cumsum((e[1:] + e[:-1]) / 2 * np.diff(s))))
-    fine = np.diff(np.interp(np.linspace(0, 1, s.size), s, integral))
+    fine = np.diff(np.interp(np.linspace(0, 1, min(s.size, _MAX_CELLS + 1)), s, integral))
     power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
     periods = int(np.argmax(power * np.arange(power.size)))  # per octave: decay alone must not win
     count = min(max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS)
@@ -121,33 +140,43 @@ def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) ->
 
 @np.errstate(over="ignore", invalid="ignore")  # a trial step too far; it is rejected
 def minimise(
-    parameters: Samples, model: Callable[[Samples], tuple[Samples, Samples]], e: Samples
+    parameters: Samples, model: Model, s: Samples, e: Samples, hopeless: float = np.inf
 ) -> tuple[Samples, float]:
     """Refine parameters by Levenberg-Marquardt; return them and the sum of squares.
 
-    ``model`` gives the energies (n,) and their derivatives (p, n) by the first p parameters; the others stay.
+    Parameters that the model gives no derivatives by stay.  It ends early where steps like the last would not bring
+    the sum of squares down to ``hopeless``.
     """
     damping = 1e-4  # of the unit diagonal: starts are close, so steps may be long
-    energy, jacobian = model(parameters)
-    rest = e - energy
-    cost = float(rest @ rest)
-    free = len(jacobian)
+    cost, normal, gradient = _normal_equations(parameters, model, s, e)
+    free = gradient.size
     for _ in range(_MAX_STEPS):
-        normal, gradient = jacobian @ jacobian.T, jacobian @ rest
         scale = np.sqrt(np.diag(normal)) + 1e-150
-        normal = normal / (scale * scale[:, None]) + damping * np.eye(free)
+        damped = normal / (scale * scale[:, None]) + damping * np.eye(free)
+        step = np.linalg.solve(damped, gradient / scale) / scale
         trial = parameters.copy()
-        step = np.linalg.solve(normal, gradient / scale) / scale
         trial[:free] += step
-        energy, trial_jacobian = model(trial)
-        rest_trial = e - energy
-        trial_cost = float(rest_trial @ rest_trial)
         expected = float(step @ gradient)
+        trial_cost, *trial_equations = _normal_equations(trial, model, s, e)
         if trial_cost <= cost:
-            parameters, rest, jacobian, cost = trial, rest_trial, trial_jacobian, trial_cost
+            parameters, cost, (normal, gradient) = trial, trial_cost, trial_equations
             damping = max(damping / 10, 1e-10)
+            if _MAX_STEPS * expected < cost - hopeless:
+                break
         else:
             damping *= 10
         if expected <= 1e-12 * cost + 1e-31 * e.size:
             break
     return parameters, cost
+
+
+def _normal_equations(parameters: Samples, model: Model, s: Samples, e: Samples) -> tuple[float, Samples, Samples]:
+    """Sum of squares of the rest, J J^T and J rest, block by block."""
+    cost, normal, gradient = 0.0, np.zeros(()), np.zeros(())
+    for first in range(0, s.size, _BLOCK):
+        block = slice(first, first + _BLOCK)
+        energy, jacobian = model(parameters, s[block])
+        rest = e[block] - energy
+        cost += float(rest @ rest)
+        normal, gradient = normal + jacobian @ jacobian.T, gradient + jacobian @ rest
+    return cost, normal, gradient

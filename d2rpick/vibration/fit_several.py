@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.vibration.fit_one import CERTAIN, COARSE, STARTS, minimise, rates
+from d2rpick.vibration.fit_one import COARSE, STARTS, minimise, rates, refine
 from d2rpick.vibration.modes import sum_and_jacobian
 
 if TYPE_CHECKING:
@@ -23,26 +23,18 @@ _APART: Final = np.pi / 4
 _HOPELESS: Final = 0.5
 
 
-def fit_several(s: Samples, e: Samples, count: int) -> Samples | None:
+def fit_several(s: Samples, e: Samples, count: int, worst: float = np.inf) -> Samples | None:
     """Return the least-squares parameters of ``count`` modes; None where E does not show so many rates.
 
     Each mode makes exp(-alpha s) times a constant and a vibration at twice its rate, so the constants add up and
     3 count exponentials leave room for what is none.  For known rates E is linear in the rest, which ranks the
-    rates and gives the parameters.
+    rates and gives the parameters.  None also where on a few of the samples the fit leaves more than ``worst`` of
+    the variance.
     """
     stride = -(-s.size // COARSE)
     coarse_s, coarse_e = s[::stride], e[::stride]
-    enough = CERTAIN * float(np.sum((coarse_e - np.mean(coarse_e)) ** 2))
-    best, least = None, np.inf
-    for start in _starts(s, e, coarse_s, coarse_e, count):
-        found, cost = minimise(start, lambda p: sum_and_jacobian(p, coarse_s), coarse_e)
-        if cost < least:
-            best, least = found, cost
-        if least < enough:
-            break
-    if best is not None and stride > 1:
-        best = minimise(best, lambda p: sum_and_jacobian(p, s), e)[0]
-    return best
+    best = refine(_starts(s, e, coarse_s, coarse_e, count), sum_and_jacobian, coarse_s, coarse_e, worst)
+    return best if best is None or stride == 1 else minimise(best, sum_and_jacobian, s, e)[0]
 
 
 def _starts(s: Samples, e: Samples, coarse_s: Samples, coarse_e: Samples, count: int) -> list[Samples]:

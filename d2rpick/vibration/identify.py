@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.vibration.fit_one import VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, rates
+from d2rpick.vibration.fit_one import COARSE, VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, rates
 from d2rpick.vibration.one_mode import Mode, energy_and_jacobian
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 # Thresholds of acceptance.  White noise may be large; what a true model must not leave over is structure, the
 # part of the misfit that neighbouring samples share.
 MAX_MISFIT: Final = 0.4  # beyond, more than 16 % of the variance is unexplained and can hide another mode
+HOPELESS: Final = 0.5**2  # of the variance, unexplained on 400 samples: six standard deviations beyond that misfit
 MAX_STRUCTURE: Final = 0.02  # of std(E): thirty times what one real solver leaves with one mode
 MAX_LOCAL_STRUCTURE: Final = 0.1  # of the fit's energy at that time: a second mode that outlives the first
 MIN_SAMPLES: Final = 24  # four for each parameter of the richest model
@@ -88,7 +89,7 @@ class Identification(NamedTuple):
         return np.sqrt(np.maximum(variance, 0.0))
 
 
-def identify(time: Samples, energy: Samples) -> Identification:
+def identify(time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
     """Fit one vibration to E(t), else one over plastic work, else one about a preload, and judge the fit.
 
     Parameters
@@ -97,6 +98,8 @@ def identify(time: Samples, energy: Samples) -> Identification:
         Strictly increasing, equidistant or not [time].
     energy : array of shape (n,)
         Internal energy; may be zero or negative, as some solvers write it [energy].
+    quick : bool
+        Refuse where a few samples show that no model follows, without the best fit to all of them and its misfit.
 
     Returns
     -------
@@ -127,15 +130,16 @@ def identify(time: Samples, energy: Samples) -> Identification:
         return _nothing(time, "the energy does not oscillate: nothing vibrates, or it is overdamped")
     refused = []
     for size, least_periods in _MODELS:
-        parameters = fit(poles, record.s, record.e, size)
-        attempt, follows = _judged(_one(parameters, size, record), least_periods, record)
-        if follows:  # a richer model would follow as well, and be no more plausible
-            return attempt
-        refused.append(attempt)
-    return min(refused, key=lambda attempt: attempt.rms)
+        parameters = fit(poles, record.s, record.e, size, HOPELESS if quick else np.inf)
+        if parameters is not None:
+            attempt, follows = _judged(_one(parameters, size, record), least_periods, record)
+            if follows:  # a richer model would follow as well, and be no more plausible
+                return attempt
+            refused.append(attempt)
+    return _least_wrong(refused, time)
 
 
-def identify_several(time: Samples, energy: Samples) -> Identification:
+def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
     """Fit two vibrations of one damping to E(t), else three, and judge the fit.
 
     Parameters and result as for ``identify``; for records that one vibration does not describe.
@@ -161,18 +165,23 @@ def identify_several(time: Samples, energy: Samples) -> Identification:
     record = _Record.scaled(time, energy)
     refused = []
     for count in _SEVERAL:
-        parameters = fit_several(record.s, record.e, count)
+        parameters = fit_several(record.s, record.e, count, HOPELESS if quick else np.inf)
         if parameters is not None:
             attempt, follows = _judged(_sum(parameters, record), _PERIODS_OF_SEVERAL, record)
             if follows:
                 return attempt
             refused.append(attempt)
+    return _least_wrong(refused, time)
+
+
+def _least_wrong(refused: list[Identification], time: Samples) -> Identification:
+    """Give the refused fit that is nearest to the record."""
     if not refused:
-        return _nothing(time, "the energy does not oscillate at two rates")
+        return _nothing(time, f"no vibration comes near the energy: a few samples miss it by more than {MAX_MISFIT}")
     return min(refused, key=lambda attempt: attempt.rms)
 
 
-def assess(mode: Mode, time: Samples, energy: Samples) -> Identification:
+def assess(mode: Mode, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
     """Hold a mode that is known, not fitted, against a record: it must follow the samples as a fit must.
 
     Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
@@ -180,6 +189,9 @@ def assess(mode: Mode, time: Samples, energy: Samples) -> Identification:
     lacking = _lacking(time, energy)
     if lacking:
         return _nothing(time, lacking)
+    few = slice(None, None, -(-time.size // COARSE))
+    if quick and np.var(energy[few] - mode.energy(time[few])) > HOPELESS * np.var(energy[few]):
+        return _least_wrong([], time)
     record = _Record.scaled(time, energy)
     start = record.start
     cosine = mode.deformation(start) - mode.preload

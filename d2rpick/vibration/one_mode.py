@@ -207,10 +207,10 @@ def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Sam
     cos, sin = decay * np.cos(angle), decay * np.sin(angle)
     swing = cosine * cos + sine * sin
     q = preload + swing
-    jacobian = np.ones((6, s.size))
+    jacobian = np.ones((size, s.size))
     jacobian[0] = 2 * q * s * (sine * cos - cosine * sin)
     jacobian[1] = -q * s * swing
     jacobian[2] = 2 * q * cos
     jacobian[3] = 2 * q * sin
-    jacobian[5] = 2 * q
-    return plastic + q * q, jacobian[:size]
+    jacobian[5:] = 2 * q
+    return plastic + q * q, jacobian

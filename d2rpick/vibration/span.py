@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,12 +10,18 @@ import numpy as np
 from d2rpick.vibration.identify import identify
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
+    from typing import Protocol
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
 
-    Fitter = Callable[[Samples, Samples], Identification]
+    class Fitter(Protocol):
+        """Gives the oscillator for some samples; ``quick`` where a refusal needs no more than a few of them."""
+
+        def __call__(self, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
+            """Fit and judge an oscillator, as `identify` does."""
+
 
 # Where windows that are tried for an oscillator begin, as shares of what comes before td, and where they end, of what
 # comes after: by such steps one of them lies in any flight of some periods and fills most of it.
@@ -68,13 +75,14 @@ def described_span(
     fit : Identification
         Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
     """
+    quick, up_to_td = partial(fitter, quick=True), Span(bounds.start, td)
     refused = {}
     for window in _windows(td, bounds, whole=whole):
-        span, fit = _grow(history, td, window, bounds, fitter)
+        span, fit = _grow(history, td, window, bounds, fitter if window == up_to_td else quick)
         if span:
             return span, fit
         refused[window] = fit
-    return None, refused[Span(bounds.start, td)]
+    return None, refused[up_to_td]
 
 
 def span_of(history: History, anchor: float, fit: Identification, bounds: Span) -> Span | None:
@@ -85,18 +93,31 @@ def span_of(history: History, anchor: float, fit: Identification, bounds: Span) 
     assert fit.mode is not None
     time, energy = _samples(history, bounds)
     period = 2 * np.pi / fit.mode.fastest
-    width = max(3, round(period / _MEANS_PER_PERIOD / float(np.sort(np.diff(time))[(time.size - 1) // 2])))
+    typical = float(np.partition(np.diff(time), (time.size - 1) // 2)[(time.size - 1) // 2])
+    width = max(3, round(period / _MEANS_PER_PERIOD / typical))
     with np.errstate(over="ignore", invalid="ignore"):  # far off, a damped fit grows beyond all numbers
         least = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
         room = np.maximum(_SHARE_OFF * fit.mode.vibration_energy(time), least)
-        error = np.convolve(energy - fit.mode.energy(time), np.ones(width) / width, mode="same")
-        gone = ~(np.abs(error) <= room)
-    middle = int(np.searchsorted(time, anchor))
-    before, after = np.flatnonzero(gone[:middle]), np.flatnonzero(gone[middle:])
+        off = energy - fit.mode.energy(time)
+        middle = int(np.searchsorted(time, anchor))
+        # outwards from the anchor, so that no sum holds the large errors beyond the end that is to be found
+        behind, ahead = width // 2, (width - 1) // 2
+        after = np.flatnonzero(~(np.abs(_means(off, middle, behind, ahead)) <= room[middle:]))
+        backwards = np.abs(_means(off[::-1], time.size - middle, ahead, behind))
+        before = np.flatnonzero(~(backwards <= room[:middle][::-1]))
     # the mean over ``width`` samples reaches half as far beyond its middle
-    left = int(before[-1]) + 1 + width // 2 if before.size else 0
+    left = middle - int(before[0]) + width // 2 if before.size else 0
     right = middle + int(after[0]) - 1 - width // 2 if after.size else time.size - 1
     return Span(float(time[left]), float(time[right])) if left < right else None
+
+
+def _means(values: Samples, first: int, behind: int, ahead: int) -> Samples:
+    """Means over so many values behind each value and ahead of it, from the ``first`` on; there are zeros outside."""
+    begin = max(first - behind, 0)
+    sums = np.concatenate([[0.0], np.cumsum(values[begin:])])
+    at = np.arange(first, values.size)
+    high, low = np.minimum(at + ahead + 1, values.size), np.maximum(at - behind, 0)
+    return np.asarray((sums[high - begin] - sums[low - begin]) / (behind + 1 + ahead))
 
 
 def identify_within(history: History, window: Span) -> Identification:
