@@ -52,8 +52,9 @@ def command(
 ) -> None:
     """Find the switching cards of LS-DYNA decks and Radioss runs, and check them against deck and history.
 
-    The starter deck and the engine files of a Radioss run are one DECK, whichever is named.  Each DECK is read with its includes; a folder stands for its main decks, `-` for standard input.  `d2rpick rule`
-    lists the rules; a comment line `$ d2rpick: ignore D2R104` before a card silences one for it.
+    Each DECK is read with its includes; a folder stands for its main decks, `-` for standard input.  The starter deck
+    and the engine files of a Radioss run are one DECK, whichever is named.  `d2rpick rule` lists the rules; a comment
+    line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) silences one for it.
     """
     from d2rpick.rules import Severity
 
