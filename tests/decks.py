@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 MAIN = "main.k"
 
 
-def write(folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None) -> str:
+def write(folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None, name: str = MAIN) -> str:
     """Path of the main deck, written with the files it includes."""
-    for name, text in (files or {}).items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(text.encode("latin-1"))
-    path = folder / MAIN
+    for other, text in (files or {}).items():
+        (folder / other).parent.mkdir(parents=True, exist_ok=True)
+        (folder / other).write_bytes(text.encode("latin-1"))
+    path = folder / name
     path.write_bytes(deck if isinstance(deck, bytes) else deck.encode("latin-1"))
     return str(path)
 

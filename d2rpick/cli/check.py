@@ -13,7 +13,7 @@ from d2rpick.cli.output import Output, finish
 from d2rpick.errors import ConfigurationError, DeckError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.warnings import Caution
     from d2rpick.rules import Checked, Unreadable
@@ -50,10 +50,11 @@ Examples:
 def command(
     ctx: click.Context, /, deck: tuple[str, ...], fail_on: str, output_format: str, exit_zero: bool, **options: Any
 ) -> None:
-    """Find the switching cards of LS-DYNA decks and check them against deck and history.
+    """Find the switching cards of LS-DYNA decks and Radioss runs, and check them against deck and history.
 
-    Each DECK is read with its includes; a folder stands for its main decks, `-` for standard input.  `d2rpick rule`
-    lists the rules; a comment line `$ d2rpick: ignore D2R104` before a card silences one for it.
+    Each DECK is read with its includes; a folder stands for its main decks, `-` for standard input.  The starter deck
+    and the engine files of a Radioss run are one DECK, whichever is named.  `d2rpick rule` lists the rules; a comment
+    line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) silences one for it.
     """
     from d2rpick.rules import Severity
 
@@ -98,8 +99,7 @@ def _checked(
     asked.verify(RULES)
     results, inputs = [], []
     named, failed = _main_decks(decks)
-    first = {os.path.realpath(name): name for name in reversed(named)}  # of several spellings
-    for name in (name for name in dict.fromkeys(named) if name in first.values()):
+    for name in _apart(named):
         try:
             configuration = _configuration(name, asked)
             inputs.append(configuration.source)
@@ -124,6 +124,18 @@ def _main_decks(named: Sequence[str]) -> tuple[list[str], list[Unreadable]]:
         except DeckError as error:
             failed.append(Unreadable(name, str(error)))
     return decks, failed
+
+
+def _apart(names: Sequence[str]) -> Iterator[str]:
+    """Each deck once: by one of its spellings, and a Radioss run by the first of its files."""
+    from d2rpick.deck.radioss import run_files
+
+    seen: set[str] = set()
+    for name in names:
+        real = os.path.realpath(name)
+        if real not in seen:
+            seen.update([real, *map(os.path.realpath, run_files(name))])
+            yield name
 
 
 def _configuration(deck: str, asked: Configuration) -> Configuration:

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from d2rpick.deck.radioss import run_files
 from d2rpick.deck.reader import read_deck
 from d2rpick.errors import DeckError
 
@@ -29,6 +30,8 @@ def main_decks(folder: str) -> list[str]:
     decks = [path for path in _files(folder) if _begins(path)]
     included: set[str] = set()
     for path in decks:
+        if run_files(path):
+            continue  # its includes have no /BEGIN
         try:
             included.update(map(os.path.realpath, read_deck(path).files[1:]))
         except DeckError:

@@ -8,6 +8,20 @@ if TYPE_CHECKING:
     from d2rpick.deck.parts import Parts
     from d2rpick.deck.reader import Deck
 
+# Solid formulations that keep their stresses in global axes, by ELFORM; 0 and 9 co-rotate.
+NOT_TURNED: Final = {
+    -2: "8 points, selectively reduced, for poor aspect ratios",
+    -1: "8 points, selectively reduced, for poor aspect ratios",
+    1: "constant stress",
+    2: "8 points, selectively reduced",
+    3: "8 nodes with rotations",
+    4: "4 nodes with rotations",
+    10: "tetrahedron with 1 point",
+    13: "tetrahedron with nodal pressure",
+    15: "pentahedron with 2 points",
+    16: "tetrahedron with 10 nodes",
+    17: "tetrahedron with 10 nodes",
+}
 _DEFAULT: Final = 1  # ELFORM of a blank field
 
 

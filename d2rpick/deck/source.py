@@ -23,7 +23,7 @@ _ANCHOR = _PGP.index(b"G")  # a letter that mesh data never holds: looking for i
 _MARK = b"\xef\xbb\xbf"  # byte order mark of UTF-8
 _HEAD = 1024  # longest keyword line that is looked at
 _BEFORE = 4096  # how far back comments belonging to a keyword are looked for
-_SILENCE = re.compile(r"\$\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)", re.IGNORECASE)
+_SILENCE = re.compile(r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)", re.IGNORECASE)
 
 
 class SourceFile:
@@ -144,19 +144,24 @@ class Block:
         """Whether this is the head of an encrypted block and no keyword."""
         return self.head.startswith("-")
 
+    @property
+    def _comment(self) -> tuple[bytes, ...]:
+        """What begins a comment line: ``$`` in LS-DYNA's decks, ``#`` too in those of Radioss."""
+        return (b"$", b"#") if self.head.startswith("/") else (b"$",)
+
     @cached_property
     def line(self) -> int:
         """Number of the keyword line in its file."""
         return self.source.line_at(self.start)
 
     def lines(self) -> Iterator[tuple[int, str]]:
-        """Read the data lines, with their distance to the keyword; ``$`` in column 1 marks a comment."""
+        """Read the data lines, with their distance to the keyword, without comments."""
         position = self.start
         for distance, raw in enumerate(self.source.lines_from(self.start)):
             position += len(raw)
             if self.end is not None and position > self.end:
                 return
-            if distance and not raw.startswith(b"$"):
+            if distance and not raw.startswith(self._comment):
                 yield distance, raw.rstrip(b"\r\n").decode("latin-1")
 
     @cached_property
@@ -168,7 +173,7 @@ class Block:
         before = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(_MARK).decode("latin-1")
         rules: list[str] = []
         for line in reversed(before.split("\n")[:-1]):
-            if not line.startswith("$"):
+            if not line.encode("latin-1").startswith(self._comment):
                 break
             if found := _SILENCE.match(line):
                 rules += re.split(r"[\s,]+", found[1].strip(" \t\r,").upper())

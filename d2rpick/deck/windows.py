@@ -14,10 +14,16 @@ if TYPE_CHECKING:
 
 
 class Unit(NamedTuple):
-    """A part, or a part set whose members cannot be known."""
+    """A part; or a part set or a rigid body (by its main node) whose parts cannot be known."""
 
     id: int
     is_set: bool = False
+    is_body: bool = False
+
+    @property
+    def kind(self) -> str:
+        """What the id is one of."""
+        return "part set" if self.is_set else "main node" if self.is_body else "part"
 
 
 class Event(NamedTuple):
@@ -43,8 +49,8 @@ class Window:
 
     @property
     def part(self) -> int | None:
-        """The part; None for a part set whose members cannot be known."""
-        return None if self.unit.is_set else self.unit.id
+        """The part; None for a part set or rigid body whose parts cannot be known."""
+        return self.unit.id if self.unit.kind == "part" else None
 
 
 @dataclass(frozen=True)

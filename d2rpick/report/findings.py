@@ -193,16 +193,15 @@ def as_sarif(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable
 
 def _window_lines(windows: Sequence[Window], root: Path) -> Iterator[str]:
     """Windows that the same cards make are one line."""
-    groups: dict[tuple[int, int | None, bool], list[Window]] = {}
+    groups: dict[tuple[int, int | None, str], list[Window]] = {}
     for window in windows:
         closed = None if window.closed is None else id(window.closed.by)
-        groups.setdefault((id(window.opened.by), closed, window.unit.is_set), []).append(window)
+        groups.setdefault((id(window.opened.by), closed, window.unit.kind), []).append(window)
     for group in groups.values():
         first = group[0]
-        kind = "part set" if first.unit.is_set else "part"
         card = first.opened.by.card
         until = "the end" if first.td is None else f"{first.td:g}"
-        names = name_units((window.unit.id for window in group), kind)
+        names = name_units((window.unit.id for window in group), first.unit.kind)
         yield f"{names}: rigid from {first.tr:g} to {until} ({_shown(card.file, root)}:{card.line})"
 
 
@@ -211,6 +210,7 @@ def _window(result: Checked, window: Window, root: Path) -> dict[str, Any]:
     return {
         "part": window.part,
         "part_set": window.unit.id if window.unit.is_set else None,
+        "node": window.unit.id if window.unit.is_body else None,
         "tr": window.tr,
         "td": window.td,
         "file": _shown(card.file, root),

@@ -5,12 +5,12 @@ from __future__ import annotations
 import textwrap
 from typing import TYPE_CHECKING
 
-from d2rpick.rules import RULES
+from d2rpick.rules import RULES, Example
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.rules import Example, Rule
+    from d2rpick.rules import Rule
 
 _WIDTH = 100
 
@@ -34,7 +34,11 @@ def _example(title: str, example: Example) -> Iterator[str]:
     if example.history:
         yield f"{title}, with the history of"
         yield f"  d2rpick replay {example.history} -o energy.csv"
-        yield f"checked by d2rpick check main.k --history energy.csv {example.options}".rstrip() + ":"
+        yield f"checked by d2rpick check {example.name} --history energy.csv {example.options}".rstrip() + ":"
+    elif example.stdin:
+        yield f"{title}, read by d2rpick check -:"
+    elif example.name != Example.name:
+        yield f"{title}, as {example.name}:"
     else:
         yield f"{title}:"
     yield ""

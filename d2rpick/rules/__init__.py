@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck import read_deck
+from d2rpick.deck import radioss, read_deck
 from d2rpick.errors import ConfigurationError
-from d2rpick.rules import constraints, energy, force, formats, pairs, reading, scope, switched_parts, times
+from d2rpick.rules import constraints, energy, force, formats, pairs, reading, runs, scope, switched_parts, times
 from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, Severity, Unreadable
 from d2rpick.rules.configuration import Configuration, expected_instead
+from d2rpick.rules.run_case import RunCase
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -30,7 +31,7 @@ __all__ = [
     "find_rules",
 ]
 
-_MODULES = (reading, pairs, force, times, formats, switched_parts, constraints, energy, scope)
+_MODULES = (reading, pairs, force, times, formats, switched_parts, constraints, energy, scope, runs)
 
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted((rule for module in _MODULES for rule in module.RULES), key=lambda rule: rule.id)
@@ -72,12 +73,12 @@ def check_deck(
     judge: Judge | None = None,
     content: bytes | None = None,
 ) -> Checked:
-    """Read a deck with its includes and apply the rules.
+    """Read a deck with its includes, or a Radioss run with its legs, and apply the rules.
 
     Parameters
     ----------
     path : str
-        The main deck.
+        The main deck; or a file of a Radioss run, which is checked with the others of that run.
     configuration : Configuration, optional
         Which rules count, and how much; default: all, as they are.
     judge : Judge, optional
@@ -99,7 +100,7 @@ def check_deck(
     """
     configuration = configuration or Configuration()
     configuration.verify(RULES)
-    case = Case(read_deck(path, content), judge)
+    case = _read(path, content, judge)
     findings = [
         Finding(
             rule.id,
@@ -111,7 +112,7 @@ def check_deck(
             place.column,
         )
         for rule in RULES.values()
-        if configuration.selects(rule.id)
+        if configuration.selects(rule.id) and case.solver in rule.solvers
         for place, message, *weight in rule.check(case)
         if not case.deck.silences(rule.id, place.file, place.line)
     ]
@@ -122,6 +123,13 @@ def check_deck(
     return Checked(
         path, case.windows.windows, tuple(findings), len(case.sets), tuple(case.deck.files), tuple(_remarks(case.deck))
     )
+
+
+def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
+    """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck."""
+    if radioss.recognises(content) if content is not None else radioss.run_files(path):
+        return RunCase.of(radioss.read_run(path, content), judge)
+    return Case(read_deck(path, content), judge)
 
 
 def _remarks(deck: Deck) -> Iterator[str]:

@@ -8,12 +8,18 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from d2rpick.deck import Deck, Parts, SwitchSet, Window, Windows, find_windows, read_parts, read_switching
+from d2rpick.deck.sections import NOT_TURNED, solid_formulations
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from d2rpick.deck.card import Card
+    from d2rpick.deck.includes import Unread
     from d2rpick.deck.rows import Field, Value
+
+
+LS_DYNA, RADIOSS = "ls-dyna", "radioss"
+BOTH = (LS_DYNA, RADIOSS)
 
 
 class Fault(NamedTuple):
@@ -76,6 +82,11 @@ class Case:
     deck: Deck
     judge: Judge | None = None
 
+    @property
+    def solver(self) -> str:
+        """Whose deck it is."""
+        return LS_DYNA
+
     @cached_property
     def parts(self) -> Parts:
         """Parts, part sets, rigid materials."""
@@ -105,6 +116,22 @@ class Case:
         return self.end_time.value * cards[-1].transform.time
 
     @cached_property
+    def unread(self) -> Sequence[Unread]:
+        """Includes that were not read and may hold what is switched."""
+        return self.deck.unread
+
+    @cached_property
+    def untimed(self) -> tuple[tuple[Field, str], ...]:
+        """Cards that no clock switches, and what does."""
+        return ()
+
+    @cached_property
+    def unturned(self) -> Mapping[int, str]:
+        """Parts of solids whose stresses do not turn with a rigid body, and their formulation."""
+        forms = solid_formulations(self.deck, self.parts)
+        return {part: f"ELFORM {form}, {NOT_TURNED[form]}" for part, form in forms.items() if form in NOT_TURNED}
+
+    @cached_property
     def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:
         """Numbers of other cards that the rules rely on: ENDTIM, and DT of the energy databases."""
         names = ("CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM")
@@ -118,7 +145,7 @@ Objection = tuple["Field", str] | tuple["Field", str, Severity]
 
 @dataclass(frozen=True)
 class Example:
-    """A deck, and the files it includes by name.
+    """A deck, and the files it includes, or that belong to it, by name; ``name`` is that of the deck itself.
 
     ``history`` are arguments of ``d2rpick replay`` that write the energy history it is checked with, ``options``
     further ones of ``d2rpick check``.  ``stdin`` tells that it is read from standard input.
@@ -129,6 +156,7 @@ class Example:
     history: str = ""
     options: str = ""
     stdin: bool = False
+    name: str = "main.k"
 
 
 @dataclass(frozen=True)
@@ -142,6 +170,7 @@ class Rule:
     check: Callable[[Case], Iterable[Objection]]
     passing: tuple[Example, ...]
     failing: tuple[Example, ...]
+    solvers: tuple[str, ...] = (LS_DYNA,)  # whose decks it looks at
 
 
 def name_units(ids: Iterable[int], kind: str = "part") -> str:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.constraints import read_constraints
 from d2rpick.deck.elements import nodes_of
-from d2rpick.deck.sections import solid_formulations
-from d2rpick.rules.base import Example, Rule, Severity, name_units
+from d2rpick.rules.base import BOTH, Example, Rule, Severity, name_units
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
 if TYPE_CHECKING:
@@ -20,20 +19,6 @@ if TYPE_CHECKING:
     from d2rpick.rules.base import Case, Objection
 
 _DELETED = 1  # NRBF, NCSF
-# Solid formulations that keep their stresses in global axes, by ELFORM; 0 and 9 co-rotate.
-_NOT_TURNED: Final = {
-    -2: "8 points, selectively reduced, for poor aspect ratios",
-    -1: "8 points, selectively reduced, for poor aspect ratios",
-    1: "constant stress",
-    2: "8 points, selectively reduced",
-    3: "8 nodes with rotations",
-    4: "4 nodes with rotations",
-    10: "tetrahedron with 1 point",
-    13: "tetrahedron with nodal pressure",
-    15: "pentahedron with 2 points",
-    16: "tetrahedron with 10 nodes",
-    17: "tetrahedron with 10 nodes",
-}
 
 
 def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
@@ -80,20 +65,20 @@ def _on(constraint: Constraint, owner: dict[int, int], switched: dict[int, Heade
 
 def _unturned(case: Case) -> Iterator[Objection]:
     loaded = [window for window in case.windows.windows if window.td is not None and window.tr > 0]
-    formulations = solid_formulations(case.deck, case.parts) if loaded else {}
-    by_form: dict[int, list[int]] = {}
-    place: dict[int, Field] = {}
+    formulations = case.unturned if loaded else {}
+    by_form: dict[str, list[int]] = {}
+    place: dict[str, Field] = {}
     for window in loaded:
-        form = None if window.part is None else formulations.get(window.part)
-        if window.part is not None and form in _NOT_TURNED:
+        if window.part is not None and window.part in formulations:
+            form = formulations[window.part]
             by_form.setdefault(form, []).append(window.part)
             place.setdefault(form, window.opened.line.part.field)
     for form, parts in by_form.items():
         yield (
             place[form],
             (
-                f"{name_units(parts)} of solids with ELFORM {form} ({_NOT_TURNED[form]}): the stresses locked "
-                "in do not turn with the rigid body; expect an error after a large rotation"
+                f"{name_units(parts)} of solids that do not co-rotate ({form}): the stresses locked in do not turn "
+                "with the rigid body; expect an error after a large rotation"
             ),
         )
 
@@ -151,5 +136,6 @@ RULES: Final = (
         _unturned,
         (Example(GOOD), _solid("0"), _solid("2", "0.0")),
         (_solid("2"), _solid(""), _solid("13")),
+        solvers=BOTH,
     ),
 )

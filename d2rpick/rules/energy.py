@@ -6,7 +6,7 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.rules.base import Example, Rule, Severity, name_units
+from d2rpick.rules.base import BOTH, Example, Rule, Severity, name_units
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, automatic
 from d2rpick.rules.formats import factor_of, told
 
@@ -29,8 +29,7 @@ def _faults(rule: str, case: Case) -> Iterator[Objection]:
         for fault in case.judge.faults(window):
             event = window.closed if fault.at_td else window.opened
             if fault.rule == rule and event:
-                kind = "part set" if window.unit.is_set else "part"
-                found.setdefault((event.by, kind, fault.message), []).append(window.unit.id)
+                found.setdefault((event.by, window.unit.kind, fault.message), []).append(window.unit.id)
     for (card, kind, message), ids in found.items():
         yield card.time_field, f"{name_units(ids, kind)}: {message}"
 
@@ -84,6 +83,7 @@ RULES: Final = (
         partial(_faults, "D2R201"),
         (*_PASSING, Example(GOOD)),
         (_pair("0.017", ".0687534"), _pair("0.0135", ".0687534", "--tolerance 0.05")),
+        solvers=BOTH,
     ),
     Rule(
         "D2R202",
@@ -95,6 +95,7 @@ RULES: Final = (
         partial(_faults, "D2R202"),
         _PASSING,
         (_pair(".0122659", "0.064"),),
+        solvers=BOTH,
     ),
     Rule(
         "D2R203",
@@ -105,6 +106,7 @@ RULES: Final = (
         partial(_faults, "D2R203"),
         _PASSING,
         (_pair(".0128853", "0.064"),),
+        solvers=BOTH,
     ),
     Rule(
         "D2R204",
@@ -116,6 +118,7 @@ RULES: Final = (
         partial(_faults, "D2R204"),
         _PASSING,
         (_pair(*_GOOD_PAIR, "--after 0.03"),),
+        solvers=BOTH,
     ),
     Rule(
         "D2R205",
@@ -125,6 +128,7 @@ RULES: Final = (
         partial(_faults, "D2R205"),
         _PASSING,
         (_pair(".0135867", "0.16"),),
+        solvers=BOTH,
     ),
     Rule(
         "D2R206",
@@ -135,6 +139,7 @@ RULES: Final = (
         _units,
         (*_PASSING, Example(GOOD)),
         (_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")),),
+        solvers=BOTH,
     ),
     Rule(
         "D2R207",
@@ -146,5 +151,6 @@ RULES: Final = (
         _thousand,
         (*_PASSING, Example(GOOD)),
         (_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")), _pair("1.0e-5", "6.0e-5")),
+        solvers=BOTH,
     ),
 )

@@ -77,7 +77,9 @@ class HistoryJudge:
         key = part, window.tr, td
         if key not in self._faults:
             if self._known and part is None:
-                what = f"the members of part set {window.unit.id} are not known, it is judged by the whole model"
+                which = "members" if window.unit.is_set else "parts"
+                who = f"the {which} of {window.unit.kind} {window.unit.id}"
+                what = f"{who} are not known, it is judged by the whole model"
                 self._cautions[Caution("judged-by-whole", what)] = []
             self._faults[key] = tuple(self._judged(part, window.tr, td))
         return self._faults[key]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.deck.includes import UNKNOWN_KIND
 from d2rpick.deck.rows import Field
 from d2rpick.deck.switching import misspelt
-from d2rpick.rules.base import Example, Rule, Severity
+from d2rpick.rules.base import BOTH, Example, Rule, Severity
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ _CURES: Final = {
 
 
 def _includes(case: Case) -> Iterator[Objection]:
-    for missing in case.deck.unread:
+    for missing in case.unread:
         cure = _CURES.get(missing.reason, "correct it")
         found = f"include {missing.name.text!r} was not read ({missing.reason})"
         yield missing.name, f"{found}; switching cards may hide in it: {cure}"
@@ -161,17 +161,20 @@ RULES: Final = (
             Example(GOOD.replace("*DEFORM", "* DEFORM")),
             Example("*DEFORMABLE_TO_RIGID\n         1         0      WALL\n"),
         ),
+        solvers=BOTH,
     ),
     Rule(
         "D2R003",
         Severity.ERROR,
         "an include file is missing or cannot be read",
         "Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's "
-        "folder. A file that includes itself or cannot be read is reported too. Switching cards, parts or "
+        "folder. A file that includes itself or cannot be read is reported too; one that a Radioss starter deck "
+        "asks for, only where a main node that is switched was not found without it. Switching cards, parts or "
         "parameters may be in it, so the other findings are not the whole truth.",
         _includes,
         (Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}),),
         (Example(HEAD + "*INCLUDE\nnowhere.k\n" + END), Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END)),
+        solvers=BOTH,
     ),
     Rule(
         "D2R109",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.elements import unread_elements
 from d2rpick.deck.source import STDIN
-from d2rpick.rules.base import Example, Rule, Severity
+from d2rpick.rules.base import BOTH, LS_DYNA, Example, Rule, Severity
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
 if TYPE_CHECKING:
@@ -31,8 +31,10 @@ def _disabled(case: Case) -> Iterator[Objection]:
 
 
 def _untimed(case: Case) -> Iterator[Objection]:
+    for place, how in case.untimed:
+        yield place, f"{how}; not judged by time"
     for card in case.sets:
-        reason = _reason(card)
+        reason = _reason(card) if case.solver == LS_DYNA else ""
         if reason:
             yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
 
@@ -106,8 +108,8 @@ RULES: Final = (
         Severity.INFO,
         "not judged by time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID",
         "CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the "
-        "restart begins, plain cards at the start: no time on the card can be compared with an energy "
-        "history.",
+        "restart begins, plain cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: "
+        "no time on the card can be compared with an energy history.",
         _untimed,
         (Example(GOOD),),
         (
@@ -115,6 +117,7 @@ RULES: Final = (
             Example("*RIGID_DEFORMABLE_R2D\n         1\n"),
             Example("*DEFORMABLE_TO_RIGID\n         1\n"),
         ),
+        solvers=BOTH,
     ),
     Rule(
         "D2R304",

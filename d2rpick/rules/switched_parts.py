@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.elements import first_shared_nodes
-from d2rpick.rules.base import Example, Rule, Severity, name_units
+from d2rpick.rules.base import BOTH, Example, Rule, Severity, name_units
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
 if TYPE_CHECKING:
@@ -27,10 +27,10 @@ def _by_card(events: Iterable[Event]) -> dict[SwitchSet, list[Event]]:
 
 
 def _named(events: Iterable[Event]) -> str:
-    units = [event.unit for event in events]
-    parts = [unit.id for unit in units if not unit.is_set]
-    sets = [unit.id for unit in units if unit.is_set]
-    return " and ".join(([name_units(parts)] if parts else []) + ([name_units(sets, "part set")] if sets else []))
+    by_kind: dict[str, list[int]] = {}
+    for event in events:
+        by_kind.setdefault(event.unit.kind, []).append(event.unit.id)
+    return " and ".join(name_units(ids, kind) for kind, ids in sorted(by_kind.items()))
 
 
 def _unknown_members(case: Case, *, to_rigid: bool) -> bool:
@@ -222,6 +222,7 @@ RULES: Final = (
             Example(HEAD + PARTS + THERE + END),
             Example(HEAD + PARTS + "*DEFORMABLE_TO_RIGID\n         1\n" + END),
         ),
+        solvers=BOTH,
     ),
     Rule(
         "D2R106",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME
-from d2rpick.rules.base import Example, Rule, Severity, name_units
+from d2rpick.rules.base import BOTH, Example, Rule, Severity, name_units
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
 if TYPE_CHECKING:
@@ -150,6 +150,7 @@ RULES: Final = (
         _order,
         (Example(GOOD),),
         (_window("0.09", "0.02"), _window("0.02", "0.02")),
+        solvers=BOTH,
     ),
     Rule(
         "D2R105",

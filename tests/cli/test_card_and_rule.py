@@ -284,6 +284,8 @@ def test_the_beginning_of_an_id_gives_all_of_them_and_near_misses_are_named() ->
         "D2R302",
         "D2R303",
         "D2R304",
+        "D2R305",
+        "D2R306",
     ]
     result = run("rule", "D2R1O5")
     assert (result.exit_code, result.stdout) == (2, "")

@@ -12,6 +12,7 @@ import jsonschema
 import numpy as np
 import pytest
 
+from d2rpick.rules import RULES
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import BOX, DECK, ENERGY, GLSTAT, ROOT, answer, run
 from tests.report.test_findings import junit_is_valid, sarif_is_valid
@@ -147,7 +148,7 @@ def test_an_unreadable_deck_is_an_error_of_its_own_in_reports() -> None:
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_no_readable_deck_is_no_answer(form: str) -> None:
-    place("run.rad", "/RUN/Root/1\n 0.1\n")
+    place("run.rad", "/NODE\n 1\n")
     result = run("check", "absent.k", "run.rad", "-f", form, "--exit-zero")
     assert result.exit_code == 2
     assert ("absent.k" in result.stdout) == (form != "table")
@@ -195,6 +196,41 @@ def test_ndjson_is_a_line_for_each_deck() -> None:
     assert [one["summary"]["errors"] for one in found] == [1, 0]
     for line in lines:
         valid("json", line)
+
+
+RUN_EXAMPLE = RULES["D2R401"].passing[0]
+
+
+def place_run(folder: str = ".") -> list[str]:
+    """Write the starter deck and the engine files of a run."""
+    files = {RUN_EXAMPLE.name: RUN_EXAMPLE.deck, **RUN_EXAMPLE.files}
+    return [place(f"{folder}/{name}", text) for name, text in files.items()]
+
+
+@pytest.mark.parametrize("chosen", [slice(None), slice(0, 1), slice(2, 3)])
+def test_the_files_of_a_radioss_run_are_one_deck(chosen: slice) -> None:
+    files = place_run()
+    found = answer("check", *files[chosen])
+    assert len(found["decks"]) == 1
+    assert found["findings"] == []
+    assert [(w["part"], w["tr"], w["td"]) for w in found["windows"]] == [(1, 0.02, 0.09)]
+    jsonschema.validate(found, SCHEMA)
+
+
+def test_a_radioss_run_is_judged_by_a_history_and_found_in_a_folder() -> None:
+    place_run("runs")
+    found = answer("check", "runs", "--history", ENERGY)
+    assert found["decks"] == ["runs/box_0000.rad"]
+    assert set(rules(found)) <= {"D2R201", "D2R202", "D2R203"}
+    assert {"D2R201", "D2R202"} & set(rules(found))
+
+
+def test_printed_engine_files_pass() -> None:
+    pairs = ("--tr", "0.02", "--td", "0.09", "--tr", "0.2", "--td", "0.3")
+    card = run("card", "--solver", "radioss", *pairs, "--node", "1808", "--end", "0.4")
+    found = json.loads(run("check", "-", "-f", "json", stdin=card.stdout_bytes).stdout)
+    assert found["findings"] == []
+    assert [(w["node"], w["tr"], w["td"]) for w in found["windows"]] == [(1808, 0.02, 0.09), (1808, 0.2, 0.3)]
 
 
 # Which rules count.

@@ -37,10 +37,8 @@ FOUND: dict[str, dict[str, int]] = {
     "yaris/fixed_ground.k": {},
     "yaris/implicit_control_cards_R9.k": {},
 }
-OF_RADIOSS = [
-    *("radioss/HYPE_sensor_excerpt.rad", "radioss/IDEL8_0000_rbody_excerpt.rad"),
-    *("radioss/IDEL8_0001.rad", "radioss/IDEL8_0002.rad"),
-]
+EXCERPTS = ["radioss/HYPE_sensor_excerpt.rad", "radioss/IDEL8_0000_rbody_excerpt.rad"]
+OF_RADIOSS = [*EXCERPTS, "radioss/IDEL8_0001.rad", "radioss/IDEL8_0002.rad"]
 
 
 def check(name: str) -> Checked:
@@ -58,7 +56,7 @@ def test_all_decks_are_covered() -> None:
     assert files == FOUND.keys() | set(OF_RADIOSS)
 
 
-@pytest.mark.parametrize("name", OF_RADIOSS)
+@pytest.mark.parametrize("name", EXCERPTS)
 def test_decks_of_another_solver_are_not_passed_silently(name: str) -> None:
     with pytest.raises(DeckError, match="an LS-DYNA deck was expected"):
         check(name)
@@ -84,3 +82,36 @@ def test_swapped_codes_are_named() -> None:
 @pytest.mark.parametrize("name", ["jr_pendulum.k", "k2rad_plain_lrb.k"])
 def test_plain_cards_are_rigid_from_the_start(name: str) -> None:
     assert [(window.part, window.tr, window.td) for window in check(name).windows] == [(1, 0.0, None), (2, 0.0, None)]
+
+
+# Radioss.
+
+
+@pytest.mark.parametrize("name", ["IDEL8_0000.rad", "IDEL8_0001.rad", "IDEL8_0002.rad"])
+def test_any_file_of_a_public_run_is_the_run(name: str) -> None:
+    checked = check_deck(str(shared(f"real/radioss-decks/{name}")))
+    assert checked.findings == ()
+    assert len(checked.files) == 3
+    assert {(window.tr, window.td) for window in checked.windows} == {(0.0, 0.05)}
+    assert [window.part for window in checked.windows] == [1]
+
+
+def test_a_public_run_that_switches_nobody() -> None:
+    checked = check_deck(str(shared("real/radioss-decks/BLOCK_0000.rad")))
+    assert (checked.findings, checked.windows) == ((), ())
+
+
+def test_legs_without_their_starter_deck_tell_main_nodes() -> None:
+    checked = check("radioss/IDEL8_0001.rad")
+    assert [(window.unit.id, window.unit.kind, window.tr, window.td) for window in checked.windows] == [
+        (450, "main node", 0.0, 0.05)
+    ]
+    assert checked.findings == ()
+
+
+@pytest.mark.parametrize(("name", "nodes"), [("CAR_all", [1808]), ("CAR_heavy", range(1808, 1814))])
+def test_legs_that_were_computed(name: str, nodes: list[int]) -> None:
+    checked = check_deck(str(shared(f"openradioss/car_drop/decks/{name}_0001.rad")))
+    assert checked.findings == ()
+    found = [(window.unit.id, window.tr, window.td) for window in checked.windows]
+    assert found == [(node, 0.0496, 0.1464) for node in nodes]

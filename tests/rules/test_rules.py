@@ -41,7 +41,7 @@ def findings(folder: Path, rule: Rule, example: Example) -> list[dict[str, Any]]
     if example.history:
         (folder / "energy.csv").write_bytes(history(example.history))
         options += ["--history", str(folder / "energy.csv")]
-    path = write(folder, example.deck, example.files)
+    path = write(folder, example.deck, example.files, example.name)
     if example.stdin:
         found = json.loads(run("check", "-", "-f", "json", stdin=example.deck.encode()).stdout)["findings"]
     else:
@@ -199,7 +199,7 @@ def test_shared_nodes_of_a_part_set_name_the_set(tmp_path: Path) -> None:
     sets = "*SET_PART\n         3\n         1         2\n"
     line = "         3         0      PSET"
     deck = HEAD + PARTS + mesh + sets + automatic(1, "0.02", rigid=[line]) + END
-    assert "part 1 (of part set 3) and part 2 (of part set 3) share node 3" in message(tmp_path, "D2R108", deck)
+    assert "part 1 (of part set 3) and part 2 (of part set 3) share node 8" in message(tmp_path, "D2R108", deck)
 
 
 def test_missing_lines_of_a_card_are_named(tmp_path: Path) -> None:

@@ -1,0 +1,45 @@
+"""Keyword blocks of Radioss files: a line that begins with ``/``, and the data lines below it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from d2rpick.deck.card import Card
+from d2rpick.deck.parameters import Scope
+from d2rpick.deck.source import Block
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.deck.source import SourceFile
+
+_INCLUDE = b"#include"
+
+
+def blocks(source: SourceFile) -> Iterator[Block]:
+    """Keyword blocks and ``#include`` lines in the order of the file, up to ``/END``."""
+    position = 0
+    start: tuple[int, str] | None = None
+    for raw in source.lines_from(0):
+        if raw.startswith(b"/") or raw[: len(_INCLUDE)].lower() == _INCLUDE:
+            if start:
+                yield Block(source, start[0], position, start[1])
+            start = position, raw.rstrip(b"\r\n").decode("latin-1")
+            if start[1].upper().split() == ["/END"]:
+                return
+        position += len(raw)
+    if start:
+        yield Block(source, start[0], None, start[1])
+
+
+def keyword(block: Block) -> tuple[str, ...]:
+    """Words of a keyword line in upper case; empty for an ``#include``.
+
+    The name of the run in ``/RUN/name/1`` is in upper case too: `Card.block` has it as written.
+    """
+    return tuple(word.strip().upper() for word in block.head[1:].split("/")) if block.head.startswith("/") else ()
+
+
+def card_of(block: Block) -> Card:
+    """Show a block as a card, whose fields are 10 columns wide."""
+    return Card("/".join(keyword(block)), block, Scope())

@@ -1,0 +1,85 @@
+"""Engine files: a leg of a run, its end, and the rigid bodies it switches on and off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from d2rpick.deck.expression import ExpressionError, number
+from d2rpick.deck.radioss.blocks import blocks, card_of, keyword
+from d2rpick.deck.rows import Field, Value
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.deck.card import Card
+    from d2rpick.deck.source import Block, SourceFile
+
+
+@dataclass(eq=False)
+class Leg:
+    """One engine run: its name and number as /RUN gives them, its end, the main nodes it switches, its step limit."""
+
+    run: Card
+    name: str
+    number: int
+    stop: Value[float]
+    switched: list[tuple[Card, bool, tuple[Value[int], ...]]] = field(default_factory=list)  # True: made rigid
+    cap: Value[float] | None = None
+    version: str = ""
+
+
+def read_legs(source: SourceFile) -> list[Leg]:
+    """Read the legs of a file: one, or several where printed cards are read as they come."""
+    legs: list[Leg] = []
+    waiting: list[tuple[Block, tuple[str, ...]]] = []
+    for block in blocks(source):
+        words = keyword(block)
+        if words and words[0] == "RUN":
+            legs.append(_leg(block, words))
+            for earlier, its_words in waiting:
+                _take(legs[-1], earlier, its_words)
+            waiting.clear()
+        elif legs:
+            _take(legs[-1], block, words)
+        else:
+            waiting.append((block, words))
+    return legs
+
+
+def _leg(block: Block, words: tuple[str, ...]) -> Leg:
+    card = card_of(block)
+    stop = next(_numbers(block), None)
+    missing = Value(0.0, card.here, "the end of the run is missing below /RUN")
+    name = block.head.split("/")[2].strip() if len(words) > 1 else ""
+    return Leg(card, name, int(words[2]) if words[2:] and words[2].isdigit() else 0, stop or missing)
+
+
+def _take(leg: Leg, block: Block, words: tuple[str, ...]) -> None:
+    if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
+        nodes = tuple(_integer(value) for value in _numbers(block))
+        leg.switched.append((card_of(block), words[1] == "ON", nodes))
+    elif words == ("DTIX",):
+        leg.cap = list(_numbers(block))[-1] if any(True for _ in _numbers(block)) else None
+    elif words and words[0] == "VERS":
+        leg.version = words[1] if words[1:] else ""
+
+
+def _numbers(block: Block) -> Iterator[Value[float]]:
+    """All numbers below a keyword, in free format."""
+    for distance, line in block.lines():
+        column = 0
+        for word in line.split():
+            column = line.index(word, column)
+            place = Field(word, block, distance, column + 1)
+            column += len(word)
+            try:
+                yield Value(float(number(word)), place)
+            except ExpressionError as error:
+                yield Value(0.0, place, str(error))
+
+
+def _integer(value: Value[float]) -> Value[int]:
+    if not value.problem and value.value != int(value.value):
+        return Value(0, value.field, f"{value.field.text!r} is not an integer")
+    return Value(int(value.value), value.field, value.problem)

@@ -1,0 +1,132 @@
+"""The files of one Radioss run: which belong together, and what they hold."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.deck.includes import Unread
+from d2rpick.deck.radioss.engine import Leg, read_legs
+from d2rpick.deck.radioss.starter import Starter, card_or_none
+from d2rpick.deck.reader import Deck
+from d2rpick.deck.source import SourceFile
+from d2rpick.errors import DeckError
+
+if TYPE_CHECKING:
+    from d2rpick.deck.card import Card
+
+_HEAD = 256 * 1024
+_KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
+_STARTER: Final = re.compile(rb"^/BEGIN", re.MULTILINE | re.IGNORECASE)
+_ENGINE: Final = re.compile(rb"^/RUN/", re.MULTILINE | re.IGNORECASE)
+_NUMBERED: Final = re.compile(r"(.+)_(\d{4})\.rad", re.IGNORECASE | re.DOTALL)
+_NAME: Final = re.compile(rb"^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)", re.MULTILINE | re.IGNORECASE)
+_DEEPEST = 60  # includes in includes
+
+
+@dataclass(eq=False)
+class Run:
+    """The starter deck, where it was found, and the legs in the order of their numbers; ``deck`` has the files."""
+
+    deck: Deck
+    starter: Starter | None = None
+    legs: list[Leg] = field(default_factory=list)
+
+
+def recognises(head: bytes) -> bool:
+    """Whether a file that begins like this is a starter deck or an engine file."""
+    first = _KEYWORD.search(head)
+    return first is not None and first[0] == b"/" and bool(_STARTER.search(head) or _ENGINE.search(head))
+
+
+def run_files(path: str) -> list[str]:
+    """Files of the run that ``path`` belongs to; none where it is not a file of a Radioss run.
+
+    The starter deck ``NAME_0000.rad`` and the engine files ``NAME_0001.rad`` and so on in its folder belong
+    together; a file of another name goes by the name of the run that it holds.
+    """
+    try:
+        with Path(path).open("rb") as stream:
+            head = stream.read(_HEAD)
+    except (OSError, ValueError):
+        return []
+    if not recognises(head):
+        return []
+    name = _run_name(path, head)
+    beside = {one.name: str(Path(path).parent / one.name) for one in Path(path).parent.iterdir() if one.is_file()}
+    mine = sorted(key for key in beside if (match := _NUMBERED.fullmatch(key)) and match[1] == name)
+    files = [beside[key] for key in mine]
+    return files if any(Path(path).samefile(one) for one in files) else [path, *files]
+
+
+def _run_name(path: str, head: bytes) -> str:
+    """Name of a run by that of its file, else by what stands in it."""
+    numbered = _NUMBERED.fullmatch(Path(path).name)
+    if numbered:
+        return numbered[1]
+    found = _NAME.search(head)
+    return (found[1] or found[2] or b"").decode("latin-1").strip() if found else ""
+
+
+def read_run(path: str, content: bytes | None = None) -> Run:
+    """Read a run: of its files, or from ``content``.
+
+    Raises
+    ------
+    DeckError
+        If a file cannot be read.
+    """
+    run = Run(Deck(path))
+    for name in [path] if content is not None else run_files(path):
+        source = SourceFile(name, content)
+        head = source.read(0, _HEAD)
+        run.deck.files.append(name)
+        if _ENGINE.search(head) and not _STARTER.search(head):
+            run.legs += read_legs(source)
+        else:
+            run.starter = run.starter or Starter()
+            _read_starter(source, run, ())
+    run.legs.sort(key=lambda leg: leg.number)
+    run.deck.cards += [leg.run for leg in run.legs]
+    run.deck.cards += [card for leg in run.legs for card, _, _ in leg.switched]
+    return run
+
+
+def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
+    if run.starter is None:
+        return
+    run.starter.sources.append(source)
+    for card, words in card_or_none(source):
+        if words:
+            run.starter.take(card, words)
+            if words[0] == "RBODY":
+                run.deck.cards.append(card)
+        else:
+            _include(card, source, run, chain)
+
+
+def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
+    asked = card.block.head.split(maxsplit=1)[1:]
+    name = asked[0].strip() if asked else ""
+    path = next(
+        (
+            str(folder / name)
+            for folder in (Path(source.name).parent, Path(run.deck.path).parent)
+            if os.path.isfile(folder / name)  # noqa: PTH113 - Path.is_file raises on names too long
+        ),
+        None,
+    )
+    real = os.path.realpath(path) if path else ""
+    if path is None:
+        run.deck.unread.append(Unread(replace(card.here, text=name), "no such file"))
+    elif real in chain or real == os.path.realpath(source.name) or len(chain) >= _DEEPEST:
+        run.deck.unread.append(Unread(replace(card.here, text=name), "the file includes itself"))
+    else:
+        run.deck.files.append(path)
+        try:
+            _read_starter(SourceFile(path), run, (*chain, os.path.realpath(source.name)))
+        except DeckError:
+            run.deck.unread.append(Unread(replace(card.here, text=name), "no permission to read it"))

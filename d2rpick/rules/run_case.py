@@ -1,0 +1,110 @@
+"""A Radioss run as the rules see it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from d2rpick.deck import Parts
+from d2rpick.deck.radioss import find_run_windows
+from d2rpick.rules.base import RADIOSS, Case
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from d2rpick.deck import SwitchSet, Window, Windows
+    from d2rpick.deck.includes import Unread
+    from d2rpick.deck.radioss import RunWindows
+    from d2rpick.deck.radioss.files import Run
+    from d2rpick.deck.rows import Field, Value
+    from d2rpick.rules.base import Judge
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunCase(Case):
+    """The starter deck and the legs, with the windows that they make."""
+
+    run: Run
+
+    @classmethod
+    def of(cls, run: Run, judge: Judge | None) -> RunCase:
+        """Show a run."""
+        return cls(run.deck, judge, run=run)
+
+    @property
+    def solver(self) -> str:
+        """Whose deck it is."""
+        return RADIOSS
+
+    @cached_property
+    def found(self) -> RunWindows:
+        """Windows, and the parts of the bodies."""
+        return find_run_windows(self.run)
+
+    @cached_property
+    def parts(self) -> Parts:
+        """Parts of the starter deck by id."""
+        lines = self.run.starter.parts if self.run.starter else {}
+        return Parts(dict.fromkeys(lines, ""), {part: line.title for part, line in lines.items()})
+
+    @cached_property
+    def sets(self) -> tuple[SwitchSet, ...]:
+        """What switches bodies."""
+        return self.found.sets
+
+    @cached_property
+    def windows(self) -> Windows:
+        """The rigid windows of every part, or of every body whose parts are not known."""
+        return self.found.windows
+
+    @cached_property
+    def end_time(self) -> Value[float] | None:
+        """The end of the last leg as written."""
+        return self.run.legs[-1].stop if self.run.legs else None
+
+    @cached_property
+    def end(self) -> float | None:
+        """The end of the last leg [time of the run], where it is known and positive."""
+        stop = self.end_time
+        return stop.value if stop and not stop.problem and stop.value > 0 else None
+
+    @cached_property
+    def unread(self) -> Sequence[Unread]:
+        """Includes that were not read, where a main node that is switched may stand in them."""
+        bodies = {body.node.value for body in self.run.starter.bodies} if self.run.starter else set()
+        switched = {node.value for leg in self.run.legs for _, _, nodes in leg.switched for node in nodes if node.value}
+        return self.deck.unread if switched - bodies else ()
+
+    @cached_property
+    def untimed(self) -> tuple[tuple[Field, str], ...]:
+        """Bodies that a sensor switches whose time is not known."""
+        starter = self.run.starter
+        bodies = starter.bodies if starter else []
+        return tuple(
+            (body.node.field, f"rigid body {body.id} is switched by sensor {body.sensor}, which is no time sensor")
+            for body in bodies
+            if starter and body.sensor and body.sensor not in starter.timed
+        )
+
+    @cached_property
+    def unturned(self) -> Mapping[int, str]:
+        """Parts of bricks without a co-rotating frame."""
+        starter = self.run.starter
+        if starter is None:
+            return {}
+        what = "Isolid 1 or 2 without Iframe 2"
+        return {part: what for part, line in starter.parts.items() if line.prop in starter.unturned}
+
+    @cached_property
+    def rigid_legs(self) -> list[tuple[int, list[Window]]]:
+        """Index of every leg in which something is rigid, with the windows that hold it."""
+        found = []
+        start = 0.0
+        for index, leg in enumerate(self.run.legs):
+            stop = leg.stop.value
+            held = [w for w in self.windows.windows if w.tr <= start and (w.td is None or w.td >= stop)]
+            if held and stop > start:
+                found.append((index, held))
+            start = stop
+        return found
