@@ -1,5 +1,12 @@
 """What can go wrong, in one line each: where, what was found, what was expected, what to do."""
 
+from __future__ import annotations
+
+import unicodedata
+
+# Control and format characters (escape codes, text direction), line and paragraph separators.
+_UNSEEN = frozenset({"Cc", "Cf", "Zl", "Zp"})
+
 
 class D2RPickError(Exception):
     """Root of all errors of d2rpick; its text is one line, ready to be shown to a user."""
@@ -23,3 +30,21 @@ class DeckError(D2RPickError):
 
 class ConfigurationError(D2RPickError):
     """The configuration of the deck check is wrong: an unknown rule, key or severity."""
+
+
+def printable(text: str) -> str:
+    r"""Escape what would break a line or command a terminal, in a name that comes from a file or a user.
+
+    Letters of any language and blanks stay, and so do the lone surrogates that stand for bytes of a file name.
+
+    Examples
+    --------
+    >>> printable("Gehäuse, IE"), printable("IE\n\x1b[31m")
+    ('Gehäuse, IE', 'IE\\n\\x1b[31m')
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        letter.encode("unicode_escape").decode() if unicodedata.category(letter) in _UNSEEN else letter
+        for letter in text
+    )

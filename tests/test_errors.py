@@ -1,0 +1,26 @@
+"""Names in messages: nothing in them may break a line or reach a terminal as a command."""
+
+from __future__ import annotations
+
+import unicodedata
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.errors import printable
+
+
+@given(st.text())
+def test_what_is_shown_holds_no_line_end_and_no_control_character(text: str) -> None:
+    shown = printable(text)
+    assert len(shown.splitlines()) <= 1
+    assert not {unicodedata.category(letter) for letter in shown} & {"Cc", "Cf", "Zl", "Zp"}
+
+
+@given(st.text(st.characters(exclude_categories=["Cc", "Cf", "Zl", "Zp"])))
+def test_every_other_name_is_shown_as_it_is(text: str) -> None:
+    assert printable(text) == text
+
+
+def test_an_escape_code_is_spelled_out() -> None:
+    assert printable("\x1b[2Jbox\u202e\u2028é\udce9") == "\\x1b[2Jbox\\u202e\\u2028é\udce9"
