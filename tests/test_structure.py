@@ -100,6 +100,11 @@ def test_only_the_command_line_prints_and_exits(module: str) -> None:
     assert not called & {"print", "exit", "sys.exit", "sys.stdout.write", "sys.stderr.write"}
 
 
+def test_no_file_is_mapped_into_memory() -> None:
+    """Where a mapped file is cut by another program, the system ends the process."""
+    assert not [module for module in MODULES if "mmap" in {*imports(MODULES[module])}]
+
+
 def loaded(*args: str) -> set[str]:
     """Modules that a call of the program has loaded by its end."""
     code = (

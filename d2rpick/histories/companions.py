@@ -12,12 +12,21 @@ from d2rpick.errors import FormatError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.histories.database import Legs
+    from numpy.typing import NDArray
+
+    from d2rpick.histories.database import Database, Legs
     from d2rpick.histories.history import Samples
+
+    Indices = NDArray[np.intp]
 
 # Output intervals may differ, but a solver writes at its own cycles: unless less than this share of the states of the
 # coarser database are at times of the other one, both may be of one run.
 _FEWEST = 0.5
+
+# Energies of two legs at a time that both have are the same within this share of the largest, else the runs differ.
+_SAME = 0.01
+# Parts that are compared.
+_COMPARED = 50
 
 
 def check_companions(databases: Sequence[Legs]) -> None:
@@ -25,6 +34,26 @@ def check_companions(databases: Sequence[Legs]) -> None:
     for one, other in combinations(databases, 2):
         if one.span and other.span and (one.span[0] > other.span[1] or other.span[0] > one.span[1]):
             raise FormatError(f"{one.source} and {other.source} have no time in common, files of one run were expected")
+
+
+def check_legs(legs: Sequence[Database]) -> None:
+    """Refuse files of one format that are not of one run.
+
+    A restart repeats the state it begins with.  Files that begin at the same time are copies, or of different runs:
+    then all states that they share are compared.
+    """
+    for one, other in combinations(legs, 2):
+        for times, columns in ((_own_times, _energies), (_part_times, _part_energies)):
+            try:
+                shared = _shared(times(one), times(other))
+                values = [columns(leg, at) for leg, at in zip((one, other), shared, strict=True)] if shared else []
+            except FormatError:  # said when it is read
+                continue
+            if values and not _alike(*values):
+                raise FormatError(
+                    f"{one.source} and {other.source} have different energies at the same times, legs of one run were "
+                    "expected; name the files of one run"
+                )
 
 
 def doubts(databases: Sequence[Legs]) -> Iterator[str]:
@@ -56,6 +85,44 @@ def coinciding(times: Samples, others: Samples, room: float) -> int:
     behind = np.searchsorted(others, times)
     near = [np.abs(others[np.clip(behind - step, 0, others.size - 1)] - times) for step in (0, 1)]
     return int(np.count_nonzero(np.minimum(*near) <= room))
+
+
+def _own_times(leg: Database) -> Samples:
+    return leg.time if leg.channels else np.empty(0)
+
+
+def _part_times(leg: Database) -> Samples:
+    return leg.part_time if leg.parts else np.empty(0)
+
+
+def _energies(leg: Database, states: Indices) -> Samples:
+    name = leg.energy_channel
+    return leg.channel(name)[states] if name else np.empty((states.size, 0))
+
+
+def _part_energies(leg: Database, states: Indices) -> Samples:
+    ids = [part.id for part in leg.parts][:_COMPARED]
+    return leg.part_channel("internal_energy", ids)[states]
+
+
+def _shared(one: Samples, other: Samples) -> tuple[Indices, Indices] | None:
+    """States at the same times: all where both begin alike, else the first of the later one; None without any."""
+    _, here, there = np.intersect1d(one, other, return_indices=True)
+    if not here.size:
+        return None
+    if here[0] == there[0] == 0:
+        return here, there
+    begins = there == 0 if other[0] > one[0] else here == 0
+    return (here[begins], there[begins]) if begins.any() else None
+
+
+def _alike(one: Samples, other: Samples) -> bool:
+    """Whether energies are the same up to what a restart on other processors changes; NaN is none."""
+    if one.shape != other.shape:
+        return True
+    known = np.isfinite(one) & np.isfinite(other)
+    largest = np.maximum(np.abs(one), np.abs(other)).max(initial=0.0, where=known)
+    return bool(np.all(np.abs(one - other)[known] <= _SAME * largest))
 
 
 def _times(database: Legs) -> Samples:

@@ -6,11 +6,12 @@ imported when a file may be its own: start-up is part of the product.
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, cast
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.companions import check_companions
+from d2rpick.histories.companions import check_companions, check_legs
 from d2rpick.histories.database import Legs
 from d2rpick.histories.run import Run
 from d2rpick.histories.selection import Selection
@@ -26,6 +27,8 @@ __all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "reade
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
 _DEFAULT = Selection()
+# A keyword of LS-DYNA at the start of a line, or the first line of a Radioss deck, behind comments only.
+_DECK: Final = re.compile(rb"(?:\xef\xbb\xbf)?(?:[ \t]*(?:\$[^\n]*)?\r?\n)*(?:\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN)")
 
 
 class Reader(Protocol):
@@ -86,10 +89,10 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
         kinds.setdefault(input_format if input_format != "auto" else _format(source), []).append(source)
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
-    databases = tuple(
-        Legs(reader(kind).open_legs(kinds[kind], selection), cut=[one.name for one in kinds[kind] if one.cut])
-        for kind in ordered
-    )
+    opened = {kind: reader(kind).open_legs(kinds[kind], selection) for kind in ordered}
+    for legs in opened.values():
+        check_legs(legs)
+    databases = tuple(Legs(opened[kind], cut=[one.name for one in kinds[kind] if one.cut]) for kind in ordered)
     check_companions(databases)
     return Run(files, databases, sources)
 
@@ -102,6 +105,11 @@ def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
 
 def _format(source: Source) -> str:
     head = source.data[:_HEAD]
+    if _DECK.match(head):
+        raise FormatError(
+            f"{source.name}: this is a deck, an energy history was expected; name the glstat, matsum, binout or T01 of "
+            "its run"
+        )
     for kind, listed in READERS.items():
         if any(hint in head for hint in listed.hints) and reader(kind).recognises(head):
             return kind

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Part
 
-_RANGE = re.compile(r"(\d+)(?:\s*-\s*(\d+))?")
+# More digits than any number of a part has are a title.
+_RANGE = re.compile(r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?")
 
 
 class Selection(NamedTuple):

@@ -71,6 +71,10 @@ class Branch:
         notes = [f"{name}: the last state of {self.name} is not whole and was left out" for name in states.unfinished]
         if states.damage:
             notes.append(f"{states.damage}; records are lost or out of place")
+        if states.late:
+            notes.append(
+                f"{self.source} begins with state {states.late}, not 1; is a file of the family missing or damaged?"
+            )
         if states.missing:
             holes = listing(states.missing, most=3)
             notes.append(f"{self.source} lacks the states {holes}; is a file of the family missing?")

@@ -38,9 +38,11 @@ class Group:
             yield Group(self.file, self.layout, self.rows[part], self.starts[part])
 
     def values(self, variable: Variable, places: Indices) -> NDArray[Any]:
-        """Values of a variable at ``places`` of its list, shape (states, places)."""
+        """Values of a variable at ``places`` of its list, shape (states, places); floating-point ones as doubles."""
         positions = self.starts[:, None] + variable.offset + variable.dtype.itemsize * places
-        return self.file.read(positions, variable.dtype)
+        found = self.file.read(positions, variable.dtype)
+        with np.errstate(invalid="ignore"):  # a NaN of any kind is refused, or not used
+            return found.astype(np.float64) if variable.dtype.kind == "f" else found
 
 
 class States:
@@ -62,6 +64,8 @@ class States:
         Files whose last state is not whole; it is left out.
     missing : tuple of str
         Numbers between two files, as ``first to last``.
+    late : int
+        Number of the first state, where it is not 1; else 0.
     damage : str
         Where records are lost or out of place, so that no state can be trusted; empty if nowhere.
     """
@@ -76,6 +80,9 @@ class States:
         starts: Indices = np.empty(0, dtype=np.int64)
         kinds: NDArray[np.int32] = np.empty(0, dtype=np.int32)
         layouts: list[tuple[Lsda, Layout]] = []
+        for file in family:
+            if file.odd[branch]:
+                self.damage = f"{file.source}: {branch} has {file.odd[branch][0]!r}, which is no state"
         for file, last in zip(files, cut, strict=True):
             visits = file.visits[branch]
             whole = slice(len(visits.numbers) - last)
@@ -93,6 +100,7 @@ class States:
             kinds = np.append(kinds, np.array(visits.layouts[whole]) + len(layouts))
             layouts += [(file, layout) for layout in file.layouts]
         self.numbers = numbers
+        self.late = int(numbers[0]) if numbers.size and numbers[0] != 1 else 0
         self.groups = tuple(_groups(layouts, kinds, starts))
         holes = np.flatnonzero(np.diff(self.numbers) > 1)
         self.missing = tuple(f"{self.numbers[i] + 1} to {self.numbers[i + 1] - 1}" for i in holes)

@@ -126,7 +126,9 @@ def _describe(block: bytes) -> Layout:
     behind = 0
     fields: dict[Hashable, int] = {}
     name = ""
+    mixed = False
     for line in _LINE.finditer(block):
+        mixed |= name in fields and b"..." in block[behind : line.start()]  # a line that lost some of its columns
         name = line[1].rstrip(b".").rstrip().decode("latin-1")
         release(literal, block, _CHANGING, behind, line.start())
         behind = line.end()
@@ -137,8 +139,11 @@ def _describe(block: bytes) -> Layout:
         if value[1]:
             name += " " + " ".join(value[1].decode().split())
         literal[line.start(2) : line.start(2) + _WIDTH] = 0
-        fields[name] = UNSURE if name in fields else line.start(2)
+        mixed |= name in fields
+        fields[name] = line.start(2)
     release(literal, block, _CHANGING, behind, len(block))
+    if mixed:  # with lines of another state: any of them may be
+        fields = {name: place if name == _TIME else UNSURE for name, place in fields.items()}
     return Layout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
 
 

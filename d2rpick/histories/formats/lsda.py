@@ -131,6 +131,8 @@ class Lsda:
         The numbered directories of each wanted branch.
     metadata : dict of str to list of (int, int)
         Start and layout of each visit to the directory ``metadata`` of a wanted branch.
+    odd : dict of str to list of str
+        Other directories of each wanted branch that hold variables.
     layouts : list of Layout
     names : set of str
         All top-level directories.
@@ -150,6 +152,7 @@ class Lsda:
         self.source = source
         self.visits = {branch: Visits() for branch in branches}
         self.metadata: dict[str, list[tuple[int, int]]] = {branch: [] for branch in branches}
+        self.odd: dict[str, list[str]] = {branch: [] for branch in branches}
         self.layouts: list[Layout] = []
         self.names: set[str] = set()
         self.stop = self.unfinished = ""
@@ -233,6 +236,8 @@ class Lsda:
                 self._forms[path[0]] = layout, self._form(key)
         elif path[1] == "metadata":
             self.metadata[path[0]].append((start, layout))
+        else:
+            self.odd[path[0]].append(path[1])
 
     def _layout(self, records: list[bytes]) -> Layout:
         """Sort out the heads of a directory's records; one that makes no sense holds no variable."""

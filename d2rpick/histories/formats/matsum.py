@@ -54,7 +54,7 @@ _LINE: Final = re.compile(
 )
 _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
 # A part number has 5 or, from 100000 on, 8 columns; a longer one, where it is printed, pushes the line.
-_ID: Final = re.compile(rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,}) {10}i) *(0|[1-9]\d*) +inten=")
+_ID: Final = re.compile(rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten=")
 _CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")  # numbers in other lines
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 

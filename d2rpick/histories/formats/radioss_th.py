@@ -167,7 +167,9 @@ class TimeHistory(SolverFile):
     def _columns(self, record: int, places: Sequence[int]) -> Samples:
         """Some numbers of one record of each state, shape (n, places)."""
         before = sum(length + 2 * _WIDTH for length in self._head.lengths[:record]) + _WIDTH
-        return self._numbers(">f4", [before + _WIDTH * place for place in places], self._states).astype(np.float64)
+        found = self._numbers(">f4", [before + _WIDTH * place for place in places], self._states)
+        with np.errstate(invalid="ignore"):  # a NaN of any kind is refused, or not used
+            return found.astype(np.float64)
 
     def _numbers(self, dtype: str, offsets: Sequence[int], states: int) -> NDArray[Any]:
         """Numbers at some bytes of each of the first states, shape (states, offsets)."""

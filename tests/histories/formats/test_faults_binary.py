@@ -21,7 +21,7 @@ from d2rpick.errors import FormatError
 from d2rpick.histories.formats.binout import Binout
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from tests.faults import cases, some
-from tests.made_binout import LsdaWriter, Style, binout, values
+from tests.made_binout import GLSTAT, LsdaWriter, Style, binout, values
 from tests.made_t01 import MadePart, T01Writer, t01, value
 
 if TYPE_CHECKING:
@@ -38,6 +38,11 @@ MEMORY = 1 << 22  # far above what the small files need, far below what a damage
 
 def true_binout(data: bytes) -> list[tuple[int, bool]]:
     """Read everything; what is read must be true.  States of each column, and if the file is complete."""
+    run = refused_or(lambda: Binout([("binout", data)]))
+    if run is not None and run.complete and not run.notes:
+        assert {"time", *run.channels} == {*GLSTAT}, "a lost variable is told"
+        for times in (refused_or(lambda: run.time), refused_or(lambda: run.part_time)):
+            assert times is None or times[:1].tolist() in ([], [1 / 8]), "a lost first state is told"
     return true_columns(lambda: Binout([("binout", data)]), ("internal_energy", "z_momentum"), values)
 
 
