@@ -1,3 +1,60 @@
-"""d2rpick: choose the times of deformable-to-rigid switching from the energy history of one reference run."""
+"""d2rpick: choose the times of deformable-to-rigid switching from the energy history of one reference run.
 
-__version__ = "0.6.0"
+    >>> import d2rpick as d2
+    >>> run = d2.read("sample_data/energy.csv")
+    >>> answer = d2.suggest(run, td_window=(0.06, 0.07))
+    >>> d2.verify(run, tr=answer.recommended.tr, td=answer.recommended.td).verified
+    True
+
+What is named here is imported when it is first used: the package itself imports nothing heavy.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from d2rpick.errors import ConfigurationError as ConfigurationError
+    from d2rpick.errors import D2RPickError as D2RPickError
+    from d2rpick.errors import DeckError as DeckError
+    from d2rpick.errors import FormatError as FormatError
+    from d2rpick.errors import HistoryError as HistoryError
+    from d2rpick.errors import RangeError as RangeError
+    from d2rpick.library.answers import Suggestion as Suggestion
+    from d2rpick.library.answers import Verdict as Verdict
+    from d2rpick.library.answers import suggest as suggest
+    from d2rpick.library.answers import verify as verify
+    from d2rpick.library.checking import Findings as Findings
+    from d2rpick.library.checking import check as check
+    from d2rpick.library.runs import Run as Run
+    from d2rpick.library.runs import from_frame as from_frame
+    from d2rpick.library.runs import read as read
+    from d2rpick.library.studies import Study as Study
+    from d2rpick.library.studies import study as study
+    from d2rpick.vibration.oscillator import Oscillator as Oscillator
+
+__version__ = "0.7.0"
+
+_HOME = {
+    **dict.fromkeys(
+        ("ConfigurationError", "D2RPickError", "DeckError", "FormatError", "HistoryError", "RangeError"), "errors"
+    ),
+    **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "library.answers"),
+    **dict.fromkeys(("Findings", "check"), "library.checking"),
+    **dict.fromkeys(("Run", "from_frame", "read"), "library.runs"),
+    **dict.fromkeys(("Study", "study"), "library.studies"),
+    "Oscillator": "vibration.oscillator",
+}
+
+__all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604  names of strings all
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for by name."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'd2rpick' has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(f"d2rpick.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *_HOME]

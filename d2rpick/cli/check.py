@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.warnings import Caution
     from d2rpick.rules import Checked, Unreadable
-    from d2rpick.rules.configuration import Configuration
     from d2rpick.rules.judgement import HistoryJudge
 
 EXAMPLES = """\b
@@ -92,7 +91,7 @@ def _checked(
     A deck that cannot be read, or whose configuration cannot, does not hide the others.
     """
     from d2rpick.deck.source import STDIN
-    from d2rpick.rules import RULES, Unreadable, check_deck
+    from d2rpick.rules import RULES, Unreadable, check_deck, configuration_for
     from d2rpick.rules.configuration import Configuration
 
     asked = Configuration(_ids(options["select"]), _ids(options["ignore"]))
@@ -101,7 +100,7 @@ def _checked(
     named, failed = _main_decks(decks)
     for name in _apart(named):
         try:
-            configuration = _configuration(name, asked)
+            configuration = configuration_for(name, asked)
             inputs.append(configuration.source)
             content = sys.stdin.buffer.read() if name == STDIN else None
             results.append(check_deck(name, configuration, judge, content))
@@ -136,19 +135,6 @@ def _apart(names: Sequence[str]) -> Iterator[str]:
         if real not in seen:
             seen.update([real, *map(os.path.realpath, run_files(name))])
             yield name
-
-
-def _configuration(deck: str, asked: Configuration) -> Configuration:
-    """Take the configuration nearest to a deck; what was asked for by options overrules its keys."""
-    from dataclasses import replace
-    from pathlib import Path
-
-    from d2rpick.rules import RULES
-    from d2rpick.rules.configuration import find_configuration
-
-    found = find_configuration(Path(deck).parent)
-    found.verify(RULES)
-    return replace(found, select=asked.select or found.select, ignore=asked.ignore or found.ignore)
 
 
 def _cautions(results: Sequence[Checked], judge: HistoryJudge | None) -> list[Caution]:

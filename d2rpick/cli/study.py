@@ -19,8 +19,8 @@ from d2rpick.errors import D2RPickError, FormatError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.study.study import Question, Row, Study
-    from d2rpick.study.workers import Farm
+    from d2rpick.studies.study import Question, Row, Study
+    from d2rpick.studies.workers import Farm
 
 EXAMPLES = """\b
 Examples:
@@ -60,8 +60,8 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
     Each RUN is a file, a folder with the files of one run, or a pattern whose matches are runs.  One that cannot be
     read is told in its row and does not stop the others.
     """
-    from d2rpick.study.resume_file import fingerprint, line
-    from d2rpick.study.study import Question, summarise
+    from d2rpick.studies.resume_file import fingerprint, line
+    from d2rpick.studies.study import Question, summarise
 
     if options["scheduler"] and options["jobs"]:
         raise click.UsageError("--scheduler and --jobs exclude each other: the cluster has its own processes")
@@ -105,7 +105,7 @@ def _text(answer: Study, output_format: str, command_line: Sequence[str], lines:
 
 def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
     """Names of all runs, given and listed, patterns replaced by what they match."""
-    from d2rpick.study.study import find_runs
+    from d2rpick.studies.study import find_runs
 
     sources = find_runs([*names, *(_listed(listed) if listed is not None else ())])
     if not sources:
@@ -166,9 +166,9 @@ def _write_files(answer: Study, options: dict[str, Any], output: Output) -> None
 
 def _rows(question: Question, sources: Sequence[str], options: dict[str, Any], *, quiet: bool) -> Iterator[Row]:
     """Rows in the order of the runs, each as soon as those before it are there."""
-    from d2rpick.study.resume_file import Ledger
-    from d2rpick.study.study import ask, failed
-    from d2rpick.study.workers import answers
+    from d2rpick.studies.resume_file import Ledger
+    from d2rpick.studies.study import ask, failed
+    from d2rpick.studies.workers import answers
 
     ledger = Ledger(options["resume"], question) if options["resume"] is not None else None
     known = {number: row for number, source in enumerate(sources) if ledger and (row := ledger.find(source))}
@@ -195,7 +195,7 @@ def _rows(question: Question, sources: Sequence[str], options: dict[str, Any], *
 
 def _farm(options: dict[str, Any], calls: int) -> Farm:
     """Choose where to compute so many calls; a single one needs no other process."""
-    from d2rpick.study import workers
+    from d2rpick.studies import workers
 
     if options["scheduler"] and calls:
         cluster = workers.Cluster(options["scheduler"])
@@ -203,4 +203,4 @@ def _farm(options: dict[str, Any], calls: int) -> Farm:
             click.echo(f"note: {options['scheduler']}: no workers yet, waiting for some", err=True)
         return cluster
     processes = min(options["jobs"] or workers.cores(), calls)
-    return workers.Cores(processes) if processes > 1 else workers.Here()
+    return workers.local(processes)

@@ -125,16 +125,11 @@ def _answer(reference: Reference, td: float | tuple[float, float] | None, settin
 
 def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
     """Draw the figures, wide and narrow, and write the page around them."""
-    from d2rpick.report import figures
     from d2rpick.report.page import Record
-    from d2rpick.report.suggestion_page import as_page, better_pair
+    from d2rpick.report.suggestion_page import as_page, drawn
 
-    caption = "Internal energy with its level at td, and the choice"
-    drawn = {caption: figures.both_widths(figures.draw_suggestion, answer, "choice")}
-    if better_pair(answer):
-        drawn["The better pair"] = figures.both_widths(figures.draw_better, answer, "better")
     wish = card_wish(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, wish))
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), wish))
 
 
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:

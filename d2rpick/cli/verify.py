@@ -87,14 +87,11 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
 
 def _page(answer: Verdict, run: Run, switched: Run | None, options: dict[str, Any]) -> str:
     """Draw the figure, wide and narrow, and write the page around it."""
-    from d2rpick.report import figures
     from d2rpick.report.page import Record
-    from d2rpick.report.verdict_page import as_page
+    from d2rpick.report.verdict_page import as_page, drawn
 
-    caption = "Internal energy with its level at td, and the pair"
-    drawn = {caption: figures.both_widths(figures.draw_verdict, answer, "pair")}
     wish = card_wish(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, wish, switched))
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), wish, switched))
 
 
 def _switched(options: dict[str, Any]) -> Run | None:

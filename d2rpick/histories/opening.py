@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.database import Database
 
-__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "reader"]
+__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]
 
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
@@ -82,9 +82,12 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
     FormatError
         If a file cannot be read as an energy history, or companions have no time in common.
     """
-    files = expand(names)
+    return open_sources([open_source(name) for name in expand(names)], selection, input_format)
+
+
+def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
+    """Open the files of one run whose bytes are at hand; arguments and errors as of `open_run`."""
     kinds: dict[str, list[Source]] = {}
-    sources = tuple(map(open_source, files))
     for source in sources:
         kinds.setdefault(input_format if input_format != "auto" else _format(source), []).append(source)
     ordered = [kind for kind in READERS if kind in kinds]
@@ -94,7 +97,7 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
         check_legs(legs)
     databases = tuple(Legs(opened[kind], cut=[one.name for one in kinds[kind] if one.cut]) for kind in ordered)
     check_companions(databases)
-    return Run(files, databases, sources)
+    return Run(tuple(source.name for source in sources), databases, tuple(sources))
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:

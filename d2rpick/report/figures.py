@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.verify import Verdict
     from d2rpick.histories.history import Samples
-    from d2rpick.study.study import Study
+    from d2rpick.studies.study import Study
 
 FORMATS = ("png", "svg", "pdf")
 # Okabe and Ito's palette: told apart with any colour vision.

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
 from d2rpick.report import tables
-from d2rpick.study.resume_file import PLAIN, plain
-from d2rpick.study.study import runs_of
+from d2rpick.studies.resume_file import PLAIN, plain
+from d2rpick.studies.study import runs_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.study.study import Study
+    from d2rpick.studies.study import Study
 
 SCHEMA = "d2rpick/study/1"
 HEAD = ("run", "tr", "+-", "E(td)", "R", "basis", "status", "message")

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from d2rpick.report.html import Markup, document, drawings, pairs, remarks, resource, section, table, tag
 from d2rpick.report.study import HEAD, outcome, rows
-from d2rpick.study.study import runs_of
+from d2rpick.studies.study import runs_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.study.study import Study
+    from d2rpick.studies.study import Study
 
 
 def as_page(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> str:

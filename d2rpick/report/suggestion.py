@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 SCHEMA = "d2rpick/suggest/1"
 HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")
 
+# Keys of a candidate in JSON.
+CANDIDATE = tuple(field.name for field in fields(Candidate))
+
 
 def as_table(answer: Suggestion, limit: int) -> str:
     """Heading, the first ``limit`` candidates, the recommended and the better pair; the recommended row has a star."""

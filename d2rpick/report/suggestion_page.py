@@ -18,6 +18,20 @@ if TYPE_CHECKING:
 _MOST_ROWS = 20
 
 
+def drawn(answer: Suggestion) -> dict[str, tuple[str, str]]:
+    """Draw the figures of the page, wide and narrow."""
+    from d2rpick.report import figures
+
+    found = {
+        "Internal energy with its level at td, and the choice": figures.both_widths(
+            figures.draw_suggestion, answer, "choice"
+        )
+    }
+    if better_pair(answer):
+        found["The better pair"] = figures.both_widths(figures.draw_better, answer, "better")
+    return found
+
+
 def as_page(answer: Suggestion, record: page.Record) -> str:
     """Write the page."""
     return page.run_page(record.run, _sections(answer, record))

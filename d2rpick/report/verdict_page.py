@@ -18,6 +18,14 @@ if TYPE_CHECKING:
     from d2rpick.report.html import Markup
 
 
+def drawn(answer: Verdict) -> dict[str, tuple[str, str]]:
+    """Draw the figure of the page, wide and narrow."""
+    from d2rpick.report import figures
+
+    caption = "Internal energy with its level at td, and the pair"
+    return {caption: figures.both_widths(figures.draw_verdict, answer, "pair")}
+
+
 def as_page(answer: Verdict, record: page.Record) -> str:
     """Write the page."""
     return page.run_page(record.run, _sections(answer, record))

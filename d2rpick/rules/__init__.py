@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck import radioss, read_deck
 from d2rpick.errors import ConfigurationError
 from d2rpick.rules import constraints, energy, force, formats, pairs, reading, runs, scope, switched_parts, times
 from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, Severity, Unreadable
-from d2rpick.rules.configuration import Configuration, expected_instead
+from d2rpick.rules.configuration import Configuration, expected_instead, find_configuration
 from d2rpick.rules.run_case import RunCase
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ __all__ = [
     "Severity",
     "Unreadable",
     "check_deck",
+    "configuration_for",
     "find_rules",
 ]
 
@@ -65,6 +67,19 @@ class Checked:
     cards: int = 0
     files: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+
+
+def configuration_for(deck: str, asked: Configuration) -> Configuration:
+    """Take the configuration nearest to a deck; what was asked for overrules its keys.
+
+    Raises
+    ------
+    ConfigurationError
+        If it cannot be read, or names a rule that does not exist.
+    """
+    found = find_configuration(Path(deck).parent)
+    found.verify(RULES)
+    return replace(found, select=asked.select or found.select, ignore=asked.ignore or found.ignore)
 
 
 def check_deck(

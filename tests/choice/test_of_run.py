@@ -17,7 +17,7 @@ from d2rpick.histories.selection import Selection
 from d2rpick.report.suggestion import as_json
 from d2rpick.report.verdict import as_json as verdict_as_json
 from d2rpick.rules.judgement import faults_of
-from d2rpick.study.study import Question, ask
+from d2rpick.studies.study import Question, ask
 from d2rpick.vibration.span import described_span
 from tests.command import BOX as T01
 from tests.command import ENERGY, GLSTAT, run

@@ -18,10 +18,10 @@ import jsonschema
 import pytest
 
 from d2rpick import __version__
-from tests import studies
+from tests import variants
 from tests.cli.test_output import check_by_schema
 from tests.command import BOX, ENERGY, GLSTAT, ROOT, answer, run
-from tests.studies import STUDY
+from tests.variants import STUDY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,7 +33,7 @@ KEYS = ("source", "tr", "tr_low", "tr_high", "energy_td", "residual", "status", 
 @pytest.fixture
 def runs(tmp_path: Path) -> list[str]:
     """Three runs that differ a little."""
-    return studies.variants(tmp_path)
+    return variants.variants(tmp_path)
 
 
 def check_line(found: dict[str, Any], kind: str) -> None:
@@ -88,7 +88,7 @@ def test_every_format_says_the_same(runs: list[str]) -> None:
 
 def test_the_common_tr_verifies_in_each_run(runs: list[str]) -> None:
     tr = answer(*STUDY, *runs)["common_tr"]
-    assert all(run("verify", "--tr", repr(tr), "--td", str(studies.TD), name).exit_code == 0 for name in runs)
+    assert all(run("verify", "--tr", repr(tr), "--td", str(variants.TD), name).exit_code == 0 for name in runs)
 
 
 def test_options_of_suggest_hold_for_each_run() -> None:
@@ -189,7 +189,7 @@ def wait_for(ledger: Path, lines: int) -> None:
 def test_all_processes_give_the_answer_of_one(runs: list[str]) -> None:
     sources = [*runs, "absent.csv", *runs]
     expected = run(*STUDY, *sources).stdout
-    assert run("study", "--td", str(studies.TD), "--jobs", "3", *sources).stdout == expected
+    assert run("study", "--td", str(variants.TD), "--jobs", "3", *sources).stdout == expected
 
 
 def test_rows_come_in_order_as_soon_as_they_can(runs: list[str], tmp_path: Path) -> None:
@@ -217,7 +217,7 @@ def test_a_killed_study_loses_nothing_that_was_finished(runs: list[str], tmp_pat
     with ledger.open("ab") as file:
         file.write(ledger.read_bytes().splitlines()[0][:200])  # as if it had been writing
     slow.unlink()
-    studies.write(slow, studies.variant(1.0005))
+    variants.write(slow, variants.variant(1.0005))
     again = run(*args)
     assert again.stderr.startswith(f"note: {finished} of 4 runs taken from {ledger}\n")
     whole = run(*(arg for arg in args if arg not in ("--resume", str(ledger))))
@@ -246,11 +246,11 @@ def test_a_run_that_kills_its_process_is_a_row(
 ) -> None:
     # as the system does when memory runs out
     (tmp_path / "sitecustomize.py").write_text(
-        "import os, d2rpick.study.study as study\n"
+        "import os, d2rpick.studies.study as study\n"
         "ask = study.ask\n"
         "def kill(question, source):\n"
         "    return os.abort() if source.endswith('deadly.csv') else ask(question, source)\n"
-        "kill.__module__, kill.__qualname__ = 'd2rpick.study.study', 'ask'\n"
+        "kill.__module__, kill.__qualname__ = 'd2rpick.studies.study', 'ask'\n"
         "study.ask = kill\n"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -362,7 +362,7 @@ def test_a_plot_of_nothing_is_empty(tmp_path: Path) -> None:
 
 def test_the_report_is_one_page_with_all_of_it(runs: list[str], tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    odd = studies.write(tmp_path / "a<b>&.csv")
+    odd = variants.write(tmp_path / "a<b>&.csv")
     result = run(*STUDY, *runs, odd, "absent.csv", "--report", str(page))
     text = page.read_text()
     assert result.exit_code == 1

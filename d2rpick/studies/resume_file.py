@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.study.study import FAILED, UNREADABLE, Row, Stamp, stamps
+from d2rpick.studies.study import FAILED, UNREADABLE, Row, Stamp, stamps
 
 if TYPE_CHECKING:
-    from d2rpick.study.study import Question
+    from d2rpick.studies.study import Question
 
 # Keys of a line that are a row's plain values, in the order of the output.
 PLAIN: Final = (

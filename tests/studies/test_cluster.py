@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests import studies
+from tests import variants
 from tests.command import ROOT, run
 
 if TYPE_CHECKING:
@@ -66,8 +66,8 @@ def cluster(folder: Path, names: tuple[str, ...]) -> Iterator[tuple[str, dict[st
 
 
 def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> None:
-    sources = studies.variants(tmp_path)
-    expected = json.loads(run(*studies.STUDY, "-f", "json", *sources, sources[0]).stdout)
+    sources = variants.variants(tmp_path)
+    expected = json.loads(run(*variants.STUDY, "-f", "json", *sources, sources[0]).stdout)
     slow, ledger = tmp_path / "slow.csv", tmp_path / "ledger.ndjson"
     os.mkfifo(slow)  # whoever reads it waits
     with (
@@ -75,7 +75,7 @@ def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> 
         distributed.Client(address, set_as_default=False) as client,
     ):
         client.wait_for_workers(2, timeout=PATIENCE)
-        args = ("study", "--td", str(studies.TD), "--scheduler", address, "-f", "json", "--resume", str(ledger))
+        args = ("study", "--td", str(variants.TD), "--scheduler", address, "-f", "json", "--resume", str(ledger))
         names = [os.path.relpath(name, ROOT) for name in (*sources, str(slow))]
         with process("-m", "d2rpick", *args, *names, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as study:
             until(lambda: ledger.exists() and ledger.read_bytes().count(b"\n") == len(sources))
@@ -96,15 +96,15 @@ def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> 
 
 def test_what_cannot_be_read_on_a_cluster_is_a_row_and_no_scheduler_an_error(tmp_path: Path) -> None:
     with cluster(tmp_path, ("one",)) as (address, _):
-        args = ("study", "--td", str(studies.TD), "--scheduler", address)
-        result = run(*args, "-f", "ndjson", studies.write(tmp_path / "run.csv"), str(tmp_path / "absent.csv"))
+        args = ("study", "--td", str(variants.TD), "--scheduler", address)
+        result = run(*args, "-f", "ndjson", variants.write(tmp_path / "run.csv"), str(tmp_path / "absent.csv"))
     statuses = [json.loads(line).get("status") for line in result.stdout.splitlines()]
     assert (result.exit_code, statuses) == (1, ["ok", "unreadable", None])
 
 
 def test_where_no_scheduler_answers_the_study_ends(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("d2rpick.study.workers._PATIENCE", 0.3)
-    args = ("study", "--td", str(studies.TD), studies.write(tmp_path / "run.csv"), "--scheduler")
+    monkeypatch.setattr("d2rpick.studies.workers._PATIENCE", 0.3)
+    args = ("study", "--td", str(variants.TD), variants.write(tmp_path / "run.csv"), "--scheduler")
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         result = run(*args, address)
         assert (result.exit_code, result.stdout) == (2, "")
@@ -113,6 +113,6 @@ def test_where_no_scheduler_answers_the_study_ends(monkeypatch: pytest.MonkeyPat
 
 def test_without_the_package_its_name_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    result = run("study", "--td", "0.064", studies.write(tmp_path / "run.csv"), "--scheduler", "tcp://127.0.0.1:9")
+    result = run("study", "--td", "0.064", variants.write(tmp_path / "run.csv"), "--scheduler", "tcp://127.0.0.1:9")
     assert (result.exit_code, result.stdout) == (2, "")
     assert "pip install distributed" in result.stderr

@@ -13,12 +13,12 @@ import pytest
 from d2rpick.choice.settings import Settings
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection
-from d2rpick.study import study
-from d2rpick.study.resume_file import Ledger, fingerprint, line
-from d2rpick.study.study import Question, Row, ask
-from tests import studies
+from d2rpick.studies import study
+from d2rpick.studies.resume_file import Ledger, fingerprint, line
+from d2rpick.studies.study import Question, Row, ask
+from tests import variants
 
-QUESTION = Question(studies.TD, Settings())
+QUESTION = Question(variants.TD, Settings())
 
 
 def values(row: Row | None) -> dict[str, object]:
@@ -32,7 +32,7 @@ def values(row: Row | None) -> dict[str, object]:
 
 def kept(folder: Path, question: Question = QUESTION) -> tuple[str, str, Row]:
     """A run, the ledger that holds it, and its row."""
-    name, ledger = studies.write(folder / "run.csv"), str(folder / "ledger.ndjson")
+    name, ledger = variants.write(folder / "run.csv"), str(folder / "ledger.ndjson")
     row = ask(question, name)
     Ledger(ledger, question).add(row)
     return name, ledger, row
@@ -83,7 +83,7 @@ def test_a_row_of_changed_files_is_not_taken(tmp_path: Path, change: str) -> Non
     folder = tmp_path / "run"
     folder.mkdir()
     glstat = folder / "glstat"
-    glstat.write_bytes((Path(studies.__file__).parents[1] / "sample_data" / "energy.glstat").read_bytes())
+    glstat.write_bytes((Path(variants.__file__).parents[1] / "sample_data" / "energy.glstat").read_bytes())
     ledger = Ledger(str(tmp_path / "ledger.ndjson"), QUESTION)
     ledger.add(ask(QUESTION, str(folder)))
     assert Ledger(ledger.name, QUESTION).find(str(folder))
@@ -107,7 +107,7 @@ def test_what_could_not_be_read_is_asked_again(tmp_path: Path) -> None:
     ledger.add(ask(QUESTION, name))
     ledger.add(study.failed(name, MemoryError()))
     assert Path(ledger.name).read_bytes() == b""
-    short = studies.write(tmp_path / "short.csv", end=0.05)
+    short = variants.write(tmp_path / "short.csv", end=0.05)
     ledger.add(ask(QUESTION, short))
     assert values(Ledger(ledger.name, QUESTION).find(short))["status"] == "out-of-range"
 
@@ -117,7 +117,7 @@ def test_a_line_that_was_cut_anywhere_is_passed_over_and_the_next_one_is_whole(t
     name, ledger, row = kept(tmp_path)
     whole = Path(ledger).read_bytes()
     Path(ledger).write_bytes(whole + whole[: min(cut, len(whole) - 2)])
-    other = studies.write(tmp_path / "other.csv", studies.variant(1.01))
+    other = variants.write(tmp_path / "other.csv", variants.variant(1.01))
     Ledger(ledger, QUESTION).add(ask(QUESTION, other))
     again = Ledger(ledger, QUESTION)
     assert values(again.find(name)) == values(row)
@@ -140,7 +140,7 @@ def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(tmp_path: Pa
 
 
 def test_a_line_is_json_with_the_windows_of_the_row(tmp_path: Path) -> None:
-    row = ask(QUESTION, studies.write(tmp_path / "run.csv"))
+    row = ask(QUESTION, variants.write(tmp_path / "run.csv"))
     found = json.loads(line(row, "asked"))
     assert found["acceptable"] == [windows.tolist() for windows in row.acceptable]
     assert np.array(found["acceptable"][0]).size

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.errors import D2RPickError
-from d2rpick.study.workers import Cores, Farm, Here, answers, cores
+from d2rpick.studies.workers import Cores, Farm, Here, answers, cores
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

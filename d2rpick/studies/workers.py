@@ -158,8 +158,13 @@ class Cores:
     def _new(self, processes: int) -> ProcessPoolExecutor:
         # plain forks copy locks that threads hold; one process that forks from a clean state is nearly as quick
         method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-        set_forkserver_preload(["d2rpick.study.study"])
+        set_forkserver_preload(["d2rpick.studies.study"])
         return ProcessPoolExecutor(processes, get_context(method), _begin_work, (self._held,))
+
+
+def local(processes: int) -> Here | Cores:
+    """Choose where to compute on this machine; a single call needs no other process."""
+    return Cores(processes) if processes > 1 else Here()
 
 
 def _begin_work(held: Connection) -> None:

@@ -15,13 +15,13 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
-from d2rpick.study.study import OK, Question, Row, ask, failed, find_runs, outline, shortest, summarise
-from tests import studies
+from d2rpick.studies.study import OK, Question, Row, ask, failed, find_runs, outline, shortest, summarise
+from tests import variants
 from tests.command import BOX, GLSTAT
 from tests.reading import read_history
 from tests.shared import SHARED, shared
 
-ASKED = Question(studies.TD, Settings())
+ASKED = Question(variants.TD, Settings())
 
 
 def row(source: str, *windows: tuple[float, float], tr: float = 2.0, width: float = 0.1, **other: object) -> Row:
@@ -38,7 +38,7 @@ def row(source: str, *windows: tuple[float, float], tr: float = 2.0, width: floa
 
 
 def test_a_row_says_what_suggest_says(tmp_path: Path) -> None:
-    name = studies.write(tmp_path / "run.csv")
+    name = variants.write(tmp_path / "run.csv")
     found = ask(ASKED, name)
     assert (found.status, found.message, found.basis, found.warnings) == ("ok", None, "oscillator", ())
     assert found.tr == pytest.approx(0.0135866683619825, rel=1e-6)
@@ -96,13 +96,13 @@ def test_an_outline_keeps_the_ends_of_the_energy_and_stays_small(states: int, se
 
 
 def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(tmp_path: Path) -> None:
-    names = studies.variants(tmp_path)
-    answer = summarise(studies.TD, [ask(ASKED, name) for name in names])
+    names = variants.variants(tmp_path)
+    answer = summarise(variants.TD, [ask(ASKED, name) for name in names])
     assert answer.common.tr is not None
     assert answer.common.window is not None
     for name in names:
         for tr in (answer.common.tr, *answer.common.window):
-            assert verify(read_history([name]), tr, studies.TD, Settings()).verified
+            assert verify(read_history([name]), tr, variants.TD, Settings()).verified
     assert answer.spread is not None
     assert answer.spread.min < answer.spread.median < answer.spread.max
     assert answer.agree is False
@@ -121,8 +121,8 @@ def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(energies: tuple[s
 
 
 def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(tmp_path: Path) -> None:
-    found = ask(ASKED, studies.write(tmp_path / "run.csv"))
-    one, two = summarise(studies.TD, [found]), summarise(studies.TD, [found, found])
+    found = ask(ASKED, variants.write(tmp_path / "run.csv"))
+    one, two = summarise(variants.TD, [found]), summarise(variants.TD, [found, found])
     assert one.agree is two.agree is True
     assert one.common == two.common
     assert one.common.tr == pytest.approx(found.tr, abs=2e-5)

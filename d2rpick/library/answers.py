@@ -1,0 +1,339 @@
+"""Answers about one run: the choice of switch times, and the verdict on a pair."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Unpack
+
+from d2rpick.library import arguments
+from d2rpick.library.frames import frame_of
+from d2rpick.library.repeat import command_line
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from d2rpick.choice import suggest as choice
+    from d2rpick.choice import verify as judgement
+    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.health import Health
+    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.suggest import Pair
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.flight.flight import Flight
+    from d2rpick.library.arguments import Choosing, Parts
+    from d2rpick.library.runs import Run
+    from d2rpick.report.page import Record
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a choice and a verdict have in common.
+
+    ``situation`` is what the record tells about td, ``warnings`` are (``code``, ``message``), ``health`` how far the
+    run can be trusted, None where its files hold nothing to judge it by; ``command`` is the command line that gives the
+    same answer.  Times are in the unit of the run.
+    """
+
+    run: Run = field(repr=False)
+    situation: Situation = field(repr=False)
+    warnings: tuple[Caution, ...]
+    health: Health | None = field(repr=False)
+    command: tuple[str, ...] = field(repr=False)
+
+    @property
+    def td(self) -> float:
+        """When the parts are switched back to deformable [time]."""
+        return self.situation.td
+
+    @property
+    def flight(self) -> Flight:
+        """Window of free flight around td: ``start``, ``end``, ``source``."""
+        return self.situation.flight
+
+    @property
+    def basis(self) -> str:
+        """What the answer rests on: ``"parts"``, ``"oscillator"`` or ``"energy"``."""
+        return self.situation.basis
+
+    @property
+    def kinetic_share(self) -> float | None:
+        """K, the share of the vibration energy that no tr can save; None on basis ``"energy"`` [-]."""
+        return self.situation.kinetic_share
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the JSON document of the command line as a dictionary; its schema is named in it."""
+        found: dict[str, Any] = json.loads(self.to_json())
+        return found
+
+    def to_json(self) -> str:
+        """Give the JSON document of the command line."""
+        raise NotImplementedError
+
+    def _record(self, figures: dict[str, tuple[str, str]]) -> Record:
+        from d2rpick.choice.judged_card import CardWish
+        from d2rpick.report.page import Record
+
+        return Record(self.run.files, ("d2rpick", *self.command), (), figures, CardWish())
+
+
+@dataclass(frozen=True, eq=False)
+class Suggestion(Answer):
+    """Answer of `suggest`; nothing of it changes.
+
+    ``candidates`` are ranked, best first; ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
+    are None, with the reason in ``warnings``.
+    """
+
+    candidates: tuple[Candidate, ...] = field(repr=False)
+    recommended: Pair | None
+    better_pair: Pair | None
+    _core: choice.Suggestion = field(repr=False)
+
+    def to_json(self) -> str:
+        """Give the JSON document of ``d2rpick suggest``, schema d2rpick/suggest/1."""
+        from d2rpick.report.suggestion import as_json
+
+        return as_json(self._core, self.command)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give the candidates as a table at full precision.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per candidate, best first, a column per key of ``candidates`` in the JSON; what is not known is NaN.
+            ``attrs``: ``td``, ``basis``, ``source``.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> answer = d2.suggest(d2.read("sample_data/energy.csv"), td=0.064)
+        >>> answer.to_frame().query("recommended")["tr"].round(6).tolist()
+        [0.012885]
+        """
+        from d2rpick.report.suggestion import CANDIDATE
+
+        source = list(self.situation.history.source)
+        return frame_of(self.to_dict()["candidates"], CANDIDATE, td=self.td, basis=self.basis, source=source)
+
+    def plot(self) -> Figure:
+        """Draw the energy with its level at td, and the choice, as a matplotlib Figure."""
+        from d2rpick.report.figures import draw_suggestion
+
+        return draw_suggestion(self._core)
+
+    def report(self, path: arguments.Path) -> Path:
+        """Write the answer to one HTML page that needs no network; an existing file is replaced."""
+        from d2rpick.report.suggestion_page import as_page, drawn
+
+        page = as_page(self._core, self._record(drawn(self._core)))
+        return written(path, page)
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict(Answer):
+    """Answer of `verify`; nothing of it changes.
+
+    ``verified``: the pair is good; ``reasons``: why not, or what to know; ``tr_ok`` and ``td_ok`` are None where
+    the record does not tell; ``candidate`` has the measures of the pair.
+    """
+
+    verified: bool
+    reasons: tuple[str, ...]
+    tr_ok: bool | None
+    td_ok: bool | None
+    candidate: Candidate = field(repr=False)
+    _core: judgement.Verdict = field(repr=False)
+
+    @property
+    def tr(self) -> float:
+        """When the parts are switched to rigid [time]."""
+        return self.candidate.tr
+
+    def to_json(self) -> str:
+        """Give the JSON document of ``d2rpick verify``, schema d2rpick/verify/1."""
+        from d2rpick.report.verdict import as_json
+
+        return as_json(self._core, self.command)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give the measures of the pair as a table of one row, a column per measure; what is not known is NaN.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> verdict = d2.verify(d2.read("sample_data/energy.csv"), tr=0.0135867, td=0.0687534)
+        >>> verdict.to_frame()["verified"].tolist()
+        [True]
+        """
+        from d2rpick.report.verdict import measures
+
+        row = measures(self._core)
+        return frame_of([row], list(row), basis=self.basis, source=list(self.situation.history.source))
+
+    def plot(self) -> Figure:
+        """Draw the energy with its level at td, and the pair, as a matplotlib Figure."""
+        from d2rpick.report.figures import draw_verdict
+
+        return draw_verdict(self._core)
+
+    def report(self, path: arguments.Path) -> Path:
+        """Write the verdict to one HTML page that needs no network; an existing file is replaced."""
+        from d2rpick.report.verdict_page import as_page, drawn
+
+        return written(path, as_page(self._core, self._record(drawn(self._core))))
+
+
+def suggest(
+    run: Run,
+    td: float | None = None,
+    *,
+    td_window: tuple[float, float] | None = None,
+    parts: Parts | None = None,
+    flying: Parts | None = None,
+    **choosing: Unpack[Choosing],
+) -> Suggestion:
+    """Choose tr for ``td``, or both times with td in ``td_window``, as ``d2rpick suggest`` does.
+
+    Parameters
+    ----------
+    run : Run
+        As `read` gives it, without switching.
+    td : float
+        When the parts are switched back [time].
+    td_window : (float, float)
+        Instead of ``td``: where to choose it [time].
+    parts : number, title or several, optional
+        The parts to be switched; ``"10-19"`` is a range.
+    flying : number, title or several, optional
+        What flies together with them.
+    **choosing
+        How to choose, see `Choosing`: ``after``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``,
+        ``oscillator`` with ``v0``, ``fit_window``, ``replay``, ``cost_share``, ``step_ratio``.
+
+    Returns
+    -------
+    Suggestion
+
+    Raises
+    ------
+    D2RPickError
+        If the run has no such parts or energy, or td lies outside the record.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> run = d2.read("sample_data/energy.csv")
+    >>> answer = d2.suggest(run, td_window=(0.06, 0.07))
+    >>> f"{answer.recommended.tr:.6f} {answer.recommended.td:.6f}"
+    '0.013587 0.068753'
+    """
+    from d2rpick.choice.of_run import Reference, suggest_of
+
+    if (td is None) == (td_window is None):
+        raise TypeError("td or td_window was expected, and not both")
+    asked = arguments.number("td", td) if td is not None else arguments.window("td_window", td_window)
+    settings = arguments.settings(choosing)
+    selection = _selection(run, parts, flying)
+    core = suggest_of(Reference.of(run.files, selection), asked, settings)
+    times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked))
+    return Suggestion(
+        run=run,
+        situation=core.situation,
+        warnings=core.cautions,
+        health=core.health,
+        command=command_line("suggest", times, run, selection, choosing),
+        candidates=core.candidates,
+        recommended=core.recommended,
+        better_pair=core.better_td,
+        _core=core,
+    )
+
+
+def verify(
+    run: Run,
+    tr: float,
+    td: float,
+    *,
+    switched: Run | None = None,
+    parts: Parts | None = None,
+    flying: Parts | None = None,
+    **choosing: Unpack[Choosing],
+) -> Verdict:
+    """Judge one pair of switch times, as ``d2rpick verify`` does.
+
+    Parameters
+    ----------
+    run : Run
+        As `read` gives it, without switching.
+    tr, td : float
+        Switch times [time].
+    switched : Run, optional
+        A finished run with these switch times, to be compared with ``run``.
+    parts, flying, **choosing
+        As for `suggest`.
+
+    Returns
+    -------
+    Verdict
+
+    Raises
+    ------
+    D2RPickError
+        If the run has no such parts or energy, a time lies outside the record, or tr is not before td.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> run = d2.read("sample_data/energy.csv")
+    >>> d2.verify(run, tr=0.0135867, td=0.0687534).verified
+    True
+    """
+    from d2rpick.choice.of_run import Reference, compare_with, verify_of
+
+    pair = arguments.number("tr", tr), arguments.number("td", td)
+    settings = arguments.settings(choosing)
+    selection = _selection(run, parts, flying)
+    reference = Reference.of(run.files, selection)
+    core = verify_of(reference, *pair, settings)
+    times = ["--tr", repr(pair[0]), "--td", repr(pair[1])]
+    if switched is not None:
+        core = compare_with(core, reference, Reference.of(switched.files, selection))
+        times += [text for name in switched.sources for text in ("--switched", name)]
+    return Verdict(
+        run=run,
+        situation=core.situation,
+        warnings=core.cautions,
+        health=core.health,
+        command=command_line("verify", times, run, selection, choosing),
+        verified=core.verified,
+        reasons=core.reasons,
+        tr_ok=core.tr_ok,
+        td_ok=core.td_ok,
+        candidate=core.candidate,
+        _core=core,
+    )
+
+
+def _selection(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
+    """Add the parts to the columns that were named when the run was read."""
+    if not hasattr(run, "files"):
+        raise TypeError(f"run is {run!r}, what read() or from_frame() gives was expected")
+    names = arguments.part_names("parts", parts)
+    if names and run.chosen.energy:
+        raise ValueError("parts and the energy that was named when the run was read exclude each other")
+    return run.chosen._replace(parts=names, flying=arguments.part_names("flying", flying))
+
+
+def written(path: arguments.Path, page: str) -> Path:
+    """Write a page and give its path."""
+    place = Path(path)
+    place.write_text(page, "utf-8")
+    return place

@@ -1,0 +1,163 @@
+"""Arguments of the library, checked before any file is opened: a wrong one is named in a TypeError or ValueError."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypedDict
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from typing import Any
+
+    from d2rpick.choice.settings import Settings
+    from d2rpick.vibration.oscillator import Oscillator
+
+    Path = str | os.PathLike[str]
+    Parts = str | int | Iterable[str | int]
+
+
+class Choosing(TypedDict, total=False):
+    """How to choose and judge, as the options of ``d2rpick suggest``; times in the unit of the history.
+
+    ``after``: the load ends here (default: found from the record).  ``margin``: kept clear after the load and before
+    the next contact (0).  ``tolerance``: on the lock-in error, on the level error where no oscillator is known (0.2).
+    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: given instead of
+    identified, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the oscillator
+    is identified there only.  ``replay`` False: judge by the energy level alone.  ``cost_share``, ``step_ratio``: of
+    the switched parts in the cost of a step, and of the step while rigid to that while deformable.
+    """
+
+    after: float | None
+    margin: float
+    tolerance: float
+    max_kinetic_share: float | None
+    max_residual: float | None
+    oscillator: Oscillator | None
+    v0: float | None
+    fit_window: tuple[float, float] | None
+    replay: bool
+    cost_share: float | None
+    step_ratio: float
+
+
+# Limits of the numbers, both included; those that are None must be given or left out.
+_LIMITS = {
+    "after": (-math.inf, math.inf),
+    "margin": (0.0, math.inf),
+    "tolerance": (0.0, math.inf),
+    "max_kinetic_share": (0.0, math.inf),
+    "max_residual": (0.0, math.inf),
+    "v0": (-math.inf, math.inf),
+    "cost_share": (0.0, 1.0),
+    "step_ratio": (1.0, math.inf),
+}
+_OPTIONAL = {"after", "max_kinetic_share", "max_residual", "v0", "cost_share"}
+
+
+def number(name: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
+    """Give a finite number within its limits.
+
+    Examples
+    --------
+    >>> number("td", 1)
+    1.0
+    >>> number("margin", -1, 0.0)
+    Traceback (most recent call last):
+    ValueError: margin is -1, a number of at least 0 was expected
+    """
+    if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
+        raise TypeError(f"{name} is {value!r}, a number was expected")
+    found = float(value)
+    if not math.isfinite(found):
+        raise ValueError(f"{name} is {found}, a finite number was expected")
+    if found < low:
+        raise ValueError(f"{name} is {found:g}, a number of at least {low:g} was expected")
+    if found > high:
+        raise ValueError(f"{name} is {found:g}, a number of at most {high:g} was expected")
+    return found
+
+
+def window(name: str, value: object) -> tuple[float, float]:
+    """Give a window of time, the lower time first.
+
+    Examples
+    --------
+    >>> window("td_window", [0.06, 0.07])
+    (0.06, 0.07)
+    """
+    if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != 2:
+        raise TypeError(f"{name} is {value!r}, a pair of times was expected")
+    found = number(f"{name}[0]", value[0]), number(f"{name}[1]", value[1])
+    if not found[0] < found[1]:
+        raise ValueError(f"{name} is {found[0]:g} to {found[1]:g}, which is empty; the lower time comes first")
+    return found
+
+
+def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
+    """Give parts as the command line names them: numbers, ranges (``"10-19"``) and titles.
+
+    Examples
+    --------
+    >>> part_names("parts", [3, "roof"]), part_names("parts", "10-19"), part_names("parts", None)
+    (('3', 'roof'), ('10-19',), ())
+    """
+    if value is None:
+        return ()
+    listed = [value] if isinstance(value, str | int) else list(value)
+    for one in listed:
+        if isinstance(one, bool) or not (isinstance(one, str) or hasattr(one, "__index__")):
+            raise TypeError(f"{name} holds {one!r}; numbers and titles of parts were expected")
+    if not listed:
+        raise ValueError(f"{name} is empty; name a part, or leave {name} out")
+    return tuple(str(one) for one in listed)
+
+
+def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
+    """Give the names of files; a string is one of them.
+
+    Examples
+    --------
+    >>> paths("source", "run/"), paths("source", ["glstat", "matsum"])
+    (('run/',), ('glstat', 'matsum'))
+    """
+    listed = [value] if isinstance(value, str | os.PathLike) else list(_each(name, value))
+    for one in listed:
+        if not isinstance(one, str | os.PathLike):
+            raise TypeError(f"{name} holds {one!r}; paths were expected")
+    if not listed:
+        raise ValueError(f"{name} is empty; name a file or folder")
+    return tuple(os.fsdecode(one) for one in listed)
+
+
+def settings(choosing: Choosing) -> Settings:
+    """Collect the arguments that say how to choose and judge; TypeError for one that does not exist."""
+    from d2rpick.choice.settings import Settings
+    from d2rpick.vibration.replay import to_mode
+
+    known = Choosing.__annotations__
+    if unknown := [name for name in choosing if name not in known]:
+        raise TypeError(f"there is no argument {unknown[0]!r}; expected one of {', '.join(known)}")
+    given: dict[str, Any] = dict(choosing)
+    for name in _LIMITS.keys() & given.keys():
+        if not (given[name] is None and name in _OPTIONAL):
+            given[name] = number(name, given[name], *_LIMITS[name])
+    if given.get("fit_window") is not None:
+        given["fit_window"] = window("fit_window", given["fit_window"])
+    oscillator, v0 = given.pop("oscillator", None), given.pop("v0", None)
+    if (oscillator is None) != (v0 is None):
+        raise ValueError("oscillator and v0 go together: the one vibrates because of the other")
+    ways = {"oscillator": oscillator, "fit_window": given.get("fit_window"), "replay=False": not given.get("replay", 1)}
+    chosen = [name for name, value in ways.items() if value]
+    if len(chosen) > 1:
+        raise ValueError(f"{chosen[0]} and {chosen[1]} exclude each other")
+    if "step_ratio" in given and given.get("cost_share") is None:
+        raise ValueError("step_ratio needs cost_share too: together they tell the run time")
+    return Settings(**given, oscillator=to_mode(oscillator, v0) if oscillator else None)
+
+
+def _each(name: str, value: Iterable[Path]) -> Iterable[Path]:
+    if not hasattr(value, "__iter__"):
+        raise TypeError(f"{name} is {value!r}; a path or several were expected")
+    return value

@@ -1,0 +1,120 @@
+"""The deck check."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Unpack
+
+from d2rpick.library import arguments
+from d2rpick.library.frames import frame_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import pandas as pd
+
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.deck import Window
+    from d2rpick.library.arguments import Choosing
+    from d2rpick.library.runs import Run
+    from d2rpick.rules import Checked, Finding
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """Answer of `check`; nothing of it changes.
+
+    ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``; ``windows`` are those in
+    which parts are rigid.
+    """
+
+    decks: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    windows: tuple[Window, ...] = field(repr=False)
+    warnings: tuple[Caution, ...]
+    _checked: tuple[Checked, ...] = field(repr=False)
+    _history: tuple[str, ...] | None = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the JSON document of the command line as a dictionary; its schema is named in it."""
+        found: dict[str, Any] = json.loads(self.to_json())
+        return found
+
+    def to_json(self) -> str:
+        """Give the JSON document of ``d2rpick check``, schema d2rpick/check/1; paths relative to the working folder."""
+        from d2rpick.report.findings import as_json
+
+        history = [text for name in self._history or () for text in ("--history", name)]
+        said = [caution._asdict() for caution in self.warnings]
+        return as_json(self._checked, Path.cwd(), ("check", *history, *self.decks), said, self._history)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give a row per finding, a column per key of ``findings`` in the JSON.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> history = d2.read("sample_data/energy.csv")
+        >>> d2.check("sample_data/switching.k", history=history).to_frame()["rule"].tolist()
+        ['D2R202', 'D2R203']
+        """
+        keys = ("rule", "severity", "message", "file", "line", "column")
+        return frame_of(self.to_dict()["findings"], keys, decks=list(self.decks))
+
+
+def check(
+    decks: arguments.Path | Iterable[arguments.Path],
+    *,
+    history: Run | None = None,
+    select: Iterable[str] = (),
+    ignore: Iterable[str] = (),
+    **choosing: Unpack[Choosing],
+) -> Findings:
+    """Find the switching cards of decks and check them, as ``d2rpick check`` does.
+
+    Parameters
+    ----------
+    decks : path or several
+        Main decks; their includes are read with them.
+    history : Run, optional
+        By which the windows are judged: a run without switching.
+    select, ignore : strings
+        Rules by id or its beginning; default: by the configuration nearest to the deck.
+    **choosing
+        How to judge, as for `suggest`.
+
+    Returns
+    -------
+    Findings
+
+    Raises
+    ------
+    DeckError
+        If a deck cannot be read.
+    ConfigurationError
+        If a rule does not exist.
+    TypeError, ValueError
+        If an argument is not of its kind.
+    """
+    from d2rpick.rules import check_deck, configuration_for
+    from d2rpick.rules.configuration import Configuration
+
+    names = arguments.paths("decks", decks)
+    settings = arguments.settings(choosing)
+    judge = None
+    if history is not None:
+        from d2rpick.rules.judgement import HistoryJudge
+
+        judge = HistoryJudge(history.files, history.chosen, settings)
+    asked = Configuration(tuple(select), tuple(ignore))
+    checked = tuple(check_deck(name, configuration_for(name, asked), judge) for name in names)
+    return Findings(
+        decks=names,
+        findings=tuple(finding for one in checked for finding in one.findings),
+        windows=tuple(window for one in checked for window in one.windows),
+        warnings=tuple(judge.cautions) if judge else (),
+        _checked=checked,
+        _history=history.sources if history else None,
+    )

@@ -1,0 +1,51 @@
+"""The command line that gives the same answer as a call of the library."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.histories.selection import Selection
+    from d2rpick.library.arguments import Choosing
+    from d2rpick.library.runs import Run
+    from d2rpick.vibration.oscillator import Oscillator
+
+
+def command_line(
+    command: str, times: Sequence[str], run: Run, selection: Selection, choosing: Choosing
+) -> tuple[str, ...]:
+    """Give the arguments of ``d2rpick`` that ask the same question."""
+    return (command, *times, *options_of(selection, choosing), *run.sources)
+
+
+def options_of(selection: Selection, choosing: Choosing) -> tuple[str, ...]:
+    """Give the options that select an energy and say how to choose."""
+    return (*_selected(selection), *_options(choosing))
+
+
+def _selected(selection: Selection) -> Iterator[str]:
+    if selection.time is not None:
+        yield from ("--time", selection.time)
+    for option, values in (("energy", selection.energy), ("part", selection.parts), ("flying", selection.flying)):
+        for value in values:
+            yield from (f"--{option}", value)
+
+
+def _options(choosing: Choosing) -> Iterator[str]:
+    for name, value in choosing.items():
+        if name == "replay":
+            yield from ("--no-verify",) * (not value)
+        elif name == "oscillator" and value is not None:
+            yield from _oscillator(value)  # type: ignore[arg-type]  # the values of a TypedDict are objects
+        elif name == "fit_window" and value is not None:
+            yield from ("--fit-window", *(repr(float(time)) for time in value))  # type: ignore[attr-defined]
+        elif value is not None:
+            yield from (f"--{name.replace('_', '-')}", repr(value))
+
+
+def _oscillator(oscillator: Oscillator) -> Iterator[str]:
+    names = {"stiffness": "stiffness", "mass": "mass", "frame_mass": "frame-mass", "alpha": "alpha"}
+    for name, option in names.items():
+        yield from (f"--{option}", repr(getattr(oscillator, name)))

@@ -1,0 +1,228 @@
+"""A run in the hands of a script: read from files, from memory, or taken from a table in pandas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING, Any
+
+from d2rpick.library import arguments
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import pandas as pd
+
+    from d2rpick.choice.overview import Overview
+    from d2rpick.histories import run as histories
+    from d2rpick.histories.history import Part
+    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.source import Source
+    from d2rpick.library.arguments import Parts, Path
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run: its files, opened, and which columns of a table were named; nothing of it changes.
+
+    ``files`` is what was opened, ``chosen`` the columns.  Energies are read when they are asked for.
+    """
+
+    files: histories.Run
+    chosen: Selection
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the files."""
+        return self.files.sources
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the histories of the whole model."""
+        return tuple(dict.fromkeys(name for one in self.files.databases for name in one.channels))
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Parts that have histories of their own: ``id`` and ``title``."""
+        return self.files.parts
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out or assumed in reading."""
+        return self.files.notes
+
+    def overview(self) -> Overview:
+        """Give what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health."""
+        from d2rpick.choice.overview import survey
+
+        return survey(self.files, self.chosen)
+
+    def to_frame(self, parts: Parts | None = None) -> pd.DataFrame:
+        """Give energies over time as a table, at full precision.
+
+        Parameters
+        ----------
+        parts : number, title or several, optional
+            Whose internal energies: as ``suggest`` takes them, or ``"all"``.  Default: the energy that ``suggest``
+            takes without parts.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``time``, shape (states, parts) with the part's number as the name of its column, or (states, 1) with
+            ``internal_energy`` [energy].  ``attrs``: ``source``, ``format``, ``channel``, ``time_unit`` (empty where no
+            file names it), ``titles`` of the parts by number, and ``notes``.
+
+        Raises
+        ------
+        FormatError
+            If there are no such parts, or no energy.
+
+        Examples
+        --------
+        >>> read("sample_data/energy.csv").to_frame().shape
+        (1501, 1)
+        """
+        import pandas as pd
+
+        names = ("0-4294967295",) if parts == "all" else arguments.part_names("parts", parts)
+        history = self.files.history(self.chosen._replace(energy=(), parts=names) if names else self.chosen)
+        if history.parts is None:
+            columns: dict[Any, Any] = {"internal_energy": history.energy}
+        else:
+            energies = self.files.part_energies(history.parts)
+            columns = {part.id: energies[:, at] for at, part in enumerate(history.parts)}
+            # parts and the energy of their sum stand at the same times
+        frame = pd.DataFrame(columns, index=pd.Index(history.time, name="time"))
+        frame.attrs = {
+            "source": list(history.source),
+            "format": history.format,
+            "channel": history.channel,
+            "time_unit": history.time_unit,
+            "titles": {part.id: part.title for part in history.parts or ()},
+            "notes": list(history.notes),
+        }
+        return frame
+
+
+def read(
+    source: Path | IO[bytes] | Iterable[Path],
+    *,
+    time: str | int | None = None,
+    energy: str | int | Iterable[str | int] | None = None,
+    input_format: str = "auto",
+) -> Run:
+    """Read the files of one run, as ``d2rpick suggest`` reads its HISTORY.
+
+    Parameters
+    ----------
+    source : path, several, or an open binary file
+        A file, a folder, a glob, the legs of a run, companions of different formats; a string is one path.
+    time, energy : str or int, optional
+        Columns, labels or HDF5 paths, by name or 1-based number; several energies are added.
+    input_format : str
+        ``"auto"`` (by content), or one of csv, hdf5, glstat, matsum, binout, radioss-th.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    D2RPickError
+        If a file cannot be read as the history of a run; one line that says where, what and what to do.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> read("sample_data/energy.csv").channels
+    ('z', 'y', 'vz', 'vy', 'internal_energy', 'kinetic_energy')
+    """
+    if hasattr(source, "read"):
+        return _opened([_in_memory(source)], selection_of(time, energy), input_format)
+    names = arguments.paths("source", source)
+    from d2rpick.histories.opening import open_run
+
+    chosen = selection_of(time, energy)
+    return Run(open_run(names, chosen, known_format(input_format)), chosen)
+
+
+def from_frame(
+    frame: pd.DataFrame,
+    *,
+    time: str | int | None = None,
+    energy: str | int | Iterable[str | int] | None = None,
+    name: str = "frame",
+) -> Run:
+    """Take the energies of a run from a table: of lasso-python (``as_df``), a database, a spreadsheet.
+
+    It is checked as the csv file is that ``frame.to_csv()`` writes: its times must rise, its values be finite numbers.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        A row per state; the times are a column named so, or the index.
+    time, energy : str or int, optional
+        Columns as for ``read``.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    D2RPickError
+        If it is not the history of a run.
+    TypeError
+        If ``frame`` is not a pandas.DataFrame.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> table = pd.DataFrame({"time": [0.0, 1.0, 2.0], "internal_energy": [0.0, 4.0, 1.0]})
+    >>> from_frame(table).to_frame()["internal_energy"].tolist()
+    [0.0, 4.0, 1.0]
+    """
+    import pandas as pd
+
+    from d2rpick.histories.names import is_time
+    from d2rpick.histories.source import Source
+
+    if not isinstance(frame, pd.DataFrame):
+        raise TypeError(f"frame is a {type(frame).__name__}, a pandas.DataFrame was expected")
+    has_time = time is not None or any(is_time(str(column)) for column in frame.columns)
+    text = frame.to_csv(index=not has_time, index_label="time")
+    return _opened([Source(name, text.encode())], selection_of(time, energy), "csv")
+
+
+def _in_memory(file: Any) -> Source:
+    from d2rpick.histories.source import Source
+
+    data = file.read()
+    if not isinstance(data, bytes):
+        raise TypeError("source is a file opened as text, one opened as binary was expected: open(name, 'rb')")
+    return Source(str(getattr(file, "name", "file")), data)
+
+
+def _opened(sources: list[Source], chosen: Selection, input_format: str) -> Run:
+    from d2rpick.histories.opening import open_sources
+
+    return Run(open_sources(sources, chosen, known_format(input_format)), chosen)
+
+
+def known_format(input_format: str) -> str:
+    """Give the name of a format, or ``"auto"``; ValueError for any other."""
+    from d2rpick.histories.opening import READERS
+
+    if input_format not in ("auto", *READERS):
+        raise ValueError(f"input_format is {input_format!r}, one of auto, {', '.join(READERS)} was expected")
+    return input_format
+
+
+def selection_of(time: str | int | None, energy: str | int | Iterable[str | int] | None) -> Selection:
+    """Give the columns that are meant; TypeError for what is no name or number."""
+    from d2rpick.histories.selection import Selection
+
+    listed = [] if energy is None else [energy] if isinstance(energy, str | int) else list(energy)
+    for name, value in [("time", time), *(("energy", one) for one in listed)]:
+        if value is not None and (isinstance(value, bool) or not isinstance(value, str | int)):
+            raise TypeError(f"{name} is {value!r}, the name or number of a column was expected")
+    return Selection(None if time is None else str(time), tuple(str(one) for one in listed))

@@ -1,0 +1,147 @@
+"""The same question for many runs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Unpack
+
+from d2rpick.library import arguments
+from d2rpick.library.answers import written
+from d2rpick.library.frames import frame_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.library.arguments import Choosing, Parts
+    from d2rpick.studies.study import Common, Row
+    from d2rpick.studies.study import Study as Core
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Answer of `study`; nothing of it changes.
+
+    ``runs`` has a row per run; ``agree`` is whether the intervals of tr intersect, None without a tr; ``common`` is one
+    tr for all judged runs, with the window they share, or None with the reason.  Times are in the unit of the runs.
+    """
+
+    td: float
+    runs: tuple[Row, ...] = field(repr=False)
+    agree: bool | None
+    common: Common
+    warnings: tuple[Caution, ...]
+    command: tuple[str, ...] = field(repr=False)
+    _core: Core = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the JSON document of the command line as a dictionary; its schema is named in it."""
+        found: dict[str, Any] = json.loads(self.to_json())
+        return found
+
+    def to_json(self) -> str:
+        """Give the JSON document of ``d2rpick study``, schema d2rpick/study/1."""
+        from d2rpick.report.study import as_json
+
+        return as_json(self._core, self.command)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give a row per run, a column per key of ``runs`` in the JSON; what is not known is NaN.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> d2.study(["sample_data/energy.csv"], td=0.0687534).to_frame()["status"].tolist()
+        ['ok']
+        """
+        from d2rpick.studies.resume_file import PLAIN
+
+        return frame_of(self.to_dict()["runs"], PLAIN, td=self.td)
+
+    def plot(self) -> Figure:
+        """Draw the energies over each other, with every tr, as a matplotlib Figure."""
+        from d2rpick.report.figures import draw_study
+
+        return draw_study(self._core)
+
+    def report(self, path: arguments.Path) -> Path:
+        """Write the study to one HTML page that needs no network; an existing file is replaced."""
+        from d2rpick.report.figures import both_widths, draw_study
+        from d2rpick.report.study_page import as_page
+
+        page = as_page(self._core, ("d2rpick", *self.command), both_widths(draw_study, self._core, "runs"))
+        return written(path, page)
+
+
+def study(
+    runs: Iterable[arguments.Path],
+    td: float,
+    *,
+    parts: Parts | None = None,
+    flying: Parts | None = None,
+    time: str | int | None = None,
+    energy: str | int | Iterable[str | int] | None = None,
+    input_format: str = "auto",
+    jobs: int = 1,
+    **choosing: Unpack[Choosing],
+) -> Study:
+    """Ask the same question of many runs, as ``d2rpick study`` does.
+
+    Parameters
+    ----------
+    runs : several paths
+        Each a file, or a folder with the files of one run; patterns are replaced by what they match, each a run.
+    td : float
+        When the parts are switched back [time].
+    parts, flying, **choosing
+        As for `suggest`.
+    time, energy, input_format
+        As for `read`.
+    jobs : int
+        Processes that work at the same time.  In a script more than 1 need its guard ``if __name__ == "__main__":``.
+
+    Returns
+    -------
+    Study
+        A run that cannot be read has a row that says why.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> found = d2.study(["sample_data/energy.csv", "sample_data/energy.glstat"], td=0.0687534)
+    >>> found.agree, round(found.common.tr, 4)
+    (True, 0.0136)
+    """
+    from d2rpick.library.repeat import options_of
+    from d2rpick.library.runs import known_format, selection_of
+    from d2rpick.studies.study import Question, ask, failed, find_runs, summarise
+    from d2rpick.studies.workers import answers, local
+
+    names = find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
+    selection = selection_of(time, energy)._replace(
+        parts=arguments.part_names("parts", parts), flying=arguments.part_names("flying", flying)
+    )
+    question = Question(
+        arguments.number("td", td), arguments.settings(choosing), selection, known_format(input_format), True
+    )
+    if not (isinstance(jobs, int) and jobs > 0):
+        raise ValueError(f"jobs is {jobs!r}, a whole number of at least 1 was expected")
+    rows: dict[int, Row] = {}
+    with local(min(jobs, len(names))) as farm:
+        for answer in answers(farm, partial(ask, question), names):
+            row = failed(names[answer.number], answer.error) if answer.error else answer.result
+            rows[answer.number] = replace(row, source=names[answer.number])
+    core = summarise(question.td, [rows[number] for number in range(len(names))])
+    command = ("study", "--td", repr(question.td), *options_of(selection, choosing), *names)
+    return Study(core.td, core.rows, core.agree, core.common, core.cautions, command, core)

@@ -1,0 +1,172 @@
+"""The library gives what the command line gives, loses nothing in tables, and names a wrong argument."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import d2rpick as d2
+from tests.command import BOX, DECK, ENERGY, ROLLOVER, answer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+TD = "0.0687534"
+loose: Any = d2  # for what a type checker would not let pass
+
+
+def same(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> None:
+    """Hold two documents against each other, but for the command that asked for them."""
+    assert {**mine, "command": None} == {**theirs, "command": None}
+
+
+@st.composite
+def records(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
+    """Energies of a damped oscillator after a load, with or without noise: some are described, some are not."""
+    states, periods = draw(st.integers(30, 200)), draw(st.floats(0.5, 12))
+    noise, damping = draw(st.sampled_from([0.0, 0.0, 0.01, 0.5])), draw(st.floats(0, 3))
+    time = np.linspace(0, 1, states)
+    energy = np.exp(-damping * time) * np.sin(np.pi * periods * time + draw(st.floats(0, 3))) ** 2
+    return time, energy + noise * np.random.default_rng(draw(st.integers(0, 99))).uniform(size=states)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(record=records(), td=st.floats(0.3, 1.0), tr=st.floats(0.0, 0.29))
+def test_the_library_and_the_command_line_say_the_same(
+    record: tuple[np.ndarray, np.ndarray], td: float, tr: float, tmp_path: Path
+) -> None:
+    file = tmp_path / "run.csv"
+    pd.DataFrame({"time": record[0], "internal_energy": record[1]}).to_csv(file, index=False)
+    run = d2.read(file)
+    same(d2.suggest(run, td).to_dict(), answer("suggest", "--td", repr(td), str(file)))
+    verdict = d2.verify(run, tr, td, margin=0.01)
+    same(verdict.to_dict(), answer("verify", "--tr", repr(tr), "--td", repr(td), "--margin", "0.01", str(file)))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options"),
+    [
+        ({"parts": "box"}, ("--part", "box")),
+        ({"parts": [1, "2"], "flying": (1, 2)}, ("--part", "1", "--part", "2", "--flying", "1", "--flying", "2")),
+        ({"parts": 1, "after": 0.1, "tolerance": 0.1}, ("--part", "1", "--after", "0.1", "--tolerance", "0.1")),
+        ({"parts": "box", "replay": False, "cost_share": 0.8}, ("--part", "1", "--no-verify", "--cost-share", "0.8")),
+    ],
+)
+def test_arguments_mean_what_options_mean(arguments: dict[str, Any], options: tuple[str, ...]) -> None:
+    found = d2.suggest(d2.read(BOX), td=0.37, **arguments)
+    same(found.to_dict(), answer("suggest", "--td", "0.37", *options, BOX))
+
+
+def test_the_command_of_an_answer_asks_the_same() -> None:
+    oscillator = d2.Oscillator(stiffness=660e3, mass=31.4, frame_mass=15.7, alpha=50)
+    found = d2.suggest(d2.read(ENERGY), td_window=(0.06, 0.07), oscillator=oscillator, v0=6.0)
+    same(found.to_dict(), answer(*found.command))
+    assert found.to_dict()["command"] == list(found.command)
+
+
+def test_a_table_of_candidates_loses_nothing() -> None:
+    found = d2.suggest(d2.read(ROLLOVER, energy="boxIE_J"), td=0.37)
+    frame = found.to_frame()
+    assert len(frame) == len(found.candidates) > 1
+    for row, candidate in zip(frame.to_dict("records"), found.candidates, strict=True):
+        for name in ("tr", "energy", "level_error", "tr_low", "tr_high", "rigid_time", "acceptable", "kind"):
+            assert row[name] == getattr(candidate, name)
+        assert candidate.residual is None
+        assert np.isnan(row["residual"])
+    assert frame.attrs["basis"] == found.basis == "energy"
+
+
+def test_a_table_of_a_run_holds_its_energies() -> None:
+    run = d2.read(BOX)
+    every, box = run.to_frame(parts="all"), run.to_frame(parts="box")
+    assert [*every] == [part.id for part in run.parts]
+    assert every.index.name == "time"
+    assert every.attrs["titles"][1] == "box"
+    pd.testing.assert_series_equal(every[1], box[1])
+    assert d2.suggest(run, 0.37, parts="box").situation.history.energy == pytest.approx(box[1].to_numpy())
+
+
+def test_a_frame_is_the_file_it_would_be() -> None:
+    table = pd.read_csv(ENERGY)
+    mine, theirs = d2.suggest(d2.from_frame(table), 0.064), d2.suggest(d2.read(ENERGY), 0.064)
+    assert mine.to_frame()["tr"].tolist() == theirs.to_frame()["tr"].tolist()
+    by_index = table.set_index(table.columns[0])
+    assert d2.suggest(d2.from_frame(by_index), 0.064).recommended == theirs.recommended
+    with pytest.raises(d2.D2RPickError, match="frame:3: 'internal_energy' is ''"):
+        d2.from_frame(pd.DataFrame({"time": [0, 1, 2], "internal_energy": [1.0, np.nan, 2.0]})).to_frame()
+    with pytest.raises(d2.D2RPickError):
+        d2.suggest(d2.from_frame(pd.DataFrame({"time": [0, 2, 1.0], "internal_energy": [1.0, 2.0, 2.0]})), 1.0)
+
+
+def test_an_open_file_is_read() -> None:
+    with Path(ENERGY).open("rb") as file:
+        same(d2.suggest(d2.read(file), 0.064).to_dict(), answer("suggest", "--td", "0.064", ENERGY))
+    with pytest.raises(TypeError, match="opened as text"):
+        loose.read(io.StringIO("time,energy\n"))
+
+
+def test_pictures_and_pages(tmp_path: Path) -> None:
+    found = d2.suggest(d2.read(ENERGY), float(TD))
+    assert found.plot().axes
+    page = found.report(tmp_path / "choice.html").read_text("utf-8")
+    assert "d2rpick suggest --td 0.0687534" in page
+    assert found.recommended is not None
+    verdict = d2.verify(d2.read(ENERGY), tr=found.recommended.tr, td=float(TD))
+    assert verdict.plot().axes
+    assert "Verified" in verdict.report(str(tmp_path / "verdict.html")).read_text("utf-8")
+
+
+def test_a_study_and_a_check_say_what_the_command_line_says(tmp_path: Path) -> None:
+    copy = tmp_path / "second.csv"
+    copy.write_bytes(Path(ENERGY).read_bytes())
+    names = [ENERGY, str(copy), str(tmp_path / "absent.csv")]
+    found = d2.study(names, td=float(TD))
+    same(found.to_dict(), answer("study", "--td", TD, *names))
+    assert found.to_frame()["status"].tolist() == ["ok", "ok", "unreadable"]
+    assert found.plot().axes
+    assert found.report(tmp_path / "study.html").stat().st_size > 0
+    checked = d2.check(DECK, history=d2.read(ENERGY))
+    theirs = answer("check", "--history", ENERGY, DECK)
+    assert checked.to_dict()["findings"] == theirs["findings"]
+    assert checked.to_frame()["rule"].tolist() == [one["rule"] for one in theirs["findings"]]
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "text"),
+    [
+        (lambda: loose.suggest(d2.read(ENERGY)), TypeError, "td or td_window was expected"),
+        (lambda: loose.suggest(d2.read(ENERGY), "0.064"), TypeError, "td is '0.064', a number was expected"),
+        (lambda: loose.suggest(d2.read(ENERGY), td_window=(2, 1)), ValueError, "td_window is 2 to 1, which is empty"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, tolerence=1), TypeError, "there is no argument 'tolerence'"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, margin=-1), ValueError, "margin is -1, a number of at least 0"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, tolerance=None), TypeError, "tolerance is None"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, v0=6.0), ValueError, "oscillator and v0 go together"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[]), ValueError, "parts is empty"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[1.5]), TypeError, "parts holds 1.5"),
+        (lambda: loose.suggest(ENERGY, 0.06), TypeError, "run is .*, what read"),
+        (lambda: loose.suggest(d2.read(ROLLOVER, energy="boxIE_J"), 0.3, parts=1), ValueError, "exclude each other"),
+        (lambda: loose.read(3), TypeError, "source is 3"),
+        (lambda: loose.read([]), ValueError, "source is empty"),
+        (lambda: loose.read(ENERGY, input_format="exel"), ValueError, "input_format is 'exel', one of auto, binout"),
+        (lambda: loose.from_frame([1, 2]), TypeError, "frame is a list"),
+        (lambda: loose.study([ENERGY], 0.06, jobs=0), ValueError, "jobs is 0"),
+        (lambda: loose.suggest(d2.read(ENERGY), 9), d2.RangeError, "lies outside the record"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, parts=1), d2.D2RPickError, "a table has no parts"),
+        (lambda: loose.check("absent.k"), d2.DeckError, "absent.k"),
+    ],
+)
+def test_a_wrong_argument_is_named(call: Callable[[], Any], error: type[Exception], text: str) -> None:
+    with pytest.raises(error, match=text):
+        call()
+
+
+def test_json_is_that_of_the_schema() -> None:
+    assert json.loads(d2.suggest(d2.read(ENERGY), 0.064).to_json())["schema"] == "d2rpick/suggest/1"

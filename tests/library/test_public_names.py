@@ -1,0 +1,48 @@
+"""``import d2rpick`` is light, offers every public name, and its types hold for whoever uses it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import assert_type
+
+import pandas as pd
+import pytest
+
+import d2rpick as d2
+from tests.command import ENERGY, ROOT
+
+HEAVY = ("numpy", "pandas", "scipy", "matplotlib", "h5py", "click")
+
+
+def test_the_import_alone_loads_nothing_heavy() -> None:
+    code = "import sys, d2rpick; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert not {*HEAVY} & {*loaded.stdout.split()}
+
+
+def test_reading_and_choosing_load_no_pandas() -> None:
+    code = f"import sys, d2rpick as d2; d2.suggest(d2.read({ENERGY!r}), 0.064); print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert not {"pandas", "scipy", "matplotlib", "h5py", "click"} & {*loaded.stdout.split()}
+
+
+@pytest.mark.parametrize("name", d2.__all__)
+def test_every_public_name_is_there_and_says_what_it_is(name: str) -> None:
+    assert name in dir(d2)
+    assert getattr(d2, name).__doc__
+
+
+def test_other_names_are_not() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'sugest'"):
+        d2.sugest  # noqa: B018  # type: ignore[attr-defined]
+
+
+def test_types_hold_for_a_stranger() -> None:
+    """What mypy is asked here it is asked without knowing more than a user does."""
+    answer = d2.suggest(d2.read(ENERGY), td=0.0687534)
+    assert_type(answer, d2.Suggestion)
+    assert_type(answer.to_frame(), pd.DataFrame)
+    assert answer.recommended is not None
+    assert_type(answer.recommended.tr, float)
+    assert_type(d2.verify(d2.read(ENERGY), tr=answer.recommended.tr, td=answer.td).verified, bool)
