@@ -22,9 +22,9 @@ Examples:
 
 @click.command("replay", epilog=EXAMPLES)
 @shared.oscillator_options(required=True)
-@click.option("--tr", type=shared.NOT_NEGATIVE, metavar="T", help="Switch to rigid at this time; with --td.")
-@click.option("--td", type=shared.NOT_NEGATIVE, metavar="T", help="Switch back to deformable at this time.")
-@click.option("--t-end", type=shared.POSITIVE, required=True, metavar="T", help="Last time.")
+@click.option("--tr", type=shared.NOT_NEGATIVE, metavar="T", help="Switch to rigid at this time; needs --td.")
+@click.option("--td", type=shared.NOT_NEGATIVE, metavar="T", help="Switch back to deformable at this time; needs --tr.")
+@click.option("--t-end", type=shared.POSITIVE, required=True, metavar="T", help="End time.")
 @click.option("--dt", type=shared.POSITIVE, required=True, metavar="T", help="Output interval.")
 @click.option(
     "--write-as",
@@ -40,8 +40,8 @@ def command(
 ) -> None:
     """Compute the floating oscillator in closed form, with or without switching.
 
-    The frame starts with velocity v0, everything else at rest.  Columns: time, displacement and velocity of frame
-    (z) and suspended mass (y), internal and kinetic energy; at tr itself the state after the switch.
+    The frame starts with velocity v0 and everything else at rest.  Columns: time, displacement and velocity of frame
+    (z) and suspended mass (y), internal and kinetic energy; the row at tr holds the state after the switch.
     """
     from d2rpick.report import writers
     from d2rpick.vibration.oscillator import State
@@ -50,7 +50,7 @@ def command(
     oscillator = shared.oscillator(options)
     assert oscillator is not None  # its options are required
     if (tr is None) != (td is None):
-        raise click.UsageError("--tr and --td go together")
+        raise click.UsageError("--tr and --td need each other")
     if tr is not None and td is not None and not tr < td:
         raise click.UsageError(f"--tr {tr:g} is not before --td {td:g}")
     if t_end / dt > MOST_STATES:

@@ -32,22 +32,24 @@ Examples:
 
 
 @click.command("rollover", epilog=EXAMPLES)
-@click.option("--tr", type=shared.NOT_NEGATIVE, metavar="T", help="Switch the box to rigid at this time; with --td.")
-@click.option("--td", type=shared.NOT_NEGATIVE, metavar="T", help="Switch it back.  [with --scan: 0.37]")
-@click.option("--scan", is_flag=True, help="Compute many tr, and hold each run against the one without switching.")
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes of a scan.  [default: one for each core]")
-@click.option("--t-end", type=shared.POSITIVE, default=0.42, show_default=True, metavar="T", help="Last time.")
+@click.option("--tr", type=shared.NOT_NEGATIVE, metavar="T", help="Switch the box to rigid at this time; needs --td.")
+@click.option(
+    "--td", type=shared.NOT_NEGATIVE, metavar="T", help="Switch it back at this time.  [default with --scan: 0.37]"
+)
+@click.option("--scan", is_flag=True, help="Compute many tr and compare each run with the one without switching.")
+@click.option("--jobs", type=click.IntRange(min=1), help="Number of processes for --scan.  [default: one per core]")
+@click.option("--t-end", type=shared.POSITIVE, default=0.42, show_default=True, metavar="T", help="End time.")
 @click.option("--dt", type=shared.POSITIVE, default=1e-4, show_default=True, metavar="T", help="Output interval.")
-@click.option("--speed", type=shared.POSITIVE, help="Of the sled at the start, m/s.  [default: 7]")
-@click.option("--stiffness", type=shared.POSITIVE, help="Of the bars of the box, E A in N.  [default: 4.5e6]")
-@click.option("--yield-strain", type=shared.POSITIVE, help="Of the bars of the box.  [default: 4.5e-3]")
-@click.option("--damping", type=shared.NOT_NEGATIVE, help="Rate of the mass damping, 1/s.  [default: 0.2]")
+@click.option("--speed", type=shared.POSITIVE, help="Speed of the sled at the start [m/s].  [default: 7]")
+@click.option("--stiffness", type=shared.POSITIVE, help="Stiffness E A of the bars of the box [N].  [default: 4.5e6]")
+@click.option("--yield-strain", type=shared.POSITIVE, help="Yield strain of the bars of the box.  [default: 4.5e-3]")
+@click.option("--damping", type=shared.NOT_NEGATIVE, help="Rate of damping proportional to mass [1/s].  [default: 0.2]")
 @click.option("--mesh", type=click.IntRange(4, 200), help="Cells along each side of the box.  [default: 16]")
 @click.option(
-    "--write-as", type=click.Choice(FORMATS), help="Format of a history.  [default: by the name of -o, else csv]"
+    "--write-as", type=click.Choice(FORMATS), help="Format of the history.  [default: by the suffix of -o, else csv]"
 )
 @click.option(
-    "-f", "--output-format", type=click.Choice(["table", "json", "csv", "markdown"]), help="Form of a scan.  "
+    "-f", "--output-format", type=click.Choice(["table", "json", "csv", "markdown"]), help="Format of the scan.  "
     "[default: table]",
 )  # fmt: skip
 @click.option(
@@ -59,9 +61,9 @@ Examples:
 def command(ctx: click.Context, /, scan: bool, **options: Any) -> None:
     """Compute a planar box that trips over the curb of a braking sled, rolls and lands.  SI units.
 
-    It is deformable throughout, or rigid from tr to td; the step that meets the curb stays deformable.  Columns: time,
-    place, roll and velocities of the box, its energies, and the momentum of box and step.  glstat holds the energies
-    of both, matsum those of each.
+    The box is deformable throughout, or rigid from tr to td; the step that meets the curb stays deformable.
+    Columns: time, position, roll and velocities of the box, its energies, and the momentum of box and step.  glstat
+    holds the sum of their energies, matsum those of each.
     """
     _check(scan=scan, **options)
     if scan:
@@ -74,13 +76,13 @@ def _check(
     *, scan: bool, tr: float | None, td: float | None, t_end: float, dt: float, output_format: str | None,
     write_as: str | None, jobs: int | None, **_: Any,
 ) -> None:  # fmt: skip
-    """UsageError where options contradict each other."""
+    """Raise UsageError where options contradict each other."""
     if scan and (tr is not None or write_as):
         raise click.UsageError(f"--scan and {'--write-as' if tr is None else '--tr'} exclude each other")
     if not scan and (output_format or jobs):
-        raise click.UsageError(f"--{'output-format' if output_format else 'jobs'} belongs to --scan")
+        raise click.UsageError(f"--{'output-format' if output_format else 'jobs'} needs --scan")
     if not scan and (tr is None) != (td is None):
-        raise click.UsageError("--tr and --td go together")
+        raise click.UsageError("--tr and --td need each other")
     if tr is not None and td is not None and not tr < td:
         raise click.UsageError(f"--tr {tr:g} is not before --td {td:g}")
     if not scan and td is not None and td > t_end:
@@ -96,7 +98,7 @@ def _parameters(options: dict[str, Any]) -> Parameters:
 
 
 def _run(options: dict[str, Any]) -> None:
-    """One run; for a plot also the one without switching."""
+    """Compute one run; for a plot also the one without switching."""
     from d2rpick.models.rollover.run import Window, simulate
     from d2rpick.report import writers
 
@@ -120,7 +122,7 @@ def _run(options: dict[str, Any]) -> None:
 
 
 def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
-    """Many switched runs, the tr that the tool recommends among them."""
+    """Compute many switched runs, one of them at the recommended tr."""
     from d2rpick.models.rollover.as_history import suggestion_for
     from d2rpick.models.rollover.run import simulate
     from d2rpick.models.rollover.scan import comparison_end, scan, scan_times
@@ -156,11 +158,11 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
 
 
 def _unbalanced(record: Record) -> tuple[Caution, ...]:
-    """Object to a run whose energy is not balanced, as with damping that is over within some steps."""
+    """Warn of a run whose energy is not balanced, for example with damping that acts within a few steps."""
     from d2rpick.choice.warnings import Caution
 
     off = float(abs(record.balance - 1).max())
     if off <= BALANCED:
         return ()
-    found = f"the energy is balanced within {off:.2g} of that at the start, {BALANCED} was expected"
-    return (Caution("energy-balance", f"{found}; these parameters are beyond what the model can do"),)
+    found = f"the energy balance is off by {off:.2g} of the energy at the start, at most {BALANCED} was expected"
+    return (Caution("energy-balance", f"{found}; the model cannot handle these parameters"),)
