@@ -22,7 +22,7 @@ Examples:
 @shared.output_options("table", "json", "csv", "markdown")
 @click.pass_context
 def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **options: Any) -> None:  # noqa: ARG001
-    """Tell what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health."""
+    """Show what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health."""
     from d2rpick.choice.overview import survey
     from d2rpick.report import overview as report
 

@@ -60,7 +60,7 @@ def command(
     oscillator = shared.oscillator({**options, "v0": float(start.vz)})
     assert oscillator is not None  # its options are required
     if (tr is None) != (td is None):
-        raise click.UsageError("--tr and --td go together")
+        raise click.UsageError("--tr and --td need each other")
     if tr is not None and td is not None and not tr < td:
         raise click.UsageError(f"--tr {tr:g} is not before --td {td:g}")
     if t_end / dt > MOST_STATES:

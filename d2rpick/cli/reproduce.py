@@ -31,20 +31,20 @@ PICTURES = ("svg", "png")
     metavar="DIR",
     required=True,
     type=shared.FILE,
-    help="Folder for figures and tables; made where missing.",
+    help="Folder for figures and tables; created if missing.",
 )
 @click.option(
     "--solver",
     metavar="FILE",
     type=shared.FILE,
-    help=f"A solver's run of the same oscillator to be drawn beside: a table of time_s, {', '.join(SOLVER)}.",
+    help=f"Solver run of the same oscillator to draw for comparison: a table of time_s, {', '.join(SOLVER)}.",
 )
 @shared.output_options("table", "json", "csv", "markdown")
 @click.pass_context
 def command(
     ctx: click.Context, /, output_dir: str, solver: str | None, output_format: str, exit_zero: bool, **options: Any
 ) -> None:
-    """Compute the published oscillator results anew: figures (svg, png) and tables (csv).
+    """Reproduce the published oscillator results as figures (svg, png) and tables (csv).
 
     Displacement for several pairs, closed form against numerical integration, the energy level and the motion that
     follows, beside it the better pair; published numbers beside those found here.
@@ -87,7 +87,7 @@ def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exh
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise D2RPickError(f"{folder}: no folder can be made there ({error.strerror}); name another one") from error
+        raise D2RPickError(f"{folder}: the folder cannot be created ({error.strerror}); choose another one") from error
     index = report.as_markdown(rows, [(one.title, f"{one.name}.svg") for one in shown])
     contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{report.as_csv(rows)}\n".encode()}
     for one in shown:

@@ -101,7 +101,7 @@ def _check(*, scan: bool, t_end: float, dt: float, drop: float | None, tilt: flo
         if len(options["td"]) > 1:
             raise click.UsageError("--scan takes one --td")
     elif options["output_format"] or options["jobs"]:
-        raise click.UsageError(f"--{'output-format' if options['output_format'] else 'jobs'} belongs to --scan")
+        raise click.UsageError(f"--{'output-format' if options['output_format'] else 'jobs'} needs --scan")
     else:
         _check_windows(options["tr"], options["td"], t_end)
     if tilt is not None and drop is None:
@@ -113,7 +113,7 @@ def _check(*, scan: bool, t_end: float, dt: float, drop: float | None, tilt: flo
 def _check_windows(starts: Sequence[float], ends: Sequence[float], t_end: float) -> None:
     """UsageError unless the times are pairs in order, within the run."""
     if len(starts) != len(ends):
-        raise click.UsageError("--tr and --td go together, as many of the one as of the other")
+        raise click.UsageError("--tr and --td need each other, as many of the one as of the other")
     before = None
     for tr, td in zip(starts, ends, strict=True):
         if not tr < td:

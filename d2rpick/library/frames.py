@@ -22,5 +22,5 @@ def frame_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], **attrs:
 
     frame = pd.DataFrame(list(rows), columns=list(columns))
     frame = frame.astype({name: "float64" for name in frame.columns if len(frame) and frame[name].isna().all()})
-    frame.attrs = {**attrs}
+    frame.attrs.update(attrs)
     return frame

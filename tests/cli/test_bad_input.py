@@ -157,8 +157,8 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         (f"{ONE_COMMAND} --vz0 1", ["--v0 and --vz0 exclude each other"]),
         (f"{ONE_COMMAND} --dt 0", ["--dt", "above 0 was expected"]),
         (f"{ONE_COMMAND} --dt 1e-12", ["--dt 1e-12", "10000000"]),
-        (f"{ONE_COMMAND} --tr 0.006", ["--tr and --td go together"]),
-        (f"{ONE_COMMAND} --td 0.006", ["--tr and --td go together"]),
+        (f"{ONE_COMMAND} --tr 0.006", ["--tr and --td need each other"]),
+        (f"{ONE_COMMAND} --td 0.006", ["--tr and --td need each other"]),
         (f"{ONE_COMMAND} --tr 0.006 --td 0.005", ["--tr 0.006 is not before --td 0.005"]),
         (f"{ONE_COMMAND} -o motion.txt", ["motion.txt", "--write-as csv, hdf5, glstat, matsum"]),
         # files to be written; all of them are known to be wrong before anything is computed

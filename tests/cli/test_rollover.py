@@ -157,7 +157,7 @@ def test_the_progress_of_a_scan_is_told_on_a_terminal_only() -> None:
 @pytest.mark.parametrize(
     ("args", "complaint"),
     [
-        (("--tr", "0.1"), "--tr and --td go together"),
+        (("--tr", "0.1"), "--tr and --td need each other"),
         (("--tr", "0.2", "--td", "0.1"), "is not before"),
         (("--tr", "0.1", "--td", "0.2", "--tr", "0.2", "--td", "0.3"), "--tr 0.2 is not after --td 0.2"),
         (("--tr", "0.1", "--td", "0.2", "--tr", "0.3"), "as many"),
@@ -171,8 +171,8 @@ def test_the_progress_of_a_scan_is_told_on_a_terminal_only() -> None:
         (("--mesh", "100000"), "200"),
         (("--scan", "--tr", "0.1"), "exclude each other"),
         (("--scan", "--write-as", "csv"), "exclude each other"),
-        (("--jobs", "2"), "belongs to --scan"),
-        (("-f", "json"), "belongs to --scan"),
+        (("--jobs", "2"), "needs --scan"),
+        (("-f", "json"), "needs --scan"),
         (("--dt", "1e-9"), "more than"),
         (("--mesh", "3"), "4"),
         (("--scan", "--td", "0.5", "--mesh", "4"), "end of the flight"),

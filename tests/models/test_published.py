@@ -128,7 +128,7 @@ def test_a_folder_that_cannot_be_made_is_an_error_that_says_what_to_do(tmp_path:
     for place in (tmp_path / "file", tmp_path / "file" / "paper"):
         result = run("reproduce", "--output-dir", str(place))
         assert result.exit_code == 2
-        assert "no folder can be made there" in result.stderr
+        assert "the folder cannot be created" in result.stderr
 
 
 def test_all_states_that_were_computed_with_40_digits_are_in_the_table() -> None:
