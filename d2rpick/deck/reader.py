@@ -47,6 +47,7 @@ class Deck:
     problems: list[Problem] = field(default_factory=list)
     scope: Scope = field(default_factory=Scope)
     files: list[str] = field(default_factory=list)
+    long: bool = False  # whether the main file ends in long format
 
     def named(self, *names: str) -> list[Card]:
         """Cards whose keyword is one of ``names``, or one of them with an option behind ``_``."""
@@ -135,6 +136,8 @@ class _Reader:
             name, suffix = _keyword(block.head)
             if name == "KEYWORD" and (found := _LONG.search(block.head)):
                 width = LONG if found[1].upper() == "Y" else STANDARD
+                if not context.chain:
+                    self.deck.long = width == LONG
             own = LONG if "+" in suffix else STANDARD if "-" in suffix else width
             self.take(Card(name, block, context.scope.as_of_now(), own, context.transform), context, width)
 
