@@ -64,12 +64,16 @@ class Deck:
     @property
     def silencing(self) -> list[Card]:
         """Cards before which a comment silences rules."""
-        return [card for cards in self._by_line.values() for card in cards if card.block.silenced]
+        return [card for card in self._all if card.block.silenced]
+
+    @property
+    def _all(self) -> list[Card]:
+        return [*self.cards, *self.disabled, *self.included]
 
     @cached_property
     def _by_line(self) -> defaultdict[str, list[Card]]:
         found: defaultdict[str, list[Card]] = defaultdict(list)
-        for card in (*self.cards, *self.disabled, *self.included):
+        for card in self._all:
             found[card.file].append(card)
         for cards in found.values():
             cards.sort(key=lambda card: card.line)
