@@ -47,6 +47,7 @@ class Deck:
     problems: list[Problem] = field(default_factory=list)
     scope: Scope = field(default_factory=Scope)
     files: list[str] = field(default_factory=list)
+    long: bool = False  # whether the main file ends in long format
 
     def named(self, *names: str) -> list[Card]:
         """Cards whose keyword is one of ``names``, or one of them with an option behind ``_``."""
@@ -63,12 +64,16 @@ class Deck:
     @property
     def silencing(self) -> list[Card]:
         """Cards before which a comment silences rules."""
-        return [card for cards in self._by_line.values() for card in cards if card.block.silenced]
+        return [card for card in self._all if card.block.silenced]
+
+    @property
+    def _all(self) -> list[Card]:
+        return [*self.cards, *self.disabled, *self.included]
 
     @cached_property
     def _by_line(self) -> defaultdict[str, list[Card]]:
         found: defaultdict[str, list[Card]] = defaultdict(list)
-        for card in (*self.cards, *self.disabled, *self.included):
+        for card in self._all:
             found[card.file].append(card)
         for cards in found.values():
             cards.sort(key=lambda card: card.line)
@@ -135,6 +140,8 @@ class _Reader:
             name, suffix = _keyword(block.head)
             if name == "KEYWORD" and (found := _LONG.search(block.head)):
                 width = LONG if found[1].upper() == "Y" else STANDARD
+                if not context.chain:
+                    self.deck.long = width == LONG
             own = LONG if "+" in suffix else STANDARD if "-" in suffix else width
             self.take(Card(name, block, context.scope.as_of_now(), own, context.transform), context, width)
 

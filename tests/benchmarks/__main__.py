@@ -116,6 +116,17 @@ def deck_ratio(*, numbered: bool) -> float:
         return ratio(lambda: ours(path), lambda: deck.line_loop(path), _ROUNDS)
 
 
+def check_ratio() -> float | None:
+    """Checking a 50 MB deck over parsing it with dynars; None where that is not installed."""
+    from tests.benchmarks import deck
+
+    parse = deck.dynars_parser()
+    if parse is None:
+        return None
+    with deck.large_deck() as path:
+        return ratio(lambda: deck.check(path), lambda: parse(path), _ROUNDS)
+
+
 def deck_memory() -> float:
     """Memory that it takes [MB]."""
     from tests.benchmarks import deck
@@ -153,6 +164,7 @@ ROWS = (
     Row("  alternating call by call, in memory just freed", lambda: integration_ratio(repeats=1)),
     Row("cards of a 50 MB deck / loop over its lines", lambda: deck_ratio(numbered=False), most=1 / 3),
     Row("  with the number of each card's line", lambda: deck_ratio(numbered=True)),
+    Row("check of a 50 MB deck / dynars.parse_deck", check_ratio),
     Row("  memory for the cards [MB]", deck_memory, most=32.0),
     Row("check / import click: processes", lambda: process_ratio("click", *CHECK)),
     Row("loop over lines / glstat, 1e5 states", reading("glstat_to_loop"), least=8.0),

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import tracemalloc
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from d2rpick.deck import find_windows, read_deck, read_parts, read_switching
+from d2rpick.rules import check_deck
 from d2rpick.rules.example_decks import BACK, HEAD, PARTS, THERE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 NODES = ELEMENTS = 408_321
 MEGABYTE = 1e6
@@ -53,6 +55,25 @@ def find_cards(path: Path) -> None:
 def number_cards(path: Path) -> None:
     """Find the cards and count the lines to each."""
     assert [card.line for card in read_deck(str(path)).cards][-1] == 2 * NODES + 22
+
+
+def check(path: Path) -> None:
+    """Read the deck and apply all rules."""
+    assert [window.td for window in check_deck(str(path)).windows] == [0.09]
+
+
+def dynars_parser() -> Callable[[Path], None] | None:
+    """Give the parser of dynars, which finds the keywords and the first rows of their cards; None without it."""
+    try:
+        parse_deck = import_module("dynars").parse_deck
+    except ImportError:
+        return None
+
+    def parse(path: Path) -> None:
+        found = parse_deck(str(path)).keywords("DEFORMABLE_TO_RIGID_AUTOMATIC")
+        assert [card.field("time1") for card in found] == [0.02, 0.09]
+
+    return parse
 
 
 def memory() -> float:

@@ -1,0 +1,186 @@
+"""A deck with switching cards in it: a copy in another folder, ready to be run."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from d2rpick.deck import radioss
+from d2rpick.deck.parts import read_parts
+from d2rpick.deck.radioss.blocks import blocks, keyword
+from d2rpick.deck.radioss.engine import read_legs
+from d2rpick.deck.reader import read_deck
+from d2rpick.deck.source import SourceFile
+from d2rpick.deck.switching import read_switching
+from d2rpick.deck.windows import find_windows
+from d2rpick.errors import DeckError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.deck.printing.common import PrintedCard
+    from d2rpick.deck.radioss.engine import Leg
+    from d2rpick.deck.reader import Deck
+    from d2rpick.deck.source import Block
+
+_ONCE = {"INIV", "END"}  # engine keywords that a later leg must not repeat: velocities are set at its start again
+
+
+def write_deck(main: str, card: PrintedCard, folder: str, *, overwrite: bool = False) -> list[str]:
+    """Write a deck with printed cards into a folder.
+
+    LS-DYNA: the main file, byte for byte but for one ``*INCLUDE`` of the cards before ``*END``, the cards, and the
+    files that the deck includes from its own folder and below.  Radioss: the starter deck and its includes, and the
+    engine files of the legs, each with the further keywords of the run's only engine file.
+
+    Parameters
+    ----------
+    main : str
+        The main deck, or a file of the Radioss run without switching.
+    card : PrintedCard
+        What `d2rpick.deck.printing.cards` gave for its solver.
+    folder : str
+        Another folder than that of the deck; made where it does not exist.
+    overwrite : bool
+        Replace files that exist.
+
+    Returns
+    -------
+    list of str
+        The files written, the main deck first.
+
+    Raises
+    ------
+    DeckError
+        If the deck switches one of these parts already, uses the id of a switch set, or includes what would not be
+        found from ``folder``; if a file exists; if the card is one for another solver.
+    """
+    files = dict(_radioss(main, card) if radioss.run_files(main) else _ls_dyna(main, card))
+    place = Path(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        if place.samefile(Path(main).parent):
+            raise DeckError(f"{folder}: this is the folder of the deck; name another one")
+        for name in files:
+            if (place / name).exists() and not overwrite:
+                raise DeckError(f"{place / name}: the file exists; name another folder, or let it be replaced")
+        for name, content in files.items():
+            _put(place / name, content)
+    except OSError as error:
+        raise DeckError(f"{error.filename or folder}: cannot be written ({error.strerror})") from None
+    return [str(place / name) for name in files]
+
+
+def _put(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    scratch = path.with_name(f".{path.name}.part")
+    try:
+        scratch.write_bytes(content)
+        scratch.replace(path)
+    finally:
+        scratch.unlink(missing_ok=True)
+
+
+def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
+    deck, printed = read_deck(main), read_deck("the card", card.text.encode())
+    if len(card.files) != 1 or not read_switching(printed):
+        raise DeckError(f"{main}: an LS-DYNA deck, but the card is one for another solver")
+    _refuse_switched(deck, printed)
+    ((name, text),) = card.files.items()
+    if deck.long:
+        text = text.replace("_AUTOMATIC\n", "_AUTOMATIC-\n")  # the minus keeps its fields 10 columns wide
+    yield Path(main).name, _with_include(main, name)
+    yield name, text.encode()
+    yield from _copies(deck.files[1:], main, {name, Path(main).name})
+
+
+def _refuse_switched(deck: Deck, printed: Deck) -> None:
+    """Raise DeckError where the deck switches a part of the printed cards, or has one of their switch sets."""
+    sets, mine = read_switching(deck), read_switching(printed)
+    parts = {line.part.value for one in mine for line in one.switched}
+    for event in find_windows(sets, read_parts(deck)).events:
+        if event.unit.is_set or event.unit.id in parts:
+            place = event.by.card
+            what = f"{event.unit.kind} {event.unit.id}"
+            raise DeckError(f"{place.file}:{place.line}: the deck switches {what} already; remove this card first")
+    ids = {one.header.swset.value for one in mine if one.header}
+    for one in sets:
+        if one.header and one.header.swset.value in ids:
+            place = one.card
+            found = f"{place.file}:{place.line}: switch set {one.header.swset.value} is one of the cards to be added"
+            raise DeckError(f"{found}; print them with other ids")
+
+
+def _with_include(main: str, name: str) -> bytes:
+    """Insert the include into the bytes of the main file: before ``*END``, else at its end."""
+    content = Path(main).read_bytes()
+    newline = b"\r\n" if b"\r\n" in content else b"\n"
+    last = list(SourceFile(main).blocks())[-1]
+    at = len(content) if last.end is None else content.rfind(b"\n", 0, last.end) + 1
+    before = content[:at]
+    if before and not before.endswith(b"\n"):
+        before += newline
+    return before + newline.join([b"*INCLUDE", name.encode(), b""]) + content[at:]
+
+
+def _copies(files: Sequence[str], main: str, taken: set[str]) -> Iterator[tuple[str, bytes]]:
+    """Files below the folder of the deck, by their relative names; others must be named by an absolute path."""
+    base = os.path.abspath(Path(main).parent)  # noqa: PTH100 - resolve() would follow links to elsewhere
+    for file in dict.fromkeys(files):
+        relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100
+        if not relative.startswith(os.pardir):
+            if relative in taken:
+                raise DeckError(
+                    f"{file}: the deck includes a file of the name {relative!r}, that of the cards; rename it"
+                )
+            yield relative, Path(file).read_bytes()
+        elif os.path.normpath(file) != file or not Path(file).is_absolute():
+            raise DeckError(f"{file}: included from outside the folder of the deck by a relative path; copy it there")
+
+
+def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
+    run = radioss.read_run(main)
+    printed = [leg for text in card.files.values() for leg in read_legs(SourceFile("the card", text.encode()))]
+    if not printed:
+        raise DeckError(f"{main}: a Radioss run, but the card is one for another solver")
+    if run.starter is None or len(run.legs) != 1:
+        found = "no starter deck" if run.starter is None else f"{len(run.legs)} engine files"
+        raise DeckError(f"{main}: the run has {found}; its starter deck and one engine file were expected")
+    (leg,) = run.legs
+    _refuse_other_run(leg, printed)
+    starter = run.starter.sources[0].name
+    yield Path(starter).name, Path(starter).read_bytes()
+    further = list(blocks(leg.run.block.source))
+    for (name, text), mine in zip(card.files.items(), printed, strict=True):
+        kept = (_text(block) for block in further if _repeated(keyword(block), mine))
+        yield name, text.encode() + b"".join(kept)
+    yield from _copies([one.name for one in run.starter.sources[1:]], starter, {Path(starter).name, *card.files})
+
+
+def _refuse_other_run(leg: Leg, printed: Sequence[Leg]) -> None:
+    if printed[0].name != leg.name:
+        raise DeckError(
+            f"the card is one for run {printed[0].name!r}, the run is {leg.name!r}; print it with that name"
+        )
+    nodes = {node.value for one in printed for _, _, ids in one.switched for node in ids}
+    for card, rigid, ids in leg.switched:
+        if rigid and (known := nodes & {node.value for node in ids}):
+            found = f"{card.file}:{card.line}: the run switches main node {min(known)} already"
+            raise DeckError(f"{found}; remove it from this /RBODY/ON first")
+
+
+def _repeated(words: tuple[str, ...], leg: Leg) -> bool:
+    """Whether a leg repeats a keyword of the run's engine file."""
+    if not words or words[0] == "RUN" or words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
+        return False
+    if words[0] == "DTIX":
+        return leg.cap is None
+    return leg.number == 1 or words[0] not in _ONCE
+
+
+def _text(block: Block) -> bytes:
+    source = block.source
+    content = b"".join(source.lines_from(block.start)) if block.end is None else source.read(block.start, block.end)
+    return content if content.endswith(b"\n") else content + b"\n"

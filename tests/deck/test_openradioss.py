@@ -1,0 +1,119 @@
+"""Printed engine files in the hands of the real solver: they run to the end, and the parts are rigid in the window.
+
+Runs only where OPENRADIOSS_PATH names an installation of OpenRadioss; takes some seconds.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from d2rpick.deck.printing import cards
+from d2rpick.deck.printing.common import Printing
+from d2rpick.deck.writing import write_deck
+from d2rpick.histories.opening import Selection, open_run
+from d2rpick.rules import check_deck
+
+MAIN, END = 99, 0.02
+ENGINE = f"""\
+/RUN/strip/1
+{END}
+/VERS/2022
+/DT
+0.9 0.0
+/RBODY/OFF
+{MAIN}
+/INIV/TRA/Z/2
+5.0
+2
+/TFILE/4
+2e-05
+/PRINT/-1000
+"""
+
+
+def row(*values: float | str, width: int = 10) -> str:
+    return "".join(f"{value:>{width}}" for value in values) + "\n"
+
+
+def starter() -> str:
+    """A strip of four shells, one end of which is given a velocity; SI units."""
+    wide = 20
+    nodes = [(2 * i + j + 1, 0.1 * i, 0.1 * j) for i in range(5) for j in range(2)]
+    text = f"#RADIOSS STARTER\n/BEGIN\nstrip\n{row(2022, 0)}" + 2 * row("kg", "m", "s", width=wide)
+    text += f"/TITLE\nstrip of shells\n/MAT/ELAST/1\nsteel\n{row(7850.0, width=wide)}{row(2.1e11, 0.3, width=wide)}"
+    text += f"/PROP/SHELL/1\nshell\n{row(24, 0, 0, 0)}{row(*5 * [0.0], width=wide)}"
+    text += f"{row(3, 0)[:-1]}{row(0.002, 0.0, width=wide)[:-1]}{'':10}{row(1, 1)}"
+    text += f"/PART/1\nstrip\n{row(1, 1)}/NODE\n"
+    text += "".join(row(node)[:-1] + row(x, y, 0.0, width=wide) for node, x, y in nodes)
+    text += row(MAIN)[:-1] + row(0.2, 0.05, 0.01, width=wide)
+    text += "/SHELL/1\n" + "".join(row(i + 1, 2 * i + 1, 2 * i + 3, 2 * i + 4, 2 * i + 2) for i in range(4))
+    text += f"/GRNOD/NODE/1\nstrip\n{row(*(node for node, _, _ in nodes))}/GRNOD/NODE/2\nend\n{row(1, 2)}"
+    text += f"/RBODY/1\nstrip\n{row(MAIN, 0, 0, 0)[:-1]}{row(0.0, width=wide)[:-1]}{row(1, 0, 0, 0)}"
+    text += 2 * row(0.0, 0.0, 0.0, width=wide) + row(0, 0, 0)
+    return text + f"/TH/PART/1\nparts\nDEF       MASS\n{row(1)}/END\n"
+
+
+def solve(folder: Path, name: str) -> None:
+    """Run the starter and all engine files; the test is skipped where there is no solver."""
+    home = os.environ.get("OPENRADIOSS_PATH")
+    if not home:
+        pytest.skip("OPENRADIOSS_PATH names no installation of OpenRadioss; set it to run the printed cards")
+    programs = [
+        path
+        for kind in ("starter", "engine")
+        for path in (Path(home, "bin", f"{kind}_gf"), Path(home, "exec", f"{kind}_linux64_gf"))
+        if path.exists()
+    ]
+    assert len(programs) == 2, f"no starter and engine in {home}"
+    libraries = os.pathsep.join(str(Path(home, part)) for part in ("exec", "syslib", "extlib/hm_reader/linux64"))
+    environment = {
+        **os.environ, "RAD_CFG_PATH": str(Path(home, "hm_cfg_files")), "LD_LIBRARY_PATH": libraries,
+        "OMP_STACKSIZE": "400m", "OMP_NUM_THREADS": "1",
+    }  # fmt: skip
+    calls = [(programs[0], ["-i", f"{name}_0000.rad", "-np", "1", "-nt", "1"])]
+    calls += [(programs[1], ["-i", path.name, "-nt", "1"]) for path in sorted(folder.glob(f"{name}_000[1-9].rad"))]
+    for program, arguments in calls:
+        script = 'ulimit -s unlimited; exec "$@"'
+        result = subprocess.run(
+            ["bash", "-c", script, "bash", str(program), *arguments],
+            cwd=folder, env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        ended = ("NORMAL TERMINATION", "TERMINATION WITH WARNING")
+        assert any(words in result.stdout for words in ended), result.stdout[-2000:] + result.stderr
+
+
+@pytest.mark.parametrize(
+    ("windows", "vibrates"),
+    [([(0.004, 0.012)], True), ([(0.003, 0.006), (0.009, 0.014)], True), ([(0.0, 0.005)], False)],
+    ids=["one", "two", "from 0: then nothing ever deforms the strip"],
+)
+def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
+    tmp_path: Path, windows: list[tuple[float, float]], vibrates: bool
+) -> None:
+    reference, switched = tmp_path / "reference", tmp_path / "switched"
+    reference.mkdir()
+    (reference / "strip_0000.rad").write_text(starter())
+    (reference / "strip_0001.rad").write_text(ENGINE)
+    card = cards(windows, Printing(node=(MAIN,), end=END, name="strip"), "radioss")
+    main, *legs = write_deck(str(reference / "strip_0000.rad"), card, str(switched))
+    checked = check_deck(main)
+    assert checked.findings == ()
+    assert [(window.part, window.tr, window.td) for window in checked.windows] == [(1, *times) for times in windows]
+    solve(switched, "strip")
+    histories = sorted(map(str, switched.glob("stripT0?")))
+    assert len(histories) == len(legs)
+    history = open_run(histories).history(Selection(parts=("1",)))
+    assert history.time[-1] == pytest.approx(END, abs=4e-5)
+    inside = np.zeros(history.time.size, dtype=bool)
+    for tr, td in windows:
+        held = (history.time > tr + 4e-5) & (history.time < td - 4e-5)
+        assert held.sum() > 50
+        assert np.ptp(history.energy[held]) <= 1e-9 * history.energy.max()  # what is locked in stays as it is
+        inside |= held
+    assert bool(np.ptp(history.energy[~inside]) > 0.5 * history.energy.max()) == vibrates
+    assert (history.energy.max() > 0.1) == vibrates  # [J]

@@ -1,0 +1,138 @@
+"""Decks written with cards in them: nothing else changes, and what is there is never lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from d2rpick.deck.printing import cards
+from d2rpick.deck.printing.common import Printing
+from d2rpick.deck.writing import write_deck
+from d2rpick.errors import DeckError
+from d2rpick.rules import RULES, check_deck
+from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE
+from tests.decks import write
+
+WINDOWS = [(0.02, 0.09), (0.1, 0.15)]
+CARD = cards(WINDOWS, Printing(part=(1,)))
+INCLUDE = "*INCLUDE\nswitches.k\n"
+RUN = RULES["D2R401"].passing[0]
+
+
+def windows(path: str) -> list[tuple[int, float, float | None]]:
+    checked = check_deck(path)
+    assert [finding for finding in checked.findings if finding.severity != "info"] == []
+    return [(window.unit.id, window.tr, window.td) for window in checked.windows]
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+@pytest.mark.parametrize("end", [END, "", "  *END\nleft over\n", "*end"])
+def test_the_deck_is_the_same_but_for_one_include(tmp_path: Path, end: str, newline: str) -> None:
+    before, after = ((HEAD + PARTS).replace("\n", newline), end.replace("\n", newline))
+    main = write(tmp_path, (before + after).encode())
+    written, switches = write_deck(main, CARD, str(tmp_path / "next"))
+    assert Path(written).read_bytes() == (before + INCLUDE.replace("\n", newline) + after).encode()
+    assert Path(switches).read_text() == CARD.text
+    assert windows(written) == [(1, tr, td) for tr, td in WINDOWS]
+
+
+def test_a_last_line_without_end_is_ended(tmp_path: Path) -> None:
+    written, _ = write_deck(write(tmp_path, (HEAD + PARTS).rstrip("\n")), CARD, str(tmp_path / "next"))
+    assert Path(written).read_text() == HEAD + PARTS + INCLUDE
+
+
+def test_a_deck_in_long_format_gets_cards_that_are_not(tmp_path: Path) -> None:
+    deck = "*KEYWORD LONG=Y\n*PART\ndoor\n" + f"{1:20d}{1:20d}{1:20d}\n" + END
+    written, _ = write_deck(write(tmp_path, deck), CARD, str(tmp_path / "next"))
+    assert [(w.part, w.tr, w.td) for w in check_deck(written).windows] == [(1, tr, td) for tr, td in WINDOWS]
+
+
+def test_included_files_go_with_the_deck(tmp_path: Path) -> None:
+    main = write(tmp_path, HEAD + "*INCLUDE\nparts/all.k\n" + END, {"parts/all.k": PARTS})
+    written = write_deck(main, CARD, str(tmp_path / "next"))
+    assert [Path(name).name for name in written] == ["main.k", "switches.k", "all.k"]
+    assert windows(written[0]) == [(1, tr, td) for tr, td in WINDOWS]
+
+
+def refused(tmp_path: Path, deck: str, message: str, files: dict[str, str] | None = None) -> None:
+    main = write(tmp_path, deck, files)
+    with pytest.raises(DeckError, match=message):
+        write_deck(main, CARD, str(tmp_path / "next"))
+    assert not list((tmp_path / "next").glob("*"))
+
+
+def test_what_cannot_be_written_is_refused_before_anything_is(tmp_path: Path) -> None:
+    refused(tmp_path, GOOD, r"main.k:14: the deck switches part 1 already")
+    refused(
+        tmp_path,
+        HEAD
+        + PARTS
+        + THERE.replace("         1         0  ", "       901         0  ", 1).replace(
+            "         1         0      PART", "         2         0      PART"
+        )
+        + END,
+        "switch set 901",
+    )
+    refused(tmp_path, HEAD + "*INCLUDE\nswitches.k\n" + END, "of the name 'switches.k'", {"switches.k": PARTS})
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "parts.k").write_text(PARTS)
+    refused(tmp_path / "deep", HEAD + "*INCLUDE\n../parts.k\n" + END, "outside the folder")
+
+
+def test_nothing_is_replaced_without_being_told(tmp_path: Path) -> None:
+    main = write(tmp_path, HEAD + PARTS + END)
+    folder = tmp_path / "next"
+    write_deck(main, CARD, str(folder))
+    (folder / "switches.k").write_text("mine")
+    with pytest.raises(DeckError, match=r"main.k: the file exists"):
+        write_deck(main, CARD, str(folder))
+    assert (folder / "switches.k").read_text() == "mine"
+    write_deck(main, CARD, str(folder), overwrite=True)
+    assert (folder / "switches.k").read_text() == CARD.text
+    with pytest.raises(DeckError, match="the folder of the deck"):
+        write_deck(main, CARD, str(tmp_path), overwrite=True)
+
+
+# Radioss.
+
+
+ENGINE = "/RUN/box/1\n 0.4\n/VERS/2022\n/RBODY/OFF\n1808\n/INIV/TRA/X/2\n6.0\n2\n/TFILE/4\n1e-5\n/DTIX\n1e-6 1e-4\n"
+
+
+def radioss_run(folder: Path, engine: str = ENGINE) -> str:
+    folder.mkdir(exist_ok=True)
+    (folder / "box_0001.rad").write_text(engine)
+    return write(folder, RUN.deck, name=RUN.name)
+
+
+def test_a_run_gets_the_legs_with_its_own_keywords(tmp_path: Path) -> None:
+    card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name="box"), "radioss")
+    starter, *legs = write_deck(radioss_run(tmp_path / "ref"), card, str(tmp_path / "next"))
+    assert Path(starter).read_text() == RUN.deck
+    assert windows(starter) == [(1, tr, td) for tr, td in WINDOWS]
+    texts = [Path(leg).read_text() for leg in legs]
+    assert ["/INIV" in text for text in texts] == [True, False, False, False, False]
+    assert all("/TFILE/4\n1e-5\n" in text and "/VERS/2022" in text for text in texts)
+    assert all(text.count("/DTIX") == text.count("/RUN") == 1 for text in texts)
+
+
+@pytest.mark.parametrize(
+    ("engine", "name", "message"),
+    [
+        (ENGINE.replace("OFF", "ON"), "box", "switches main node 1808 already"),
+        (ENGINE, "other", "run 'other', the run is 'box'"),
+    ],
+)
+def test_a_run_that_does_not_suit_is_refused(tmp_path: Path, engine: str, name: str, message: str) -> None:
+    card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name=name), "radioss")
+    with pytest.raises(DeckError, match=message):
+        write_deck(radioss_run(tmp_path / "ref", engine), card, str(tmp_path / "next"))
+
+
+def test_the_card_is_one_for_the_solver_of_the_deck(tmp_path: Path) -> None:
+    with pytest.raises(DeckError, match="another solver"):
+        write_deck(radioss_run(tmp_path / "ref"), CARD, str(tmp_path / "next"))
+    card = cards(WINDOWS, Printing(node=(1808,), end=0.4), "radioss")
+    with pytest.raises(DeckError):
+        write_deck(write(tmp_path, HEAD + PARTS), card, str(tmp_path / "next"))
