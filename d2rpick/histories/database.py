@@ -146,7 +146,8 @@ class Legs:
     @cached_property
     def channels(self) -> tuple[str, ...]:
         """Columns that all legs have."""
-        return tuple(n for n in self._legs[0].channels if all(n in leg.channels for leg in self._legs))
+        others = [{*leg.channels} for leg in self._legs[1:]]
+        return tuple(name for name in self._legs[0].channels if all(name in names for names in others))
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:

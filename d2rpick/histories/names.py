@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -51,7 +51,8 @@ _SOME_INTERNAL = re.compile(r"(?i:internal|allie|inten)|(?<![A-Z])IE(?![A-Za-z])
 _OTHER = re.compile(
     r"(?i:kinetic|kinen|\ball(?:ke|pd|se|ae|wk|fd|vd|cd|dmd|mw)|etotal|total.?energy|hourglass|hgeng|eroded"
     r"|dissipat|plastic|damping|sliding|contact|friction|external|work|stonewall|rigidwall"
-    r"|accel|veloc|displac|moment|force|pressure|mass|time.?step)|(?<![A-Z])KE(?![A-Z])"
+    r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
+    r"|(?<![A-Z])KE(?![A-Z])"
 )
 
 
@@ -126,6 +127,16 @@ def quantity_note(channel: str) -> tuple[str, ...]:
     return (f"{channel!r} is no internal energy by its name ({word[0]}); it was taken as it is",)
 
 
+def refuse_other_quantity(channel: str, where: str) -> None:
+    """FormatError if the only column or curve of a file is called something else than an internal energy."""
+    word = _OTHER.search(channel)
+    if word:
+        raise FormatError(
+            f"{where}: the only values are {channel!r}, by this name no internal energy ({word[0]}); "
+            "choose with --energy what to take for it"
+        )
+
+
 def resolve(wanted: str, known: Sequence[str], where: str) -> str:
     """Find the name that is meant: as it stands, in other case, or but for blanks, underscores and units.
 
@@ -173,4 +184,4 @@ def plain_text(raw: bytes) -> str:
 def listing(names: Sequence[object], most: int = 20) -> str:
     """Names for a message, cut where it would fill the screen."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(map(str, names[:most])) + more
+    return printable(", ".join(map(str, names[:most]))) + more

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import pytest
 
 from d2rpick.errors import FormatError
+from d2rpick.histories.opening import Selection
 from tests.reading import read_history
 
 FOLDER = Path(os.environ.get("D2RPICK_REAL_FILES", Path(__file__).parents[3] / "shared" / "real")) / "histories"
@@ -28,6 +29,7 @@ FOLDER = Path(os.environ.get("D2RPICK_REAL_FILES", Path(__file__).parents[3] / "
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no real files in {FOLDER}; set D2RPICK_REAL_FILES")
 
 
+LONE = ("2",)  # column or curve of another quantity, taken only when it is asked for
 FLOOR = 1.999999936531045e-20  # 2e-20 in single precision
 
 
@@ -36,6 +38,7 @@ class Readable(NamedTuple):
     states: int
     first_middle_last: tuple[tuple[float, float], ...]  # time, energy
     notes: tuple[str, ...] = ()  # what each of its notes speaks of
+    energy: tuple[str, ...] = ()  # what has to be asked for: refused without
 
 
 READABLE = {
@@ -46,38 +49,38 @@ READABLE = {
     "FV_crashworthiness__DRI-OLD_LSDYNA-z_acc_filtered.csv": Readable(
         "A8874: Z-acceleration", 152,
         ((0.0, -81362.117188), (0.075999438763, 162256.60938), (0.15000039339, -255236.17188)),
-        ("no internal energy by its name",),
+        ("no internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__DRI-OLD_LSDYNA-z_acc_totfloor.csv": Readable(
         "A2: Z-Rigid Body Acceleration", 126,
         ((0.0, -9623.0292969), (0.06299957633, 123345.07812), (0.12499960512, -878.76928711)),
-        ("no internal energy by its name",),
+        ("no internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__DRI-OLD_LSDYNA-z_accel_1.csv": Readable(
         "Z-acceleration", 152, ((0.0, 39466.921875), (0.075999461114, 157388.57812), (0.15000037849, 67724.9375)),
-        ("no internal energy by its name",),
+        ("no internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__F28_validation-e=0-4frames-ALLKE_Global.csv": Readable(
         "Energy(J): XY-History ALLKE(Scalar).1/ALLKE", 61, ((0.0, 38764.8), (0.150001, 1273.01), (0.3, 303.246)),
-        ("no internal energy by its name",),
+        ("no internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__F28_validation-e=0_energies-ALLPD_Frames.csv": Readable(
         "Energy(J): ALLPD_frames/ALLPD/INP2SIM_ELSET_ASSEMBLY_PART-1-1_FRAMES-1/", 301,
         ((0.0, 0.0), (0.150001, 16961.8), (0.3, 16995.3)),
-        ("no internal energy by its name",),
+        ("no internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__mesh_convergence-050x-ALLPD_Skin.csv": Readable(
         "Energy(J): ALLPD_Skin/ALLPD/INP2SIM_ELSET_ASSEMBLY_PART-1-1_SKIN-1/", 61,
         ((0.0, 0.0), (0.150001, 1668.28), (0.3, 1671.43)),
-        ("no internal energy by its name",),
+        ("no internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__ovalization_study-e=070-ALLKE_Global.csv": Readable(
         "Energy(J): ALLKE_Global/ALLKE", 61, ((0.0, 49697.8), (0.150001, 1941.81), (0.3, 787.411)),
-        ("no internal energy by its name",),
+        ("no internal energy by its name",), LONE,
     ),
     "Masters-Project__Steel_Explicit-Kinetic_Energy": Readable(
         "Kinetic Energy", 101, ((0.0, 0.0), (0.02499989979, 0.00057965097949), (0.049999900162, 0.00053615897195)),
-        ("no internal energy by its name",),
+        ("no internal energy by its name",), ("1",),
     ),
     "Masters-Project__Steel_Explicit-glstat.head16000": Readable(
         "internal energy", 17, ((0.0, 2e-20), (0.00399979, 0.330105), (0.0079998, 1.31465)),
@@ -246,7 +249,10 @@ REFUSED = {
 @pytest.mark.parametrize("file", READABLE)
 def test_read(file: str) -> None:
     expected = READABLE[file]
-    history = read_history([str(FOLDER / file)])
+    if expected.energy:
+        with pytest.raises(FormatError, match="by this name no internal energy"):
+            read_history([str(FOLDER / file)])
+    history = read_history([str(FOLDER / file)], Selection(energy=expected.energy))
     assert (history.channel, history.time.size) == (expected.channel, expected.states)
     states = list(zip(history.time.tolist(), history.energy.tolist(), strict=True))
     digits = {"radioss-th": 1e-6, "matsum": 1e-15}.get(history.format, 0.0)  # sums depend on their order
@@ -268,3 +274,33 @@ def test_refused(file: str) -> None:
 
 def test_no_file_is_left_out() -> None:
     assert {file.name for file in FOLDER.iterdir()} == {*READABLE, *REFUSED}
+
+
+# Tables among the files beside them, and what is said of each.
+MORE = {
+    "FV_crashworthiness__DRI-OLD_LSDYNA-z_many.csv": "'Z-acceleration', by this name no internal energy",
+    "FV_crashworthiness__F28_validation-plot-data.csv": r":14: time steps back from 12\.011 to 0\.967",
+    "FV_crashworthiness__ovalization_study-e=030-AT3_Floor.csv": ":303: a second header, another curve begins here",
+    "Masters-Project__Steel_Implicit-Energy_Ratio.head6": "'Energy Ratio', by this name no internal energy",
+    "luchete80__radioss_tutorials-test-testT01.ascii": "a time history of Radioss as text",
+}
+PAIRS = {
+    "UMAT_2scale_LSDYNA__curve.txt": (300, (0.0, 4e7), (4.2000001606841885e-06, 42607482.295758456)),
+    "UMAT_2scale_LSDYNA__stress_x_av.csv": (24, (0.0, 922.56408691), (0.50034189224, 667.45178223)),
+}
+
+
+@pytest.mark.parametrize("file", MORE)
+def test_tables_that_hold_no_energy_are_refused(file: str) -> None:
+    with pytest.raises(FormatError, match=MORE[file]):
+        read_history([str(FOLDER.with_name("more-histories") / file)])
+
+
+@pytest.mark.parametrize("file", PAIRS)
+def test_pairs_with_a_count_are_read(file: str) -> None:
+    states, first, second = PAIRS[file]
+    history = read_history([str(FOLDER.with_name("more-histories") / file)])
+    assert history.time.size == states
+    assert list(zip(history.time[:2].tolist(), history.energy[:2].tolist(), strict=True)) == [first, second]
+    assert not history.notes
+    assert history.complete

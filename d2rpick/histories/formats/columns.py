@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.names import internal_energies, is_time, listing, near_miss, normalised
+from d2rpick.histories.names import internal_energies, is_time, listing, near_miss, normalised, refuse_other_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -16,10 +17,11 @@ if TYPE_CHECKING:
 def labelled(layout: Layout, time: int) -> dict[str, int]:
     """Columns beside the time by the name they are called by, with their number where a name is not theirs alone."""
     names = [layout.channel(column) for column in range(layout.trusted)]
+    bearers, times = Counter(names), {time, *own_times(layout)}
     return {
-        name if names.count(name) == 1 else f"{name} (column {column + 1})": column
+        name if bearers[name] == 1 else f"{name} (column {column + 1})": column
         for column, name in enumerate(names)
-        if column != time and column not in own_times(layout)
+        if column not in times
     }
 
 
@@ -50,8 +52,10 @@ def time_column(source: str, layout: Layout, wanted: str | None, energies: Seque
 
 def internal_energy(source: str, layout: Layout, times: Sequence[int]) -> int:
     """Pick the only column beside the times, or else the one named like an internal energy."""
-    beside = [column for column in range(layout.columns) if column not in times]
+    apart = {*times}
+    beside = [column for column in range(layout.columns) if column not in apart]
     if len(beside) == 1:
+        refuse_other_quantity(layout.channel(beside[0]), source)
         return beside[0]
     sure = [column for column in beside if column < layout.trusted]
     named = [sure[i] for i in internal_energies([layout.name(column) for column in sure])]

@@ -1,80 +1,108 @@
 """Curves one after the other in one text, each with times of its own: what pre- and postprocessors export.
 
 LS-PrePost's Curveplot: a head of word, title, x label, y label; for each curve ``name #pts=number``, lines with a star,
-pairs of numbers and ``endcurve``.  T/HIS ``.cur``: title, x label, y label, name and pairs, ``CONTINUE`` between
-curves, comments with a dollar.  DYNAFORM: the number of curves; for each ``number 'name'`` and pairs.
+pairs of numbers and ``endcurve``.  LS-PrePost's XY pairs: a line with the number of pairs, then these.  T/HIS ``.cur``:
+title, x label, y label, name and pairs, ``CONTINUE`` between curves, comments with a dollar.  DYNAFORM: the number of
+curves; for each ``number 'name'`` and pairs.
 """
 
 from __future__ import annotations
 
 import re
+from array import array
+from collections import Counter
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from functools import cached_property
+from itertools import chain, islice
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.layout import as_number
-from d2rpick.histories.names import internal_energies, is_time, listing, resolve, unit_of
+from d2rpick.histories.formats.order import not_a_restart
+from d2rpick.histories.names import internal_energies, is_time, listing, refuse_other_quantity, resolve, unit_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
+    from d2rpick.histories.formats.text import Text
     from d2rpick.histories.history import Part, Precision, Samples
     from d2rpick.histories.selection import Selection
 
-_POINTS = re.compile(r"(.*?)\s*#pts=\s*(\d+)\s*")
-_DYNAFORM = re.compile(r"\s*\d+\s+'([^']*)'\s*")
+_POINTS: Final = "#pts="
+_DYNAFORM: Final = re.compile(r"\s*\d+\s+'([^']*)'\s*")
+_MOST_DIGITS: Final = 12  # no file has more pairs than such a number says
 
 
 @dataclass
 class _Curve:
-    """Name of a curve and its pairs, as cells, with the numbers of their lines."""
+    """Name of a curve, its pairs as cells, and the numbers of their lines."""
 
     name: str
-    cells: list[list[str]] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)
+    times: list[str] = field(default_factory=list)
+    values: list[str] = field(default_factory=list)
+    lines: array[int] = field(default_factory=lambda: array("q"))
 
 
-def find_curves(source: str, lines: Sequence[str], unended: str, selection: Selection) -> Curves | None:
-    """Read a text of curves; None for any other.
-
-    Parameters
-    ----------
-    source : str
-        Name for messages.
-    lines : sequence of str
-        The lines that have an end.
-    unended : str
-        The last line when it has none, else empty.
-    selection : Selection
-        The curves that are asked for, whose times are the times of the run.
-    """
-    for read in (_curveplot, _t_his, _dynaform):
-        text = _Text(source, [*lines, unended])
-        if read(text):
-            return Curves(text, bool(unended.strip()), selection)
-    return None
+def find_curves(text: Text, selection: Selection) -> Curves | None:
+    """Read a text of curves, those whose times are asked for first by the selection; None for any other text."""
+    found = _Found(text)
+    read = next((read for read in (_curveplot, _t_his, _dynaform, _counted) if read(found)), None)
+    return Curves(found, selection) if read else None
 
 
-class _Text:
-    """Lines of a text and the curves that were found in it."""
+class _Found:
+    """What was found in a text: curves, the label of their x axis, and what it stops inside of."""
 
-    def __init__(self, source: str, lines: Sequence[str]) -> None:
-        self.source = source
-        self.lines = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and line[0] != "$"]
+    def __init__(self, text: Text) -> None:
+        self.source, self._text = text.name, text
+        self.unended = bool(text.unended.strip())
         self.curves: list[_Curve] = []
         self.x_label = ""
-        self.stops = ""  # what the file stops inside of, if it does
+        self.stops = ""
+        self.last = 0  # number of the last line
+
+    def top(self, count: int) -> list[str]:
+        """The first lines that are neither blank nor comments."""
+        rest = [self._text.unended] if self._text.is_short else []
+        return list(islice(filter(_counts, chain(self._text.head, rest)), count))
+
+    def lines(self) -> Iterator[tuple[int, str]]:
+        """All lines that are neither blank nor comments, numbered."""
+        for number, line in enumerate(self._text.lines(0), 1):
+            self.last = number
+            if _counts(line):
+                yield number, line
+        if _counts(self._text.unended):
+            self.last += 1
+            yield self.last, self._text.unended
 
     def add(self, number: int, line: str) -> None:
         """Add a pair to the last curve."""
         cells = line.replace(",", " ").split()
         if len(cells) != 2 or not self.curves:
             raise FormatError(f"{self.source}:{number}: {line.strip()[:60]!r}, a pair of numbers was expected")
-        self.curves[-1].cells.append(cells)
-        self.curves[-1].lines.append(number)
+        curve = self.curves[-1]
+        curve.times.append(cells[0])
+        curve.values.append(cells[1])
+        curve.lines.append(number)
+
+    def count(self, number: int, digits: str) -> int:
+        """Read how many pairs or curves a line announces."""
+        if len(digits) > _MOST_DIGITS:
+            raise FormatError(f"{self.source}:{number}: a count of {len(digits)} digits; the file is damaged")
+        return int(digits)
+
+    def close(self, number: int, expected: int) -> None:
+        """End the last curve; FormatError unless it has the pairs that were announced."""
+        found = len(self.curves[-1].times)
+        if found != expected:
+            raise FormatError(
+                f"{self.source}:{number}: {found} pairs, {expected} were expected in {self.stops}; export it again"
+            )
+        self.stops = ""
 
 
 class Curves:
@@ -84,19 +112,21 @@ class Curves:
     version = ""
     parts: tuple[Part, ...] = ()
 
-    def __init__(self, text: _Text, unended: bool, selection: Selection) -> None:
-        self.source, self.title = text.source, ""
-        self.time_unit = unit_of(text.x_label)
-        self._curves = _uniquely_named(text.curves)
+    def __init__(self, found: _Found, selection: Selection) -> None:
+        self.source, self.title = found.source, ""
+        self.time_unit = unit_of(found.x_label)
+        self._curves = _uniquely_named(found.curves)
         self.channels = tuple(self._curves)
-        notes = [f"the file stops inside {text.stops}"] if text.stops else []
-        if text.x_label and not is_time(text.x_label):
-            notes.append(f"the x axis is called {text.x_label!r}; it was taken for the time")
-        last = text.curves[-1]
-        if unended and last.cells and last.lines[-1] == text.lines[-1][0] and not _is_whole(last):
-            last.cells.pop()
+        notes = [f"the file stops inside {found.stops}"] if found.stops else []
+        if found.x_label and not is_time(found.x_label):
+            notes.append(f"the x axis is called {found.x_label!r}; it was taken for the time")
+        last = found.curves[-1]
+        cut = found.unended and bool(last.times) and last.lines[-1] == found.last and not _is_whole(last)
+        if cut:
+            for cells in (last.times, last.values, last.lines):
+                cells.pop()
             notes.append("the last line has no line end and may be cut; it was left out")
-        self.complete = not text.stops and not (notes and "may be cut" in notes[-1])
+        self.complete = not found.stops and not cut
         self.notes = tuple(notes)
         if selection.time is not None and not is_time(selection.time):
             raise FormatError(f"{self.source}: each curve has its own times; leave --time {selection.time!r} out")
@@ -111,6 +141,8 @@ class Curves:
             raise FormatError(
                 f"{self.source}: {found} named like an internal energy; choose with --energy: {self._menu()}"
             )
+        if len(self.channels) == 1:
+            refuse_other_quantity(self.channels[0], self.source)
         return self.channels[fitting[0]]
 
     def find(self, wanted: str) -> str:
@@ -119,10 +151,18 @@ class Curves:
             return self.channels[int(wanted) - 1]
         return resolve(wanted, self.channels, self.source)
 
-    @property
+    @cached_property
     def time(self) -> Samples:
         """Times of the curve that is asked for first, shape (n,) [time]."""
-        return self._values(self.find(self._asked[0]) if self._asked else self.energy_channel, 0)
+        name = self.find(self._asked[0]) if self._asked else self.energy_channel
+        time = self._numbers(name, "times")
+        state = not_a_restart(time)
+        if state is not None:
+            raise FormatError(
+                f"{self.source}:{self._curves[name].lines[state]}: time steps back from {time[state - 1]:g} to "
+                f"{time[state]:g} in {name!r}, increasing times or one restart were expected; sort the pairs"
+            )
+        return time
 
     @property
     def part_time(self) -> Samples:
@@ -133,9 +173,9 @@ class Curves:
         """Values of one curve, shape (n,); FormatError when its times are not those of the run."""
         if name not in self._curves:
             raise FormatError(f"{self.source}: no curve {name!r}, only {self._menu()}")
-        if not np.array_equal(self._values(name, 0), self.time):
+        if not np.array_equal(self._numbers(name, "times"), self.time):
             raise FormatError(f"{self.source}: {name!r} has other times than the first curve that is asked for")
-        return self._values(name, 1)
+        return self._numbers(name, "values")
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:  # noqa: ARG002  as a Database
         """Refused: curves are no parts."""
@@ -143,21 +183,22 @@ class Curves:
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """How finely the times and these curves were printed."""
-        cells = [self._curves[name].cells for name in names or self.channels[:1]]
-        return printed.precisions(
-            [pair[0] for curve in cells for pair in curve], [pair[1] for curve in cells for pair in curve], self.time
-        )
+        curves = [self._curves[name] for name in names or self.channels[:1]]
+        times = [cell for curve in curves for cell in curve.times]
+        values = [cell for curve in curves for cell in curve.values]
+        return printed.precisions(times, values, self.time)
 
-    def _values(self, name: str, axis: int) -> Samples:
+    def _numbers(self, name: str, axis: str) -> Samples:
         curve = self._curves[name]
-        numbers = [as_number(pair[axis], ".") for pair in curve.cells]
-        if None in numbers:
-            bad = numbers.index(None)
+        cells = curve.times if axis == "times" else curve.values
+        numbers = np.array([as_number(cell, ".") for cell in cells], dtype=np.float64)  # None becomes nan
+        bad = np.flatnonzero(~np.isfinite(numbers))
+        if bad.size:
             raise FormatError(
-                f"{self.source}:{curve.lines[bad]}: {curve.cells[bad][axis]!r} of {name!r}, a number was expected; "
+                f"{self.source}:{curve.lines[bad[0]]}: {cells[bad[0]][:60]!r} of {name!r}, a number was expected; "
                 "repair or delete the line"
             )
-        return np.array(numbers, dtype=np.float64)
+        return numbers
 
     def _menu(self) -> str:
         return listing([f"{number} {name!r}" for number, name in enumerate(self.channels, 1)])
@@ -166,63 +207,86 @@ class Curves:
         return FormatError(f"{self.source}: curves are no parts; choose them with --energy")
 
 
-def _curveplot(text: _Text) -> bool:
-    if not text.lines or text.lines[0][1].strip() != "Curveplot":
+def _curveplot(found: _Found) -> bool:
+    word, *labels = [line.strip() for line in found.top(4)] or [""]
+    if word != "Curveplot":
         return False
-    labels = [line.strip() for _, line in text.lines[1:4]]
-    text.x_label, y_label = (*labels, "", "", "")[1:3]
+    found.x_label, y_label = (*labels, "", "", "")[1:3]
     points = 0
-    for number, line in text.lines[1:]:
-        if start := _POINTS.fullmatch(line):
-            name, points = start[1].strip(), int(start[2])
-            text.curves.append(_Curve(name if name == y_label else f"{name}: {y_label}"))
-            text.stops = f"the curve {name!r}"
-        elif line.strip() == "endcurve" and text.stops:
-            if len(text.curves[-1].cells) != points:
-                raise FormatError(
-                    f"{text.source}:{number}: {len(text.curves[-1].cells)} pairs, {points} were expected "
-                    f"in {text.stops} (#pts); export it again"
-                )
-            text.stops = ""
-        elif text.stops and not line.startswith("*"):
-            text.add(number, line)
-    if not text.curves:
-        raise FormatError(f"{text.source}: a Curveplot without a line '#pts=', no curve was found; export it again")
+    for number, line in found.lines():
+        name, mark, digits = (piece.strip() for piece in line.rpartition(_POINTS))
+        if mark and digits.isdecimal():
+            points = found.count(number, digits)
+            found.curves.append(_Curve(name if name == y_label else f"{name}: {y_label}"))
+            found.stops = f"the curve {name!r}"
+        elif line.strip() == "endcurve" and found.stops:
+            found.close(number, points)
+        elif found.stops and not line.startswith("*"):
+            found.add(number, line)
+    if not found.curves:
+        raise FormatError(f"{found.source}: a Curveplot without a line '#pts=', no curve was found; export it again")
     return True
 
 
-def _t_his(text: _Text) -> bool:
-    head = [line.strip() for _, line in text.lines[:4]]
-    if len(text.lines) < 5 or any(map(_is_pair, head)) or not is_time(head[1]) or not _is_pair(text.lines[4][1]):
+def _t_his(found: _Found) -> bool:
+    top = found.top(5)
+    if len(top) < 5 or any(map(_is_pair, top[:4])) or not is_time(top[1].strip()) or not _is_pair(top[4]):
         return False
-    text.x_label = head[1]
+    found.x_label = top[1].strip()
     labels: list[str] = []
     in_head = True
-    for number, line in text.lines:
+    for number, line in found.lines():
         if line.strip() == "CONTINUE":
             in_head, labels = True, []
         elif in_head and not _is_pair(line):
             labels.append(line.strip())
         else:
             if in_head:
-                text.curves.append(_Curve(": ".join(reversed(labels[-2:])) or f"curve {len(text.curves) + 1}"))
+                found.curves.append(_Curve(": ".join(reversed(labels[-2:])) or f"curve {len(found.curves) + 1}"))
                 in_head = False
-            text.add(number, line)
+            found.add(number, line)
     return True
 
 
-def _dynaform(text: _Text) -> bool:
-    first, *rest = text.lines or [(1, "")]
-    if not first[1].strip().isdecimal() or not rest or not _DYNAFORM.fullmatch(rest[0][1]):
+def _dynaform(found: _Found) -> bool:
+    top = found.top(2)
+    if len(top) < 2 or not top[0].strip().isdecimal() or not _DYNAFORM.fullmatch(top[1]):
         return False
-    for number, line in rest:
+    lines = found.lines()
+    number, first = next(lines)
+    expected = found.count(number, first.strip())
+    for number, line in lines:
         if start := _DYNAFORM.fullmatch(line):
-            text.curves.append(_Curve(start[1].strip()))
+            found.curves.append(_Curve(start[1].strip()))
         else:
-            text.add(number, line)
-    if len(text.curves) < int(first[1]):
-        text.stops = f"curve {len(text.curves)} of {first[1].strip()}"
+            found.add(number, line)
+    if len(found.curves) < expected:
+        found.stops = f"curve {len(found.curves)} of {expected}"
     return True
+
+
+def _counted(found: _Found) -> bool:
+    top = found.top(2)
+    if len(top) < 2 or not top[0].strip().isdecimal() or not _is_pair(top[1]):
+        return False
+    points = 0
+    for number, line in found.lines():
+        if line.strip().isdecimal():
+            if found.stops:
+                found.close(number, points)
+            points = found.count(number, line.strip())
+            found.curves.append(_Curve(f"curve {len(found.curves) + 1}"))
+            found.stops = f"the {found.curves[-1].name}"
+        else:
+            found.add(number, line)
+    if len(found.curves[-1].times) >= points:
+        found.close(found.last, points)
+    return True
+
+
+def _counts(line: str) -> bool:
+    """Whether a line is neither blank nor a comment."""
+    return bool(line.strip()) and line[0] != "$"
 
 
 def _is_pair(line: str) -> bool:
@@ -232,12 +296,12 @@ def _is_pair(line: str) -> bool:
 
 def _is_whole(curve: _Curve) -> bool:
     """Whether the last pair, behind which the file stops, is whole for sure."""
-    return printed.is_whole(curve.cells[-1][1], [pair[1] for pair in curve.cells[:-1]])
+    return printed.is_whole(curve.values[-1], curve.values[:-1])
 
 
 def _uniquely_named(curves: Sequence[_Curve]) -> dict[str, _Curve]:
-    names = [curve.name for curve in curves]
+    bearers = Counter(curve.name for curve in curves)
     return {
-        name if names.count(name) == 1 else f"{name} (curve {number})": curve
-        for number, (name, curve) in enumerate(zip(names, curves, strict=True), 1)
+        curve.name if bearers[curve.name] == 1 else f"{curve.name} (curve {number})": curve
+        for number, curve in enumerate(curves, 1)
     }

@@ -8,10 +8,13 @@ from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import FormatError
+from d2rpick.histories.formats.text import HEAD
 from d2rpick.histories.names import is_time, is_unit, listing, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+
+    from d2rpick.histories.formats.text import Text
 
 _COMMENTS = ("#", "$", "%", "//")
 
@@ -19,9 +22,10 @@ _COMMENTS = ("#", "$", "%", "//")
 # cannot be read for sure.
 _FORMS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (None, "."), (None, ","))
 
+# What was taken is not given back: the time grows with the length of a cell, not with its square.
 _NUMBER = {
-    "." : re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII),
-    ",": re.compile(r"[+-]?(?:\d+,?\d*|,\d+)(?:[eEdD][+-]?\d+)?", re.ASCII),
+    "." : re.compile(r"[+-]?(?:\d++\.?+\d*+|\.\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
+    ",": re.compile(r"[+-]?(?:\d++,?+\d*+|,\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
 }  # fmt: skip
 _MISSING = frozenset({"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null"})
 _SEP_LINE = re.compile(r"sep=(.)", re.IGNORECASE)
@@ -103,35 +107,28 @@ def as_number(cell: str, decimal: str) -> float | None:
     return float(cell.replace(",", ".").replace("D", "E").replace("d", "e"))
 
 
-def find_layout(source: str, lines: Sequence[str], unended: str) -> Layout:
-    """Find the layout of a table.
-
-    Parameters
-    ----------
-    source : str
-        Name for messages.
-    lines : sequence of str
-        The lines that have an end.
-    unended : str
-        The last line when it has none, which is looked at only if there is no other row; else empty.
+def find_layout(text: Text) -> Layout:
+    """Find the layout of a table by its first lines; a last line without end counts if there is no other row.
 
     Raises
     ------
     FormatError
         If the lines are no table, or one whose columns cannot be told for sure.
     """
+    lines, every = text.head, [*text.head, *([text.unended] if text.is_short else [])]
     told = _SEP_LINE.fullmatch(lines[0].strip()) if lines else None
     first, separator = (1, told[1]) if told else (0, "")
-    bare = _find_rows(lines, first, separator) or _find_rows([*lines, unended], first, separator)
+    bare = _find_rows(lines, first, separator) or _find_rows(every, first, separator)
     if bare is None:
-        number, line = next(((n, line) for n, line in enumerate([*lines, unended], 1) if not is_skipped(line)), (1, ""))
+        number, line = next(((n, line) for n, line in enumerate(every, 1) if not is_skipped(line)), (1, ""))
+        below = "below" if text.is_short else f"in the first {HEAD} lines"
         raise FormatError(
-            f"{source}:{number}: {_short(line)} and no rows of at least two numbers below; "
+            f"{text.name}:{number}: {_short(line)} and no rows of at least two numbers {below}; "
             "expected a table of time and energy; check that this is the right file"
         )
-    _refuse_odd_rows(source, lines, first, bare)
-    _refuse_decimal_commas(source, lines, bare)
-    return _with_header(source, lines[first : bare.start], bare)
+    _refuse_odd_rows(text.name, lines, first, bare)
+    _refuse_decimal_commas(text.name, lines, bare)
+    return _with_header(text.name, lines[first : bare.start], bare)
 
 
 def _find_rows(lines: Sequence[str], first: int, separator: str) -> Layout | None:

@@ -14,7 +14,11 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-_PARTS = re.compile(r"[+-]?(\d*)\.?(\d*)(?:[eEdD]([+-]?\d+))?")
+_PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
+
+# Digits that restore every double, and numbers that are not written with an exponent.
+_LONGEST = 17
+_PLAIN = re.compile(r"[+-]?(?:0|[1-9]\d+)\.\d+", re.ASCII)
 
 # 15 significant digits are what every double keeps; a writer that shows so many meant to lose nothing.
 _FULL = 15
@@ -58,13 +62,19 @@ def is_whole(field: str, above: Sequence[str]) -> bool:
 
     It is when the column has a format of constant length: always the same number of decimals (two or more)
     and of digits in the exponent, with a trailing zero somewhere, which shortest formats (``%g``) never
-    write.  An exponent that could be the start of a longer one (``e-10`` of ``e-100``) remains in doubt.
+    write.  An exponent that could be the start of a longer one (``e-10`` of ``e-100``) remains in doubt.  It also is
+    when it has the 17 digits that restore every double, as no field above has more, and no exponent can follow: that
+    stands behind a mantissa of one digit before the point.
 
     Examples
     --------
     >>> is_whole("1.25", ["0.50", "0.75"]), is_whole("1.2", ["0.50", "0.75"]), is_whole("1.25", ["0.55"])
     (True, False, False)
+    >>> is_whole("0.30000000000000004", ["0.1"]), is_whole("3.0000000000000004", ["0.1"])
+    (True, False)
     """
+    if above and _significant(field) == _LONGEST == max(_LONGEST, *map(_significant, above)):
+        return _PLAIN.fullmatch(field) is not None
     parts = [_PARTS.fullmatch(text) for text in (field, *above)]
     shapes = {(len(part[2]), _exponent_width(part[3])) for part in parts if part}
     if None in parts or len(shapes) != 1:

@@ -231,7 +231,14 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
         ("time,IE\n0,-\n1,2\n2,3\n", "table:2: '0,-' is unlike the rows below"),
         ("time;IE\n0,5;1.5\n0,6;1,5\n", "table:2: 'IE' is '1.5'|table:2: '0,5;1.5' is unlike"),
         ("time,IE\n0,1\n1,2\n\n0,3\n1,4\n", "table:5: the time starts again behind a gap"),
-        ("time,IE\n5,1\n3,2\n4,3\n1,4\n2,5\n", "table: time steps back"),
+        ("time,IE\n5,1\n3,2\n4,3\n1,4\n2,5\n", "table:3: time steps back from 5 to 3"),
+        ("time,IE\n0,1\n1,2\n2,3\n\n# two\n0.5,4\n", "table:7: the time starts again behind a gap"),
+        ("time,IE\n0,1\n1,2\n2,3\n0,4\n1,5\n2,6\n", "table:5: time steps back from 2 to 0"),
+        ("time,IE\n0,1\n1,2\n2,3\n1.5,4\n1.6,5\n1.7,6\n", "table:5: time steps back from 2 to 1.5"),
+        ("# run\ntime,IE\n0,1\n1,2\n\n2,3\n0.5,4\n1.5,5\n1,6\n", "table:7: time steps back from 2 to 0.5"),
+        ("time,IE\n0,1\n1,2\ntime,IE\n0,3\n1,4\n", "table:4: a second header, another curve begins here"),
+        ("time,ALLKE\n0,1\n1,2\n", r"'ALLKE', by this name no internal energy \(ALLKE\); choose with --energy"),
+        ("Nodal History,Z-acceleration\nTime,A8,\n0,1,\n1,2,\n", "'A8: Z-acceleration', by this name"),
         ("run,IE\na1,1\na2,2\n", "no rows of at least two numbers"),
         ("run,IE,KE\na1,1,2\na2,2,3\n", "table:2: 'run' is 'a1'"),
         ("time,IE\n", "table:1: 'time,IE' and no rows"),
@@ -247,17 +254,86 @@ def test_refused(text: str, reason: str) -> None:
     ("text", "note"),
     [
         ("x,y\n0,1\n1,2\n", "no column is named like a time; 'x', the first, was taken for it"),
-        ("time,ALLKE\n0,1\n1,2\n", "'ALLKE' is no internal energy by its name"),
-        (
-            "Nodal History,Z-acceleration\nTime,A8,\n0,1,\n1,2,\n",
-            "'A8: Z-acceleration' is no internal energy",
-        ),
         ("time,IE\n0,1\n0,2\n", "same printed time"),
         ("time,IE\n0,1\n1,2\n2,3", "the last line has no line end and may be cut"),
     ],
 )
 def test_notes_say_what_was_assumed(text: str, note: str) -> None:
     assert note in read(text).notes[0]
+
+
+def test_a_quantity_that_is_asked_for_is_taken_with_a_note() -> None:
+    history = read("time,ALLKE\n0,1\n1,2\n", "ALLKE")
+    assert history.energy.tolist() == [1, 2]
+    assert "'ALLKE' is no internal energy by its name" in history.notes[0]
+
+
+LONG = [f"{i},{i % 7}.5" for i in range(40_000)]
+
+
+@pytest.mark.parametrize(
+    ("row", "text", "reason"),
+    [
+        (31_000, "31000", "table:31002: 1 values"),
+        (31_000, "31000,1,2", "table:31002: 3 values"),
+        (31_000, "31000,1_0", "table:31002: 'IE' is '1_0'"),
+        (31_000, "31000,nan", "table:31002: 'IE' is 'nan'"),
+        (31_000, "31000,inf", "table:31002: 'IE' is 'inf'"),
+        (31_000, "31000,0x10", "table:31002: 'IE' is '0x10'"),
+        (31_000, "1,2", "table:31002: time steps back from 30999 to 1"),
+        (31_000, "time,IE", "table:31002: a second header"),
+        (39_999, "39999,", "table:40001: 'IE' is ''"),
+    ],
+)
+def test_one_bad_line_of_many_is_named(row: int, text: str, reason: str) -> None:
+    with pytest.raises(FormatError, match=reason):
+        read("\n".join(["time,IE", *LONG[:row], text, *LONG[row + 1 :], ""]))
+
+
+@pytest.mark.parametrize("between", ["# switched\n", "\n", " \n"])
+def test_lines_between_many_rows_are_passed_over(between: str) -> None:
+    text = "\n".join(["time,IE", *LONG, ""])
+    plain, broken = read(text), read(text.replace("\n20000,", f"\n{between}20000,"))
+    assert plain.energy.tolist() == broken.energy.tolist() == [i % 7 + 0.5 for i in range(40_000)]
+
+
+def test_a_comment_is_no_row_though_it_has_as_many_cells() -> None:
+    rows = [f"{i},{i},{i % 7}" for i in range(20_000)]
+    text = "\n".join(["n,time,IE", *rows[:15_000], "# 5,1,2", *rows[15_000:], ""])
+    assert read(text).energy.size == 20_000
+
+
+def test_words_without_numbers_are_refused_by_the_first_lines() -> None:
+    with pytest.raises(FormatError, match="'no table at all' and no rows of at least two numbers in the first"):
+        read("no table at all\n" * 20_000)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1" * 30_000 + "\n1,2\n",
+        "time,IE\n0,1\n1," + "1" * 30_000 + "x\n",
+        "1" * 5000 + "\n0 1\n1 2\n",
+        ",".join(map(str, range(5000))) + "\n",
+    ],
+)
+def test_endless_digits_and_endless_rows_take_no_endless_time(text: str) -> None:
+    with pytest.raises(FormatError) as error:
+        read(text)
+    assert len(str(error.value)) < 600
+
+
+def test_thousands_of_columns_are_read() -> None:
+    columns = 5000
+    rows = [",".join([str(i), *(str(i + c) for c in range(columns))]) for i in range(3)]
+    head = ",".join(["time", "IE", *(f"c{c}" for c in range(columns - 1))])
+    assert read("\n".join([head, *rows, ""])).energy.tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("energy", [1e150, 1e-307, -1e150])
+def test_extreme_energies_are_read_without_a_warning(energy: float) -> None:
+    text = "".join(f"{i / 10},{energy * (1 + i % 3 / 10)!r}\n" for i in range(20))
+    assert read("time,IE\n" + text).energy[0] == energy
 
 
 @pytest.mark.parametrize(

@@ -151,3 +151,37 @@ def test_a_text_cut_anywhere_never_yields_a_wrong_number(form: str) -> None:
 def test_no_text_raises_anything_else(text: str, form: str) -> None:
     with contextlib.suppress(FormatError):
         read(TEXTS[form][:90] + text + TEXTS[form][90:])
+
+
+COUNTED = "3\n0.0, 1.5\n 0.25 2.75\n0.625, -3.125\n"
+PAIRS = [(0.0, 1.5), (0.25, 2.75), (0.625, -3.125)]
+
+
+def test_pairs_below_their_count_are_a_curve() -> None:
+    history = read(COUNTED)
+    assert (states_of(history), history.channel, history.complete) == (PAIRS, "curve 1", True)
+    assert states_of(read(COUNTED + COUNTED.replace("1.5", "7"), "2"))[0] == (0.0, 7.0)
+    history = read(COUNTED.replace("3\n", "4\n"))
+    assert (states_of(history), history.complete) == (PAIRS, False)
+    assert history.notes == ("the file stops inside the curve 1",)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (COUNTED.replace("3\n", "2\n"), "curves:4: 3 pairs, 2 were expected in the curve 1"),
+        ("5\n0 1\n1 2\n2\n0 1\n1 2\n", "curves:4: 2 pairs, 5 were expected"),
+        ("1" * 5000 + "\n0 1\n1 2\n", "curves:1: a count of 5000 digits"),
+        ("1" * 5000 + "\n1 'IE'\n0 1\n1 2\n", "curves:1: a count of 5000 digits"),
+        ("Curveplot\nt\nTime\nIE\nA #pts=" + "1" * 5000 + "\n0 1\n", "curves:5: a count of 5000 digits"),
+        ("3\n0 1\n1e999 2\n1e999 3\n", "curves:3: '1e999' of 'curve 1', a number was expected"),
+        (
+            "Curveplot\nt\nTime\nEnergy Ratio\nC\nEnergy Ratio #pts=2\n0 1\n1 1\nendcurve\n",
+            "'Energy Ratio', by this name",
+        ),
+        ("4\n0 1\n1 2\n0 3\n1 4\n", "curves:4: time steps back from 1 to 0 in 'curve 1'"),
+    ],
+)
+def test_curves_that_are_none_are_refused(text: str, reason: str) -> None:
+    with pytest.raises(FormatError, match=reason):
+        read(text)
