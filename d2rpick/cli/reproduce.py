@@ -10,18 +10,24 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.histories.history import Samples
+    from d2rpick.models.exhibit import Exhibit
     from d2rpick.models.published import Row
-    from d2rpick.models.published_figures import Exhibit
 
 EXAMPLES = """\b
 Examples:
   d2rpick reproduce --output-dir paper
-  d2rpick reproduce --output-dir paper --overwrite --solver sample_data/oscillator_solver.csv -f markdown
+  d2rpick reproduce --output-dir paper --overwrite --section 3 --solver sample_data/oscillator_solver_6_80.csv
+  d2rpick reproduce --output-dir paper --overwrite --section 4 --report paper.html -f markdown
 """
-SOLVER = ("reference_m", "published_m", "better_m")
+# Columns of a solver's table beside time_s, by what it is.
+SOLVER = {
+    "pairs": ("reference_m", "published_m", "better_m"),
+    "run": ("z_m", "y_m", "vz_mps", "vy_mps"),
+}
+SECTIONS = ("1", "2", "3", "4", "5")
 PICTURES = ("svg", "png")
 
 
@@ -34,44 +40,80 @@ PICTURES = ("svg", "png")
     help="Folder for figures and tables; created if missing.",
 )
 @click.option(
+    "--section",
+    type=click.Choice(SECTIONS),
+    multiple=True,
+    help="Only the figures of this section of the paper; repeatable.  1: the setting, early switches of the box; 2: "
+    "the oscillator; 3: finite elements; 4: the choice, the revised pair, variants; 5: what is saved.",
+)
+@click.option(
     "--solver",
     metavar="FILE",
+    multiple=True,
     type=shared.FILE,
-    help=f"Solver run of the same oscillator to draw for comparison: a table of time_s, {', '.join(SOLVER)}.",
+    help="A solver's runs of the same oscillator to draw for comparison: a table of time_s and "
+    + ", or ".join(", ".join(columns) for columns in SOLVER.values())
+    + "; repeatable.",
 )
+@click.option("--report", metavar="FILE", type=shared.FILE, help="Write all of it to one HTML page.")
 @shared.output_options("table", "json", "csv", "markdown")
 @click.pass_context
 def command(
-    ctx: click.Context, /, output_dir: str, solver: str | None, output_format: str, exit_zero: bool, **options: Any
-) -> None:
-    """Reproduce the published oscillator results as figures (svg, png) and tables (csv).
+    ctx: click.Context, /, output_dir: str, section: Sequence[str], solver: Sequence[str], report: str | None,
+    output_format: str, exit_zero: bool, **options: Any,
+) -> None:  # fmt: skip
+    """Reproduce the published results as figures (svg, png) and tables (csv), section by section.
 
-    Displacement for several pairs, closed form against numerical integration, the energy level and the motion that
-    follows, beside it the better pair; published numbers beside those found here.
+    Each figure stands with what the paper shows there, what is found here, and whether the two agree; the table puts
+    published numbers and reference values beside those found here.  The figures of the box (sections 1 and 4) take
+    about half a minute.
     """
     from d2rpick.models.published import table
-    from d2rpick.models.published_figures import exhibits
-    from d2rpick.report import reproduction as report
+    from d2rpick.report import reproduction
 
-    output = Output.of(options, *([solver] if solver else []))
-    rows, shown = table(), exhibits(_solver(solver) if solver else None)
+    output = Output.of({**options, "report": report}, *solver)
+    rows, shown = table(), list(_exhibits(section, _solver(solver)))
     files = _write(output, output_dir, rows, shown)
+    if report:
+        from d2rpick.report.reproduction_page import as_page
+
+        output.write(report, as_page(rows, shown, shared.repeat()).encode())
     texts = {
-        "table": lambda: report.as_table(rows),
-        "markdown": lambda: report.as_markdown(rows),
-        "csv": lambda: report.as_csv(rows),
-        "json": lambda: report.as_json(rows, files, ctx.meta["d2rpick.command"]),
+        "table": lambda: reproduction.as_table(rows, shown),
+        "markdown": lambda: reproduction.as_markdown(rows, shown),
+        "csv": lambda: reproduction.as_csv(rows),
+        "json": lambda: reproduction.as_json(rows, shown, files, ctx.meta["d2rpick.command"]),
     }
     output.result(texts[output_format]())
     output.notes([f"{len(files)} files in {output_dir}"], ())
-    finish(ctx, objection=any(row.agrees is False for row in rows), exit_zero=exit_zero)
+    finish(ctx, objection=not all(row.agrees for row in rows), exit_zero=exit_zero)
 
 
-def _solver(name: str) -> Mapping[str, Samples]:
+def _exhibits(sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]) -> Iterator[Exhibit]:
+    """Give the figures of these sections, of all without any, in the order of the paper."""
+    from d2rpick.models import published_box, published_figures, saving
+    from d2rpick.models.rollover.model import Parameters
+
+    of_box, of_oscillator = published_box.exhibits_of(Parameters()), published_figures.exhibits_of(solver)
+    makers = sorted([*of_box, *of_oscillator, (5, saving.exhibit)], key=lambda one: one[0])
+    return (make() for section, make in makers if str(section) in (sections or SECTIONS))
+
+
+def _solver(names: Sequence[str]) -> dict[str, dict[str, Samples]]:
+    """Read each table by the columns that it has."""
+    from d2rpick.errors import FormatError
     from d2rpick.histories.opening import Selection, open_run
 
-    (database,) = open_run([name], Selection(energy=SOLVER[:1])).databases
-    return {"time_s": database.time, **{column: database.channel(database.find(column)) for column in SOLVER}}
+    found = {}
+    for name in names:
+        (database,) = open_run([name], Selection(energy=("2",))).databases
+        kinds = [kind for kind, columns in SOLVER.items() if {*columns} <= {*database.channels}]
+        if not kinds:
+            known = " or ".join(", ".join(columns) for columns in SOLVER.values())
+            raise FormatError(f"{name}: the columns are {', '.join(database.channels)}; {known} were expected")
+        columns = {column: database.channel(database.find(column)) for column in SOLVER[kinds[0]]}
+        found[kinds[0]] = {"time_s": database.time, **columns}
+    return found
 
 
 def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exhibit]) -> list[str]:
@@ -80,20 +122,20 @@ def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exh
 
     from d2rpick.errors import D2RPickError
     from d2rpick.histories.formats import csv_table
-    from d2rpick.report import figures, figures_models
-    from d2rpick.report import reproduction as report
+    from d2rpick.report import figures, figures_models, reproduction
 
     place = Path(folder)
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise D2RPickError(f"{folder}: the folder cannot be created ({error.strerror}); choose another one") from error
-    index = report.as_markdown(rows, [(one.title, f"{one.name}.svg") for one in shown])
-    contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{report.as_csv(rows)}\n".encode()}
+    index = reproduction.as_markdown(rows, shown, pictures=True)
+    contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{reproduction.as_csv(rows)}\n".encode()}
     for one in shown:
         figure = figures_models.draw_exhibit(one)
         contents |= {f"{one.name}.{form}": figures.render(figure, f"x.{form}") for form in PICTURES}
-        contents[f"{one.name}.csv"] = csv_table.write(dict(one.columns))
+        if one.columns:
+            contents[f"{one.name}.csv"] = csv_table.write(dict(one.columns))
     named = {str(place / name): content for name, content in contents.items()}
     for name in named:
         output.claim(name)

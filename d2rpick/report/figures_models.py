@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, finish, show_level
+from d2rpick.report.schemes import SCHEMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,13 +18,14 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.history import Samples
-    from d2rpick.models.published_figures import Exhibit, Panel
+    from d2rpick.models.exhibit import Exhibit, Panel
     from d2rpick.models.rollover.record import Record
     from d2rpick.models.rollover.run import Window
     from d2rpick.models.rollover.scan import Outcome
     from d2rpick.vibration.replay import Replay, Trajectory
 
-_COLOURS = (REFERENCE, SWITCHED, GOOD)
+# Okabe and Ito's palette goes on.
+_COLOURS = (REFERENCE, SWITCHED, GOOD, FLIGHT, "#cc79a7", "#e69f00")
 _STYLES: Final[Mapping[str, dict[str, Any]]] = {
     "line": {"linewidth": 1}, "thin": {"linewidth": 0.6, "linestyle": "--"}, "dots": {"linestyle": "", "marker": "."},
 }  # fmt: skip
@@ -50,39 +53,69 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
 
 
 def draw_exhibit(exhibit: Exhibit) -> Figure:
-    """All panels of an exhibit over their common time."""
+    """All panels of an exhibit, or its scheme."""
+    if not exhibit.panels:
+        figure = Figure(figsize=(8, 4.2), layout="constrained")
+        axes = figure.subplots()
+        SCHEMES[exhibit.name](axes)
+        axes.set_aspect("equal")
+        return figure
     rows, columns = len(exhibit.panels), len(exhibit.panels[0])
-    figure = Figure(figsize=(9 if columns == 1 else 5.2 * columns, 3.2 * rows), layout="constrained")
-    figure.suptitle(exhibit.title, fontsize="medium")
-    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    figure = Figure(figsize=(9 if columns == 1 else 5.2 * columns, 3.4 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False)
     for axes, panel in zip(grid.flat, (panel for row in exhibit.panels for panel in row), strict=True):
         _draw_panel(axes, panel, exhibit.columns)
-    for axes in grid[-1]:
-        axes.set_xlabel("time [ms]")
     return figure
 
 
 def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
-    time = next(iter(columns.values()))
     drawn = dict.fromkeys(_STYLES, 0)
     for curve in panel.curves:
-        every = max(1, time.size // _DOTS) if curve.style == "dots" else 1
-        axes.plot(
-            time[::every], columns[curve.column][::every], label=curve.label,
-            color=_COLOURS[drawn[curve.style]], **_STYLES[curve.style],
-        )  # fmt: skip
+        x, y = columns[curve.x] if curve.x else next(iter(columns.values())), columns[curve.column]
+        shown = slice(None, None, max(1, x.size // _DOTS) if curve.style == "dots" and not panel.span else 1)
+        label = curve.label or "_"
+        axes.plot(x[shown], y[shown], label=label, color=_COLOURS[drawn[curve.style]], **_STYLES[curve.style])
         drawn[curve.style] += 1
+    for shape, colour in zip(panel.shapes, _COLOURS, strict=False):
+        closed = np.column_stack([shape.outlines, shape.outlines[:, 0]]).T
+        lines = axes.plot(closed.real, closed.imag, color=colour, **_STYLES[shape.style])
+        lines[0].set_label(shape.label)
+        axes.set_aspect("equal")
+    _draw_marks(axes, panel)
+    if panel.span:
+        _show(axes, panel, columns)
+    axes.set_title(panel.title, fontsize="small")
+    axes.set(xlabel=panel.xlabel, ylabel=panel.ylabel)
+    finish(axes, legend=False)
+    if panel.curves and all(curve.x and curve.style == "dots" for curve in panel.curves):
+        axes.margins(x=0.1, y=0.1)  # single runs, which would stand on the edges
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize="x-small", loc="best")
+
+
+def _draw_marks(axes: Axes, panel: Panel) -> None:
     for name, level in panel.levels:
         axes.axhline(level, color=SWITCHED, linewidth=0.8, label=name)
-        show_level(axes, level, max(float(columns[curve.column].max()) for curve in panel.curves))
+    for place, (name, x) in enumerate(panel.marks):
+        axes.axvline(x, color=_COLOURS[2 + place], linestyle="--", linewidth=1, label=name)
     for x, y in panel.points:
         axes.plot(x, y, "o", color=GOOD, markersize=5)
     if panel.rigid:
         axes.axvspan(*panel.rigid, color=FLIGHT, alpha=0.2, linewidth=0, label="rigid")
-    axes.set_title(panel.title, fontsize="small")
-    axes.set_ylabel(panel.ylabel)
-    finish(axes, legend=False)
-    axes.legend(fontsize="small", loc="best")
+
+
+def _show(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
+    """Show the span of a panel, and of its curves what lies in it."""
+    assert panel.span is not None
+    low, high = panel.span
+    x = next(iter(columns.values()))
+    values = np.concatenate([columns[curve.column][(low <= x) & (x <= high)] for curve in panel.curves])
+    axes.set_xlim(low, high)
+    room = 0.06 * float(np.ptp(values))
+    axes.set_ylim(float(values.min()) - room, float(values.max()) + room)
+    if panel.levels:
+        show_level(axes, panel.levels[0][1], float(values.max()))
 
 
 def draw_rollover(reference: Record, switched: Record | None, windows: Sequence[Window] = ()) -> Figure:

@@ -11,46 +11,50 @@ from d2rpick.report import tables
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.models.exhibit import Exhibit
     from d2rpick.models.published import Row
 
-SCHEMA = "d2rpick/reproduce/1"
+SCHEMA = "d2rpick/reproduce/2"
+MODEL = "k = 660e3 N/m, M = 31.4 kg, beta = 2, alpha = 50 1/s, V0 = 6 m/s"
 _DECIMALS = 12
-_HEAD = ("quantity", "unit", "published", "here", "difference", "source")
+HEAD = ("quantity", "unit", "published", "reference", "here", "difference", "agrees", "source")
 
 
-def as_table(rows: Sequence[Row]) -> str:
-    """Published beside here, the pairs, the misprints."""
-    body: list[list[tables.Cell]]
-    body = [[row.what, row.unit, row.published, _rounded(row.here), _difference(row), row.source] for row in rows]
-    misprints = [f"  {misprint}" for misprint in MISPRINTS]
-    return "\n".join([tables.as_text(_HEAD, body), "", *_pairs(), "", "misprints in the paper", *misprints])
+def as_table(rows: Sequence[Row], exhibits: Sequence[Exhibit]) -> str:
+    """Published numbers and reference values beside those here, the pairs, the figures, the misprints."""
+    lines = [tables.as_text(HEAD, [cells(row) for row in rows]), "", *pairs_of(), ""]
+    for one in exhibits:
+        lines += [f"{heading(one)}: {verdict(one)}", f"  paper  {one.paper}", f"  here   {one.found}"]
+    return "\n".join([*lines, "", "misprints in the paper", *(f"  {misprint}" for misprint in MISPRINTS)])
 
 
-def as_markdown(rows: Sequence[Row], exhibits: Sequence[tuple[str, str]] = ()) -> str:
-    """Give the same as Markdown, with the figures (title, file) where there are any."""
-    body = [[r.what, r.unit, f"{r.published:.12g}", f"{_rounded(r.here):.12g}", _difference(r), r.source] for r in rows]
-    blocks = [
-        "# Analysis of switched-rigid floating oscillator, reproduced",
-        f"k = 660e3 N/m, M = 31.4 kg, beta = 2, alpha = 50 1/s, V0 = 6 m/s; d2rpick {__version__}.",
-        *(f"## {title}\n\n![{title}]({file})" for title, file in exhibits),
-        "## Published and here",
-        tables.as_markdown(_HEAD, body),
-        *_pairs(),
-        "## Misprints in the paper",
-        "\n".join(f"* {misprint}" for misprint in MISPRINTS),
-    ]
+def as_markdown(rows: Sequence[Row], exhibits: Sequence[Exhibit], *, pictures: bool = False) -> str:
+    """Give the same as Markdown, with the figures where ``pictures`` lie beside it."""
+    blocks = ["# Analysis of switched-rigid floating oscillator, reproduced", f"{MODEL}; d2rpick {__version__}."]
+    for one in exhibits:
+        shown = [f"![{one.title}]({one.name}.svg)"] if pictures else []
+        blocks += [
+            f"## {heading(one)}",
+            *shown,
+            f"Paper: {one.paper}",
+            f"Here: {one.found}",
+            f"Agrees: {verdict(one)}.",
+        ]
+    blocks += ["## Published and here", tables.as_markdown(HEAD, [cells(row) for row in rows]), *pairs_of()]
+    blocks += ["## Misprints in the paper", "\n".join(f"* {misprint}" for misprint in MISPRINTS)]
     return "\n\n".join(blocks)
 
 
 def as_csv(rows: Sequence[Row]) -> str:
     """Give the rows at full precision."""
-    body: list[list[tables.Cell]] = [[r.what, r.unit, r.published, r.here, r.difference, r.source] for r in rows]
-    return tables.as_csv(_HEAD, body).rstrip("\n")
+    body: list[list[tables.Cell]]
+    body = [[r.what, r.unit, r.published, r.reference, r.here, r.difference, r.agrees, r.source] for r in rows]
+    return tables.as_csv(HEAD, body).rstrip("\n")
 
 
-def as_json(rows: Sequence[Row], files: Sequence[str], command: Sequence[str]) -> str:
-    """Everything by schema d2rpick/reproduce/1."""
-    keys = ("what", "unit", "published", "here", "difference", "source", "agrees")
+def as_json(rows: Sequence[Row], exhibits: Sequence[Exhibit], files: Sequence[str], command: Sequence[str]) -> str:
+    """Everything by schema d2rpick/reproduce/2."""
+    keys = ("what", "unit", "published", "reference", "here", "difference", "tolerance", "source", "agrees")
     return tables.as_json(
         {
             "schema": SCHEMA,
@@ -60,26 +64,41 @@ def as_json(rows: Sequence[Row], files: Sequence[str], command: Sequence[str]) -
             "rows": [{key: getattr(row, key) for key in keys} for row in rows],
             "published": _pair(PUBLISHED),
             "better": _pair(better_pair()),
+            "figures": [
+                {key: getattr(one, key) for key in ("name", "title", "section", "figure", "paper", "found", "agrees")}
+                for one in exhibits
+            ],
             "misprints": list(MISPRINTS),
             "files": list(files),
         }
     )
 
 
-def _rounded(value: float) -> float:
-    """Without what is rounding and differs from machine to machine."""
-    return round(value, _DECIMALS)
-
-
-def _difference(row: Row) -> str:
-    return "0" if abs(row.difference) < MOST_DIFFERENCE * abs(row.published) else f"{row.difference:.1e}"
+def cells(row: Row) -> list[tables.Cell]:
+    """Give a row in digits that are the same on every machine."""
+    known = (None if value is None else f"{round(value, _DECIMALS):.12g}" for value in (row.published, row.reference))
+    here = f"{round(row.here, _DECIMALS):.12g}"
+    difference = "0" if abs(row.difference) < MOST_DIFFERENCE * abs(row.expected) else f"{row.difference:.1e}"
+    return [row.what, row.unit, *known, here, difference, row.agrees, row.source]
 
 
 def _pair(pair: tuple[float, float]) -> dict[str, Any]:
     return {"tr": pair[0], "td": pair[1], "residual": residual(pair)}
 
 
-def _pairs() -> list[str]:
+def heading(exhibit: Exhibit) -> str:
+    """Give the figure of the paper and what it shows."""
+    place = exhibit.figure if exhibit.figure.startswith("section") else f"fig. {exhibit.figure}"
+    return f"{place[0].upper()}{place[1:]}: {exhibit.title}"
+
+
+def verdict(exhibit: Exhibit) -> str:
+    """Say whether what is found is what the paper shows."""
+    return {True: "yes", False: "no", None: "nothing to compare"}[exhibit.agrees]
+
+
+def pairs_of() -> list[str]:
+    """Say how good the published and the better pair are."""
     return [
         f"{name} pair: tr = {1e3 * pair[0]:.6g} ms, td = {1e3 * pair[1]:.6g} ms, residual {residual(pair):.3f}"
         for name, pair in (("published", PUBLISHED), ("better", better_pair()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
+from dataclasses import replace
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
@@ -11,9 +11,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from d2rpick.models import published
-from d2rpick.models.published import MISPRINTS, Row, table
-from d2rpick.models.published_figures import Exhibit, exhibits
+from d2rpick.models import published, published_box, published_figures, saving
+from d2rpick.models.published import MISPRINTS, table
+from d2rpick.models.rollover.model import Parameters
+from d2rpick.report.figures_models import draw_exhibit
 from d2rpick.vibration.integration import integrated
 from d2rpick.vibration.oscillator import Oscillator, State
 from d2rpick.vibration.replay import Replay
@@ -24,7 +25,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 SOLVER = str(ROOT / "sample_data" / "oscillator_solver.csv")
-ALL = {exhibit.name: exhibit for exhibit in exhibits()}
+RUN = str(ROOT / "sample_data" / "oscillator_solver_6_80.csv")
+ALL = {
+    exhibit.name: exhibit for exhibit in (*(make() for _, make in published_figures.exhibits_of({})), saving.exhibit())
+}
 
 
 def test_the_oscillator_is_that_of_the_paper() -> None:
@@ -32,12 +36,13 @@ def test_the_oscillator_is_that_of_the_paper() -> None:
     assert paper.START == published.START
 
 
-def test_every_independent_number_is_met_and_the_plot_was_read_roughly() -> None:
+def test_every_number_of_the_paper_and_every_reference_value_is_met() -> None:
     rows = table()
-    assert {row.agrees for row in rows} == {True, None}
-    assert sum(row.agrees is True for row in rows) >= 20
-    (read_off,) = [row for row in rows if "plot" in row.source]
+    assert all(row.agrees for row in rows)
+    assert all((row.published is None) != (row.reference is None) for row in rows)
+    (read_off,) = [row for row in rows if row.published is not None]
     assert (read_off.published, round(read_off.here, 3), round(read_off.difference, 3)) == (13.0, 12.885, -0.115)
+    assert sum("40 digits" in row.source for row in rows) >= 20
 
 
 def test_what_a_solver_found_is_near() -> None:
@@ -46,8 +51,9 @@ def test_what_a_solver_found_is_near() -> None:
 
 
 def test_a_wrong_number_does_not_agree() -> None:
-    exact = next(row for row in table() if row.agrees)
-    assert Row(exact.what, exact.unit, exact.published * (1 + 1e-8), exact.here, exact.source).agrees is False
+    exact = next(row for row in table() if row.reference is not None)
+    assert exact.reference is not None
+    assert replace(exact, reference=exact.reference * (1 + 1e-8)).agrees is False
 
 
 def test_the_better_pair_has_no_residual() -> None:
@@ -78,47 +84,93 @@ def test_integration_of_times_before_the_switch_only() -> None:
     np.testing.assert_allclose(integrated(replay, time).z, replay.reference(time).z, atol=1e-11)
 
 
-def test_the_exhibits_are_those_of_the_paper_and_their_columns_hold_all_they_show() -> None:
-    assert list(ALL) == ["displacement", "integration", "choice"]
+def test_the_figures_are_those_of_the_paper_and_their_columns_hold_all_they_show() -> None:
+    assert [exhibit.figure for exhibit in ALL.values()] == ["3", "4", "5", "6a-d", "7a", "7b", "section 5"]
     for exhibit in ALL.values():
-        assert {values.shape for values in exhibit.columns.values()} == {published.TIME.shape}
+        assert len({values.shape for values in exhibit.columns.values()}) <= 1
+        assert exhibit.paper
+        assert exhibit.found
         drawn = {curve.column for row in exhibit.panels for panel in row for curve in panel.curves}
+        drawn |= {curve.x for row in exhibit.panels for panel in row for curve in panel.curves if curve.x}
         assert drawn <= {*exhibit.columns}
-    assert np.abs(ALL["integration"].columns["z_difference_m"]).max() < 1e-11
 
 
-def test_the_level_is_that_at_td_and_the_better_pair_continues_the_motion() -> None:
-    (energies, _), columns = ALL["choice"].panels, ALL["choice"].columns
-    assert [panel.levels[0][1] for panel in energies] == pytest.approx([paper.ENERGY_TD, paper.PEAKS[5][1]])
+def test_velocities_and_displacements_meet_those_integrated_numerically() -> None:
+    columns = ALL["motion"].columns
+    for name, unit in (("z", "m"), ("y", "m"), ("vz", "mps"), ("vy", "mps")):
+        away = np.abs(columns["time_ms"] - 6.0) > 1e-6  # at tr itself the states before and after the switch
+        error = columns[f"{name}_other_{unit}"] - columns[f"{name}_closed_{unit}"]
+        assert np.abs(error[away]).max() < 1e-7
+
+
+def test_the_crossings_of_the_level_are_all_marked() -> None:
+    (panel, near), *_ = ALL["level"].panels
+    assert panel.levels[0][1] == pytest.approx(paper.ENERGY_TD)
+    times = [time for time, _ in panel.points]
+    assert times == pytest.approx([*(time for time, _ in paper.CROSSINGS), 64.0], abs=1e-6)
+    assert [time for _, time in near.marks] == pytest.approx([12.8852793630525, 13.0])
+
+
+def test_after_td_the_better_pair_continues_the_motion_and_the_published_one_does_not() -> None:
+    columns = ALL["after-td"].columns
     after = columns["time_ms"] > 1e3 * paper.BETTER_TD
-    wanted = columns["deformation_free_m"][after]
-    np.testing.assert_allclose(columns["deformation_better_m"][after], wanted, atol=1e-12)
-    assert np.abs(columns["deformation_published_m"][after] - wanted).max() > 0.5 * np.abs(wanted).max()
+    wanted = columns["r_free_m"][after]
+    np.testing.assert_allclose(columns["r_better_m"][after], wanted, atol=1e-12)
+    assert np.abs(columns["r_published_m"][after] - wanted).max() > 0.5 * np.abs(wanted).max()
+    assert ALL["after-td"].agrees is False
+    assert "92 %" in ALL["after-td"].found
+
+
+def test_the_saving_is_predicted_beside_what_was_measured() -> None:
+    for run_ in saving.RUNS:
+        assert run_.by_cost == pytest.approx(run_.measured, abs=0.05)
+    assert saving.RUNS[1].by_count - saving.RUNS[1].measured > 0.1
+
+
+def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
+    coarse = Parameters(mesh=4)
+    made = {exhibit.name: exhibit for exhibit in (make() for _, make in published_box.exhibits_of(coarse)[1:])}
+    assert [exhibit.figure for exhibit in made.values()] == ["2a, b", "2c", "8", "section 4"]
+    assert made["early"].agrees
+    tr = next(name for name in made["revised"].columns if name.startswith("droll") and "70" not in name)
+    at_td = np.searchsorted(made["revised"].columns["time_ms"], 370.0)
+    assert abs(made["revised"].columns[tr][at_td]) < abs(made["revised"].columns["droll_70_deg"][at_td])
+    variants = made["variants"].columns
+    assert np.ptp(variants["own_tr_ms"][:4]) < 1e-9  # what acts after td leaves tr alone
+    assert np.ptp(variants["own_tr_ms"][4:]) > 0.1
+    assert np.all(variants["own_tr_ms"] <= variants["common_tr_ms"] + 1e-9)
+    for exhibit in made.values():
+        figure = draw_exhibit(exhibit)
+        assert len(figure.axes) == sum(map(len, exhibit.panels))
 
 
 def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
-    place = tmp_path / "new" / "paper"
-    result = run("reproduce", "--output-dir", str(place), "--solver", SOLVER)
+    place, page = tmp_path / "new" / "paper", tmp_path / "paper.html"
+    sections = ("--section", "2", "--section", "3", "--section", "5", "--report", str(page))
+    result = run("reproduce", "--output-dir", str(place), *sections, "--solver", RUN)
     assert result.exit_code == 0, result.stderr
     names = {path.name for path in place.iterdir()}
-    expected = {f"{name}.{form}" for name in (*ALL, "solver") for form in ("svg", "png", "csv")}
+    drawn = ("masses", "response", "elements", "motion", "saving")
+    expected = {f"{name}.{form}" for name in drawn for form in ("svg", "png", "csv")} - {"masses.csv", "elements.csv"}
     assert names == expected | {"README.md", "table.csv"}
     assert all(misprint in result.stdout for misprint in MISPRINTS)
     index = (place / "README.md").read_text("utf-8")
-    assert all(f"{name}.svg" in index for name in (*ALL, "solver"))
-    columns = np.genfromtxt(place / "integration.csv", delimiter=",", names=True)
-    np.testing.assert_array_equal(columns["z_closed_m"], ALL["integration"].columns["z_closed_m"])
+    assert all(f"{name}.svg" in index for name in drawn)
+    assert page.read_text("utf-8").count("<figure>") == len(drawn)
+    columns = np.genfromtxt(place / "response.csv", delimiter=",", names=True)
+    np.testing.assert_array_equal(columns["y_13_64_m"], ALL["response"].columns["y_13_64_m"])
 
 
 def test_its_files_are_the_same_every_time_and_replaced_only_when_told(tmp_path: Path) -> None:
-    first = answer("reproduce", "--output-dir", str(tmp_path))
-    jsonschema.validate(first, json.loads(files("d2rpick").joinpath("schemas/reproduce-1.json").read_text("utf-8")))
+    whole = ("reproduce", "--output-dir", str(tmp_path), "--section", "5")
+    first = answer(*whole)
+    jsonschema.validate(first, json.loads(files("d2rpick").joinpath("schemas/reproduce-2.json").read_text("utf-8")))
     assert first["better"]["residual"] < 1e-12
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    refused = run("reproduce", "--output-dir", str(tmp_path))
+    refused = run(*whole)
     assert refused.exit_code == 2
     assert "the file exists" in refused.stderr
-    assert run("reproduce", "--output-dir", str(tmp_path), "--overwrite", "-q").exit_code == 0
+    assert run(*whole, "--overwrite", "-q").exit_code == 0
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
     assert {name.rpartition("/")[2] for name in first["files"]} == {*before}
 
@@ -135,21 +187,28 @@ def test_all_states_that_were_computed_with_40_digits_are_in_the_table() -> None
     known = {f"{name} of ({pair}) ms at {1e3 * row[0]:g} ms": value
              for pair, rows in (("6, 80", paper.SWITCHED_6_80), ("13, 64", paper.SWITCHED_13_64))
              for row in rows for name, value in (("z", row[1]), ("y", row[2]), ("E", row[5]))}  # fmt: skip
-    assert {row.what: row.published for row in table() if row.what in known} == known
+    assert {row.what: row.reference for row in table() if row.what in known} == known
 
 
 def test_a_solver_s_table_without_its_columns_is_refused(tmp_path: Path) -> None:
-    result = run("reproduce", "--output-dir", str(tmp_path / "paper"), "--solver", ENERGY)
+    result = run("reproduce", "--output-dir", str(tmp_path / "paper"), "--section", "3", "--solver", ENERGY)
     assert result.exit_code == 2
     assert "reference_m" in result.stderr
 
 
-def test_the_sample_of_the_solver_is_near_the_closed_form() -> None:
-    rows = np.genfromtxt(SOLVER, delimiter=",", names=True)
-    shown = exhibits({name: rows[name] for name in rows.dtype.names or ()})[-1]
-    assert isinstance(shown, Exhibit)
-    assert {field.name for field in fields(shown)} >= {"columns", "panels"}
-    scale = np.abs(shown.columns["reference_solver_m"]).max()
+def test_the_samples_of_the_solver_are_near_the_closed_form() -> None:
+    tables = {kind: named_columns(name) for kind, name in (("pairs", SOLVER), ("run", RUN))}
+    made = {exhibit.name: exhibit for exhibit in (make() for _, make in published_figures.exhibits_of(tables))}
+    pairs, motion = made["solver"].columns, made["motion"].columns
+    scale = np.abs(pairs["reference_solver_m"]).max()
     for name in ("published", "better"):
-        error = np.abs(shown.columns[f"{name}_solver_m"] - shown.columns[f"{name}_m"]).max()
-        assert error < 0.004 * scale
+        assert np.abs(pairs[f"{name}_solver_m"] - pairs[f"{name}_m"]).max() < 0.004 * scale
+    for name in ("z", "y"):
+        assert np.abs(motion[f"{name}_other_m"] - motion[f"{name}_closed_m"]).max() < 1e-4 * 0.053
+    assert made["motion"].agrees
+
+
+def named_columns(name: str) -> dict[str, np.ndarray]:
+    """Columns of a sample by their names."""
+    rows = np.genfromtxt(name, delimiter=",", names=True)
+    return {column: rows[column] for column in rows.dtype.names or ()}
