@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.choice import measures
 from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.verify import approve
+from d2rpick.vibration.roots import narrow
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -119,25 +119,9 @@ def _grid(answer: Suggestion) -> Samples:
     start = situation.earliest_tr
     if start is None or start >= td:
         return np.zeros(0)
-    turns = situation.fitted.extrema(float(history.time[0]), td) if situation.fitted else ()
-    known = situation.profile.time if situation.profile else ()
     found = [candidate.tr for candidate in answer.candidates]
-    ends = [start, *(situation.span or ()), np.nextafter(td, -np.inf)]
-    times = np.concatenate([history.time, found, turns, known, ends])
+    times = np.concatenate([history.time, found, situation.vibration.knots(), [start, np.nextafter(td, -np.inf)]])
     return np.unique(times[(times >= max(start, history.time[0])) & (times < td)])
-
-
-def _errors(situation: Situation, times: Samples) -> Samples:
-    """What the tolerance is held against, of the shape of ``times``; infinite where no tolerance would help [-]."""
-    td, vibration = situation.td, situation.vibration
-    if vibration:
-        first, last = situation.measured_span
-        comparable = (times >= first) & (times <= last) & measures.sign_match(vibration, times, td)
-        return np.where(comparable, measures.lock_in_error(vibration, times, td), np.inf)
-    energy, level = np.interp(times, situation.history.time, situation.history.energy), situation.energy_td
-    if not level > 0:
-        return np.full(times.shape, np.inf)
-    return np.where(energy >= 0, np.abs(np.sqrt(np.maximum(energy, 0.0) / level) - 1), np.inf)
 
 
 def _residual_left(situation: Situation) -> float:
@@ -150,16 +134,17 @@ def _residual_left(situation: Situation) -> float:
 
 def _windows_below(situation: Situation, grid: Samples, levels: Samples) -> list[Samples]:
     """Windows in which the error stays at or below each level, each of shape (n, 2)."""
-    inside = np.pad(_errors(situation, grid) <= levels[:, np.newaxis], ((0, 0), (1, 1)))
+    inside = np.pad(situation.vibration.errors(grid) <= levels[:, np.newaxis], ((0, 0), (1, 1)))
     inner = inside[:, 1:-1]
     level, first = np.nonzero(inner & ~inside[:, :-2])
     last = np.nonzero(inner & ~inside[:, 2:])[1]
     around = np.clip([first - 1, last + 1], 0, grid.size - 1)
     within, beyond = grid[np.stack([first, last], axis=1)], grid[around.T]
-    for _ in range(_HALVINGS if level.size else 0):
-        middle = (within + beyond) / 2
-        good = _errors(situation, middle.ravel()).reshape(middle.shape) <= levels[level, np.newaxis]
-        within, beyond = np.where(good, middle, within), np.where(good, beyond, middle)
+    limits = levels[level, np.newaxis]
+    if level.size:
+        within, *_ = narrow(
+            lambda t: situation.vibration.errors(t.ravel()).reshape(t.shape) <= limits, within, beyond, steps=_HALVINGS
+        )
     return [within[level == i] for i in range(levels.size)]
 
 

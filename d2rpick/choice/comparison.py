@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.choice import measures
 from d2rpick.errors import RangeError
+from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -93,7 +93,7 @@ def compare(
     """
     tr, td = pair
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
-    after, reference_after = _between(switched, td, end), _between(reference, td, end)
+    after, reference_after = switched.between(td, end)[1], reference.between(td, end)[1]
     if min(after.size, reference_after.size) < 3:
         short = min(reference, switched, key=lambda history: history.time[-1])
         found = f"fewer than 3 states from td {td:g} to {end:g}"
@@ -164,10 +164,6 @@ def _not_of_tr(reference: History, tr: float, frozen: float) -> Iterator[str]:
             f"the energy that came back, {frozen:.6g}, is not that of the reference at tr {tr:g}, "
             f"{reference.energy_at(tr):.6g}: was it switched at another time?"
         )
-
-
-def _between(history: History, start: float, end: float) -> Samples:
-    return history.energy[(history.time >= start) & (history.time <= end)]
 
 
 def _reported_wrong(rigid: float, after: Samples) -> bool:

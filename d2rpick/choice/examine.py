@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,13 +10,15 @@ import numpy as np
 from d2rpick.choice.situation import Situation
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import find_flight, seen_flight
+from d2rpick.histories.history import window
 from d2rpick.vibration.identify import Identification, assess, identify, identify_several
+from d2rpick.vibration.model import Evidence, energy_at
 from d2rpick.vibration.span import Span, described_span, identify_within, span_of
 
 if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
     from d2rpick.flight.momentum import FreeFlight
-    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.history import History
 
 # Beyond, squares of energies are no numbers any more; no unit system comes near.
 _LARGEST = 1e150
@@ -39,12 +40,15 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
         _inside(history, settings.after, "--after")
     seen = seen_flight(history, td) if history.momenta else None
     fit, span = _oscillator(history, td, settings, seen)
-    situation = Situation(history, td, settings, find_flight(history, td, settings.after, seen, span), fit, span)
-    if history.part_energies is None or not settings.replay:
-        return situation
-    # without a sign of the next contact nothing is known of what comes after td
-    end = situation.flight.end or (float(history.time[-1]) if seen or span else td)
-    return _with_parts(situation, history.part_energies, end)
+    flight = find_flight(history, td, settings.after, seen, span)
+    given = settings.oscillator is not None
+    evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
+    if history.part_energies is not None and settings.replay:
+        # without a sign of the next contact nothing is known of what comes after td
+        end = flight.end or (float(history.time[-1]) if seen or span else td)
+        start = min(td, float(history.time[0]) if flight.start is None else flight.start)
+        evidence = _with_parts(evidence, history, td, Span(start, end))
+    return Situation(history, td, settings, flight, evidence)
 
 
 def _oscillator(
@@ -71,20 +75,18 @@ def _oscillator(
     return fit, span
 
 
-def _with_parts(situation: Situation, energies: Samples, end: float) -> Situation:
-    """Add what the energies of single parts, (n, k), tell of the flight up to ``end``."""
+def _with_parts(evidence: Evidence, history: History, td: float, within: Span) -> Evidence:
+    """Add what the energies of single parts tell of the flight."""
     from d2rpick.vibration.envelope import upper_envelope
     from d2rpick.vibration.part_signs import PartVibration, read_parts
 
-    history, td, start = situation.history, situation.td, situation.flight.start
-    first = min(td, float(history.time[0]) if start is None else start)
-    inside = slice(*np.searchsorted(history.time, [first, np.nextafter(end, np.inf)]))
-    if history.time[inside].size < 3:
-        return situation
-    parts = read_parts(history.time[inside], energies[inside], history.part_names)
-    whole = situation.mode or upper_envelope(history.time[inside], history.energy[inside])
-    vibration = PartVibration(parts, whole) if parts.signed and whole else None
-    return replace(situation, parts=parts, signed_parts=vibration)
+    assert history.part_energies is not None
+    time, energy = history.between(*within)
+    if time.size < 3:
+        return evidence
+    parts = read_parts(time, history.part_energies[window(history.time, *within)], history.part_names)
+    whole = energy_at(history, td, evidence).mode or upper_envelope(time, energy)
+    return evidence._replace(parts=parts, signed=PartVibration(parts, whole) if parts.signed and whole else None)
 
 
 def _inside(history: History, time: float, option: str) -> None:

@@ -82,10 +82,8 @@ def mean_in_flight(situation: Situation) -> float | None:
 
 def _flight(situation: Situation) -> tuple[Samples, Samples]:
     """Times and energies of the flight, up to td where its end is not known; empty where its start is not."""
-    history, (start, end) = situation.history, (situation.flight.start, situation.flight.end)
-    window = [np.inf if start is None else start, np.nextafter(situation.td if end is None else end, np.inf)]
-    inside = slice(*np.searchsorted(history.time, window))
-    return history.time[inside], history.energy[inside]
+    start, end = situation.flight.start, situation.flight.end
+    return situation.history.between(np.inf if start is None else start, situation.td if end is None else end)
 
 
 def shortfall(energy: float, mean: float) -> float:

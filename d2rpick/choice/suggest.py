@@ -70,11 +70,11 @@ def better_pair(situation: Situation) -> Pair | None:
     if start is None:
         return None
     # where nothing tells the end of the flight, it is not sought beyond td
-    end = situation.td if situation.flight.end is None and not situation.span else situation.latest_td
+    end = situation.td if situation.flight.end is None and not situation.evidence.span else situation.latest_td
     for td in sorted(situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)):
         there = situation.at(td)
-        if situation.fitted and not there.mode:
-            continue  # the oscillator has sunk into the scatter there
+        if there.vibration.doubts:
+            continue
         best = best_of(there, rank(find_candidates(there)))
         if best and not best.same_swing:
             return Pair(best.tr, td, best.residual)

@@ -41,7 +41,7 @@ def suggest_in_window(history: History, window: tuple[float, float], settings: S
     look = cache(partial(examine, history, settings=settings))  # the record is examined once for each td
     situation = _flying(look, window)
     window_in_flight = window[0], max(window[0], min(window[1], situation.latest_td))
-    if situation.vibration is None:
+    if situation.vibration.unknown:
         found = _highest(situation, window_in_flight, look)
     else:
         peaks = situation.peaks(*window_in_flight)
@@ -76,7 +76,7 @@ def _flying(look: Look, window: tuple[float, float]) -> Situation:
 
 def _best(situation: Situation, times: tuple[float, ...], look: Look) -> Situation | None:
     """Situation at the td of the best pair, of the highest of these times; None where none has an acceptable tr."""
-    highest = sorted(times, key=lambda t: -situation.energy_at(t))[:_MOST_PEAKS]
+    highest = sorted(times, key=lambda t: -situation.vibration.energy(t))[:_MOST_PEAKS]
     pairs: list[tuple[Situation, Candidate]] = []
     for td in highest:
         there = look(td)

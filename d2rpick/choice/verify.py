@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.choice.candidates import Candidate, Found, judge
+from d2rpick.choice.candidates import Candidate, judge
 from d2rpick.choice.examine import examine
 from d2rpick.choice.ranking import over_limits
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of
 from d2rpick.errors import RangeError
+from d2rpick.vibration.moments import Moment
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -48,7 +49,7 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
     settings, td = situation.settings, situation.td
     _in_order(tr, td)
     situation.history.energy_at(tr)
-    (candidate,) = judge(situation, [Found(tr, "given", None)])
+    (candidate,) = judge(situation, [Moment(tr, "given", None)])
     known = situation.flight.start is not None
     share = situation.kinetic_share
     limit = POOR_KINETIC_SHARE if settings.max_kinetic_share is None else settings.max_kinetic_share
@@ -74,7 +75,7 @@ def _in_order(tr: float, td: float) -> None:
 
 def approve(situation: Situation, times: Iterable[float]) -> list[bool]:
     """Tell for each of ``times`` before td whether ``verify`` would verify it as tr."""
-    judged = judge(situation, [Found(tr, "given", None) for tr in times])
+    judged = judge(situation, [Moment(tr, "given", None) for tr in times])
     return [candidate.acceptable and not over_limits(situation, candidate) for candidate in judged]
 
 

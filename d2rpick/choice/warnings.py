@@ -32,12 +32,12 @@ def cautions_of(situation: Situation) -> Iterator[Caution]:
 
 
 def _of_energy(situation: Situation) -> Iterator[Caution]:
-    td, mode, share = situation.td, situation.mode, situation.kinetic_share
+    td, mode, share = situation.td, situation.vibration.mode, situation.kinetic_share
     if situation.energy_td <= 0:
         found = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
         yield Caution("no-energy", f"{found}; a level to lock in needs a positive energy")
-    if situation.no_vibration:
-        yield Caution("energy-only", f"{situation.no_vibration}; candidates are judged by their energy level alone")
+    if unknown := situation.vibration.unknown:
+        yield Caution("energy-only", f"{unknown}; candidates are judged by their energy level alone")
     if share is not None and share > POOR_KINETIC_SHARE:
         lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g}"
         yield Caution("poor-td", f"{lost} and cannot be kept by any tr")
@@ -47,12 +47,12 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
 
 
 def _of_parts(situation: Situation) -> Iterator[Caution]:
-    if situation.kinetic_share_estimated:
-        found = f"the kinetic share is an estimate from the envelope of the energy: {situation.no_mode}"
+    vibration = situation.vibration
+    if vibration.estimated:
+        found = f"the kinetic share is an estimate from the envelope of the energy: {vibration.estimated}"
         yield Caution("kinetic-share-estimated", found)
-    if situation.part_vibration:
-        for part in situation.part_vibration.parts.unsigned:
-            yield Caution("part-without-sign", f"{part.name} was left out: {part.reason}")
+    for part in vibration.unsigned:
+        yield Caution("part-without-sign", f"{part.name} was left out: {part.reason}")
 
 
 def _of_flight(situation: Situation) -> Iterator[Caution]:
@@ -66,6 +66,20 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
     if earliest is None:
         yield Caution("no-flight", "nothing in the record shows when the load is over; give that time with --after")
     elif td <= earliest:
-        yield Caution("td-in-load", f"td = {td:.6g} lies before {situation.end_of_load}")
+        yield Caution("td-in-load", f"td = {td:.6g} lies before {end_of_load(situation)}")
     if td > situation.latest_td:
-        yield Caution("td-after-contact", f"td = {td:.6g} lies after {situation.end_of_flight}")
+        yield Caution("td-after-contact", f"td = {td:.6g} lies after {end_of_flight(situation)}")
+
+
+def end_of_load(situation: Situation) -> str:
+    """Words for ``earliest_tr``: the start of the flight, and the margin where one is kept."""
+    return f"the end of the load at {situation.flight.start:.6g}{_margin(situation)}"
+
+
+def end_of_flight(situation: Situation) -> str:
+    """Words for ``latest_td``: the end of the flight, and the margin where one is kept."""
+    return f"the end of the flight at {situation.flight.end:.6g}{_margin(situation)}"
+
+
+def _margin(situation: Situation) -> str:
+    return f" with the margin {situation.settings.margin:.6g}" if situation.settings.margin else ""

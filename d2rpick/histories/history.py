@@ -161,8 +161,25 @@ class History:
 
     def mean_energy(self, start: float, end: float) -> float | None:
         """Mean energy of the states in a window; None where there is none [energy]."""
-        inside = self.energy[slice(*np.searchsorted(self.time, [start, np.nextafter(end, np.inf)]))]
-        return float(inside.mean()) if inside.size else None
+        energy = self.between(start, end)[1]
+        return float(energy.mean()) if energy.size else None
+
+    def between(self, start: float, end: float) -> tuple[Samples, Samples]:
+        """Times and energies of the states from ``start`` to ``end``, both included [time], [energy]."""
+        inside = window(self.time, start, end)
+        return self.time[inside], self.energy[inside]
+
+
+def window(time: Samples, start: float, end: float) -> slice:
+    """Slice of ascending times from ``start`` to ``end``, both included [time].
+
+    Examples
+    --------
+    >>> window(np.array([0.0, 1.0, 2.0, 3.0]), 1.0, 2.0)
+    slice(1, 3, None)
+    """
+    first, last = np.searchsorted(time, [start, np.nextafter(end, np.inf)]).tolist()
+    return slice(first, last)
 
 
 def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:

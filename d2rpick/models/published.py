@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice import measures
+from d2rpick.vibration import measures
 from d2rpick.vibration.oscillator import Oscillator, State
 from d2rpick.vibration.replay import Replay, to_mode
 

@@ -152,7 +152,7 @@ def _scale(axes: Axes, levels: Samples, highest: float) -> None:
 
 
 def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | None, *, narrow: bool = False) -> Figure:
-    with_motion = tr is not None and isinstance(situation.mode, Mode) and situation.described(tr)
+    with_motion = tr is not None and isinstance(situation.vibration.mode, Mode) and situation.vibration.described(tr)
     width, one, two = _SIZES[narrow]
     figure = Figure(figsize=(width, two if with_motion else one), layout="constrained")
     axes = figure.subplots(2 if with_motion else 1, 1, sharex=True, squeeze=False)[:, 0]
@@ -173,9 +173,9 @@ def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | N
 
 
 def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, ...]) -> None:
-    history, level, flight = situation.history, situation.energy_td, situation.flight
+    history, level, flight, span = situation.history, situation.energy_td, situation.flight, situation.evidence.span
     if flight.start is not None:
-        known = situation.span.end if situation.span else situation.td  # without a contact, as far as it was seen
+        known = span.end if span else situation.td  # without a contact, as far as it was seen
         end = known if flight.end is None else flight.end
         axes.axvspan(flight.start, end, color=FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
     axes.plot(history.time, history.energy, color=REFERENCE, linewidth=1, label=_plain(history.channel))
@@ -200,7 +200,7 @@ def show_level(axes: Axes, level: float, highest: float) -> None:
 
 
 def _draw_motion(axes: Axes, situation: Situation, tr: float) -> None:
-    mode, span, td = situation.mode, situation.span, situation.td
+    mode, span, td = situation.vibration.mode, situation.evidence.span, situation.td
     assert isinstance(mode, Mode)
     assert span is not None
     time = np.linspace(span.start, max(span.end, td), 2000)

@@ -21,7 +21,7 @@ def heading(situation: Situation) -> list[str]:
     history, flight = situation.history, situation.flight
     unit = f" {history.time_unit}" if history.time_unit else ""
     what = f"{', '.join(history.source)}: {history.format}, {history.channel}"
-    share = measure(situation.kinetic_share) + (" (estimate)" if situation.kinetic_share_estimated else "")
+    share = measure(situation.kinetic_share) + (" (estimate)" if situation.vibration.estimated else "")
     lines = [
         f"history  {what}, {history.time.size} states, {history.time[0]:.6g} to {history.time[-1]:.6g}{unit}",
         f"td       {situation.td:.6g}: energy {situation.energy_td:.6g}, kinetic share {share}",
@@ -38,10 +38,10 @@ def heading(situation: Situation) -> list[str]:
 
 def _basis(situation: Situation) -> str:
     """What the choice rests on, and the oscillator behind it."""
-    fit, mode = situation.fit, situation.mode
+    fit, vibration = situation.evidence.fit, situation.vibration
+    mode, parts = vibration.mode, f"parts, signs of {', '.join(vibration.signed)}" if vibration.signed else ""
     if not (mode and fit):
-        whole = "; vibration energy estimated by the envelope of the energy"
-        return _parts(situation) + whole if situation.part_vibration else situation.basis
+        return f"{parts}; vibration energy estimated by the envelope of the energy" if parts else vibration.basis
     rates = ", ".join(f"{one.omega:.6g}" for one in mode.modes)
     facts = [f"omega {rates}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
@@ -50,13 +50,8 @@ def _basis(situation: Situation) -> str:
     source = "given" if situation.settings.oscillator else "identified"
     count = len(mode.modes)
     oscillator = f"oscillator, {source}" if count == 1 else f"oscillator of {count} modes, {source}"
-    front = f"{_parts(situation)}; " if situation.part_vibration else ""
+    front = f"{parts}; " if parts else ""
     return f"{front}{oscillator}: {', '.join(facts)}; tr and energies are its"
-
-
-def _parts(situation: Situation) -> str:
-    assert situation.part_vibration is not None
-    return f"parts, signs of {', '.join(situation.part_vibration.parts.names)}"
 
 
 def frame(situation: Situation, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
@@ -89,22 +84,22 @@ def parts_of(parts: Sequence[Part] | None) -> list[dict[str, Any]] | None:
 
 def mechanics(situation: Situation) -> dict[str, Any]:
     """Keys of JSON results that describe the situation at td."""
-    flight = situation.flight
+    flight, parts = situation.flight, situation.evidence.parts
     return {
         "energy_td": situation.energy_td,
         "kinetic_share": situation.kinetic_share,
-        "kinetic_share_estimated": situation.kinetic_share_estimated,
+        "kinetic_share_estimated": situation.vibration.estimated is not None,
         "basis": situation.basis,
         "flight": {"start": flight.start, "end": flight.end, "source": flight.source, "parts": parts_of(flight.parts)},
         "oscillator": _oscillator(situation),
         "modes": _modes(situation),
-        "unsigned_parts": [part._asdict() for part in situation.parts.unsigned] if situation.parts else None,
+        "unsigned_parts": [part._asdict() for part in parts.unsigned] if parts else None,
     }
 
 
 def _oscillator(situation: Situation) -> dict[str, Any] | None:
     """Give the one oscillator that was fitted, or null; where several describe the record, that one does not."""
-    fit = situation.fit
+    fit = situation.evidence.fit
     if fit is None:
         return None
     several = fit.mode is not None and len(fit.mode.modes) > 1
@@ -123,7 +118,7 @@ def _oscillator(situation: Situation) -> dict[str, Any] | None:
 
 def _modes(situation: Situation) -> list[dict[str, float]] | None:
     """Give the modes whose sum describes the record, or null where one or none does."""
-    modes = situation.mode.modes if situation.mode else ()
+    modes = situation.vibration.mode.modes if situation.vibration.mode else ()
     if len(modes) < 2:
         return None
     return [

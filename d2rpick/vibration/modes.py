@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.vibration.one_mode import Mode, energy_and_jacobian
+from d2rpick.vibration.roots import narrow
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 # Points per period of the fastest mode on which sign changes are looked for: an extremum of the energy lasts a quarter
 # of that period at least, but for shallow ones that are no use as switch times.
 _POINTS_PER_PERIOD: Final = 32
-_HALVINGS: Final = 50  # to rounding
 _ROUNDING: Final = 1e-6  # of a radian: where an end of a window is itself an extremum, one is found this near to it
 
 
@@ -144,9 +144,6 @@ def _roots(function: Callable[[Samples], Samples], edges: Samples, but: float = 
     """Find where ``function`` changes its sign between neighbouring ``edges``, by halving; not at ``but`` itself."""
     values = np.where(edges == but, 0.0, function(edges))
     cells = np.flatnonzero(values[:-1] * values[1:] < 0)
-    low, high, below = edges[cells], edges[cells + 1], values[cells]
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        left = function(middle) * below > 0
-        low, high = np.where(left, middle, low), np.where(left, high, middle)
-    return tuple(((low + high) / 2).tolist())
+    side = np.sign(values[cells])
+    found = narrow(lambda t: side * function(t), edges[cells], edges[cells + 1])
+    return tuple(found.at.tolist())

@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.vibration.roots import narrow
+
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
+# Halving alone would need no more to reach rounding.
+_STEPS = 64
 _EPS = float(np.finfo(np.float64).eps)
 # Of the amplitude: below, a deformation is zero but for rounding.
 _ZERO = 1e-9
@@ -158,7 +162,12 @@ class Mode:
         scale = abs(level_q) + abs(self.preload) + np.sqrt(self.vibration_energy(edges))
         above[np.abs(above) <= 8 * _EPS * scale] = 0.0
         cells = np.flatnonzero(above[:-1] * above[1:] < 0)  # between neighbouring extrema q is monotone
-        return tuple(self._roots(level_q, edges[cells], edges[cells + 1], above[cells]).tolist())
+        side = np.sign(above[cells])
+        found = narrow(
+            lambda t: side * (self.deformation(t) - level_q), edges[cells], edges[cells + 1],
+            slope=lambda t: side * self.velocity(t), steps=_STEPS,
+        )  # fmt: skip
+        return tuple(found.at.tolist())
 
     def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
         """Find the times in (start, td), ascending, where the energy passes its level at ``td`` [time]."""
@@ -166,22 +175,6 @@ class Mode:
         # a level of zero is met once by each passage, whatever rounding makes of its sign
         levels = {level, -level} if abs(level) > _ZERO * np.sqrt(self.vibration_energy(td)) else {0.0}
         return tuple(sorted(t for q in levels for t in self.crossings(q, start, td)))
-
-    def _roots(self, level_q: float, low: Samples, high: Samples, above_low: Samples) -> Samples:
-        """Root of q = level_q in each bracket: Newton, and halving where Newton leaves the bracket."""
-        t = (low + high) / 2
-        for _ in range(64):  # halving alone would need no more to reach rounding
-            above = self.deformation(t) - level_q
-            left = above * above_low > 0
-            low, high = np.where(left, t, low), np.where(left, high, t)
-            slope = self.velocity(t)
-            newton = t - above / np.where(slope == 0, np.inf, slope)
-            following = np.where((newton >= low) & (newton <= high), newton, (low + high) / 2)
-            moved = np.abs(following - t)
-            t = following
-            if np.all(moved <= 2 * _EPS * np.abs(t)):
-                break
-        return t
 
     @property
     def _velocity_parts(self) -> tuple[float, float]:

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice import measures
 from d2rpick.choice.candidates import Candidate
 from d2rpick.choice.ranking import EQUALLY_GOOD, rank
 from d2rpick.choice.settings import Settings
@@ -17,6 +16,7 @@ from d2rpick.choice.suggest import Suggestion, suggest
 from d2rpick.choice.verify import verify
 from d2rpick.errors import RangeError
 from d2rpick.histories.history import History
+from d2rpick.vibration import measures
 from d2rpick.vibration.replay import to_mode
 from tests import paper
 from tests.shared import shared

@@ -117,38 +117,38 @@ def test_a_start_that_is_given_replaces_the_start_only() -> None:
 def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
     situation = examine(loaded(), 0.064, Settings(after=0.005))
     assert situation.flight.start == 0.005
-    assert situation.span is not None
-    assert situation.span.start == pytest.approx(0.020, abs=PERIOD / 10)
-    assert situation.energy_at(0.01) == pytest.approx(loaded().energy_at(0.01))
+    assert situation.evidence.span is not None
+    assert situation.evidence.span.start == pytest.approx(0.020, abs=PERIOD / 10)
+    assert situation.vibration.energy(0.01) == pytest.approx(loaded().energy_at(0.01))
 
 
 def test_a_fit_window_away_from_td_says_nothing_of_td() -> None:
     history = loaded(alpha=5.0, contact=0.09)
     situation = examine(history, 0.12, Settings(fit_window=(0.03, 0.085)))
     assert situation.basis == "energy"
-    assert situation.no_mode is not None
-    assert "does not describe the record at td" in situation.no_mode
+    assert situation.vibration.unknown is not None
+    assert "does not describe the record at td" in situation.vibration.unknown
 
 
 def test_a_fit_window_is_where_the_oscillator_comes_from() -> None:
     situation = examine(loaded(), 0.064, Settings(fit_window=(0.03, 0.12)))
-    assert situation.fit is not None
-    assert (situation.fit.start, situation.fit.end) == pytest.approx((0.03, 0.12))
+    assert situation.evidence.fit is not None
+    assert (situation.evidence.fit.start, situation.evidence.fit.end) == pytest.approx((0.03, 0.12))
     assert situation.flight.start == pytest.approx(0.020, abs=PERIOD / 10)
 
 
 def test_without_replay_no_oscillator_is_looked_for() -> None:
     situation = examine(loaded(), 0.064, Settings(replay=False))
-    assert (situation.basis, situation.fit) == ("energy", None)
-    assert situation.no_mode is not None
-    assert "--no-verify" in situation.no_mode
+    assert (situation.basis, situation.evidence.fit) == ("energy", None)
+    assert situation.vibration.unknown is not None
+    assert "--no-verify" in situation.vibration.unknown
 
 
 def test_a_vibration_that_has_sunk_into_noise_has_no_sign() -> None:
     situation = examine(loaded(noise=0.01), 0.1, Settings())
     assert situation.basis == "energy"
-    assert situation.no_mode is not None
-    assert "sunk into the scatter" in situation.no_mode
+    assert situation.vibration.unknown is not None
+    assert "sunk into the scatter" in situation.vibration.unknown
 
 
 # ---- td early in a flight, and in the next contact
@@ -194,8 +194,9 @@ def test_td_in_the_next_contact_is_after_the_end_of_the_flight(td: float, after:
 @pytest.mark.parametrize("td", [0.1, 0.149])
 def test_a_contact_does_not_creep_into_the_fit(td: float) -> None:
     situation = examine(STRUCK, td, Settings())
-    assert situation.fitted is not None
-    assert situation.fitted.alpha == pytest.approx(10, abs=0.05)
+    fitted = situation.vibration.mode
+    assert fitted is not None
+    assert fitted.alpha == pytest.approx(10, abs=0.05)
     assert situation.flight.end == pytest.approx(0.150, abs=PERIOD / 25)
 
 
@@ -215,7 +216,10 @@ def test_a_small_second_mode_makes_no_short_flights() -> None:
     history = History(time, energy, source=("two",), format="csv", channel="E")
     for td in np.linspace(0.03, 0.12, 10):
         situation = examine(history, float(td), Settings())
-        assert situation.span is None or situation.span.end - situation.span.start > 1.25 * PERIOD
+        assert (
+            situation.evidence.span is None
+            or situation.evidence.span.end - situation.evidence.span.start > 1.25 * PERIOD
+        )
 
 
 # ---- an oscillator that is given, or has sunk into noise

@@ -7,11 +7,11 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from d2rpick.choice.examine import examine
-from d2rpick.choice.measures import kinetic_share, lock_in_error, residual
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, identify_several
+from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual
 from d2rpick.vibration.modes import Modes, sum_and_jacobian
 from d2rpick.vibration.one_mode import Mode
 from d2rpick.vibration.replay import replayed_residual
@@ -147,8 +147,8 @@ def test_records_without_several_modes_say_so(time: np.ndarray, energy: np.ndarr
 def test_several_modes_are_chosen_by_and_replayed() -> None:
     answer = suggest(of(TWO), TWO.peaks(4.0, 5.0)[0], Settings(tolerance=0.5))
     situation = answer.situation
-    assert (situation.basis, situation.fit and situation.fit.describes_record) == ("oscillator", True)
-    assert isinstance(situation.mode, Modes)
+    assert (situation.basis, situation.evidence.fit and situation.evidence.fit.describes_record) == ("oscillator", True)
+    assert isinstance(situation.vibration.mode, Modes)
     assert {c.kind for c in answer.candidates} == {"crossing", "extremum", "match"}
     tr = np.array([c.tr for c in answer.candidates])
     expected = replayed_residual(TWO, tr, situation.td)
@@ -158,14 +158,16 @@ def test_several_modes_are_chosen_by_and_replayed() -> None:
 
 def test_the_total_energy_of_the_chain_tells_its_two_modes() -> None:
     situation = examine(chain.history("IE_total_J"), chain.TD_PEAK, Settings())
-    assert isinstance(situation.mode, Modes)
-    periods = sorted(2 * np.pi / mode.omega for mode in situation.mode.modes)
+    assert isinstance(situation.vibration.mode, Modes)
+    periods = sorted(2 * np.pi / mode.omega for mode in situation.vibration.mode.modes)
     assert periods == pytest.approx([0.0285, 0.0491], abs=1e-4)
-    assert situation.mode.alpha == pytest.approx(5, rel=1e-3)
+    assert situation.vibration.mode.alpha == pytest.approx(5, rel=1e-3)
     assert situation.kinetic_share == pytest.approx(0.00065, abs=1e-4)
     errors = []
     for run in chain.scan():
         there = situation.at(run["td_s"])
-        assert there.mode is not None
-        errors.append(abs(float(replayed_residual(there.mode, np.array([run["tr_s"]]), there.td)[0]) - run["R_sim"]))
+        assert there.vibration.mode is not None
+        errors.append(
+            abs(float(replayed_residual(there.vibration.mode, np.array([run["tr_s"]]), there.td)[0]) - run["R_sim"])
+        )
     assert max(errors) < 0.025

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.candidates import Found, judge
+from d2rpick.choice.candidates import judge
 from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
@@ -18,6 +18,7 @@ from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threa
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.vibration.envelope import upper_envelope
+from d2rpick.vibration.moments import SUNK, Moment
 from d2rpick.vibration.part_signs import MOST_UNSIGNED, read_parts
 from tests import chain
 from tests.records import printed
@@ -114,7 +115,7 @@ def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
     noise = np.random.default_rng(3).normal(size=(40, 2))
     deformation[300:340] = 0.02 * noise  # the signal is lost for a while
     situation = examine(of(deformation, time), 10.0, replace(PLAIN, after=0.0))
-    early, late = judge(situation, [Found(2.0, "given", None), Found(8.0, "given", None)])
+    early, late = judge(situation, [Moment(2.0, "given", None), Moment(8.0, "given", None)])
     assert (early.sign_match, early.residual) == (None, None)
     assert any("cannot be followed" in note for note in early.notes)
     assert late.sign_match is not None
@@ -124,7 +125,7 @@ def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
 
 
 def predicted(situation: Situation, tr: float) -> float:
-    (candidate,) = judge(situation, [Found(tr, "given", None)])
+    (candidate,) = judge(situation, [Moment(tr, "given", None)])
     assert candidate.residual is not None
     return candidate.residual
 
@@ -136,12 +137,12 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
         situation = examine(chain.history(), td, PLAIN)
         assert situation.basis == "parts"
         if estimated:
-            assert situation.part_vibration is not None
+            assert situation.evidence.signed is not None
             whole = upper_envelope(situation.history.time, situation.history.energy)
             assert whole is not None
-            vibration = replace(situation.part_vibration, whole=whole)
-            situation = replace(situation, fit=None, span=None, signed_parts=vibration)
-            assert situation.kinetic_share_estimated
+            vibration = replace(situation.evidence.signed, whole=whole)
+            situation = replace(situation, evidence=situation.evidence._replace(fit=None, span=None, signed=vibration))
+            assert situation.vibration.estimated
         runs = [run for run in chain.scan() if abs(run["td_s"] - td) < 1e-3]  # a step of the solver late
         errors += [abs(predicted(situation.at(run["td_s"]), run["tr_s"]) - run["R_sim"]) for run in runs]
     assert len(errors) == len(chain.scan())
@@ -161,14 +162,14 @@ def test_the_envelope_is_that_of_the_vibration_above_the_errors_of_the_solver() 
 
 def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> None:
     situation = examine(chain.history(), chain.TD_LATE, PLAIN)
-    assert situation.part_vibration is not None
+    assert situation.evidence.signed is not None
     whole = upper_envelope(situation.history.time, situation.history.energy)
     assert whole is not None
     sunk = whole._replace(floor=1.01 * float(whole.vibration_energy(chain.TD_LATE)))
-    parts = replace(situation.part_vibration, whole=sunk)
-    situation = replace(situation, fit=None, span=None, signed_parts=parts)
-    assert (situation.basis, situation.kinetic_share, situation.drowned) == ("energy", None, True)
-    (candidate,) = judge(situation, [Found(0.18, "given", None)])
+    parts = replace(situation.evidence.signed, whole=sunk)
+    situation = replace(situation, evidence=situation.evidence._replace(fit=None, span=None, signed=parts))
+    assert (situation.basis, situation.kinetic_share, situation.vibration.doubts) == ("energy", None, (SUNK,))
+    (candidate,) = judge(situation, [Moment(0.18, "given", None)])
     assert (candidate.acceptable, candidate.residual, candidate.sign_match) == (False, None, None)
     assert "the level at td has sunk into the scatter of the record" in candidate.notes
     assert any("no more than a solver errs" in note for note in candidate.notes)
@@ -177,7 +178,7 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
 
 
 def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
-    parts = examine(chain.history(), chain.TD_LATE, PLAIN).parts
+    parts = examine(chain.history(), chain.TD_LATE, PLAIN).evidence.parts
     assert parts is not None
     for run in chain.scan():
         product = parts.amplitudes(run["tr_s"]) * parts.amplitudes(run["td_s"])
@@ -214,7 +215,7 @@ def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
 
 def test_the_parts_that_contribute_most_are_named() -> None:
     situation = examine(chain.history(), chain.TD_PEAK, PLAIN)
-    (candidate,) = judge(situation, [Found(0.1, "given", None)])
+    (candidate,) = judge(situation, [Moment(0.1, "given", None)])
     assert candidate.part_mismatch is not None
     shares = [part.share for part in candidate.parts]
     assert sum(share or 0 for share in shares) == pytest.approx(1)

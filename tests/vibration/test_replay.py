@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice import measures
 from d2rpick.errors import RangeError
+from d2rpick.vibration import measures
 from d2rpick.vibration.one_mode import Mode
 from d2rpick.vibration.oscillator import Oscillator, State
 from d2rpick.vibration.replay import Replay, from_mode, replayed_residual, to_mode, trajectory

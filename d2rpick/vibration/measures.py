@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from d2rpick.vibration.roots import narrow
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.one_mode import Mode
 
 
-class Vibration(Protocol):
+class Deformation(Protocol):
     """What the measures need to know: deformations with signs, of modes or of parts, and the energy of all."""
 
     def amplitudes(self, t: Samples | float) -> Samples:
@@ -51,7 +53,7 @@ def level_error(energy_tr: float, energy_td: float) -> float | None:
     return abs(sqrt(energy_tr / energy_td) - 1)
 
 
-def kinetic_share(vibration: Vibration, td: float) -> float:
+def kinetic_share(vibration: Deformation, td: float) -> float:
     """K = T(td)/V(td) [-]: the share of the vibration energy that is kinetic at td, which no tr can save.
 
     V = T + (q - q0)^2 is the energy of the vibration about the preload q0; without preload V = T + E.
@@ -59,7 +61,7 @@ def kinetic_share(vibration: Vibration, td: float) -> float:
     return float(vibration.kinetic_energy(td) / vibration.vibration_energy(td))
 
 
-def lock_in_error(vibration: Vibration, tr: Samples | float, td: float) -> Samples:
+def lock_in_error(vibration: Deformation, tr: Samples | float, td: float) -> Samples:
     """L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the deformation that is locked in, of the shape of ``tr``.
 
     The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1; for
@@ -69,20 +71,20 @@ def lock_in_error(vibration: Vibration, tr: Samples | float, td: float) -> Sampl
     return np.asarray(apart / np.sqrt(vibration.vibration_energy(td)))
 
 
-def part_mismatch(vibration: Vibration, tr: Samples | float, td: float) -> Samples:
+def part_mismatch(vibration: Deformation, tr: Samples | float, td: float) -> Samples:
     """D = L/sqrt(1 - K) [-]: the same error against the internal energy at td alone, of the shape of ``tr``."""
     apart = np.linalg.norm(_apart(vibration, tr, td), axis=0)
     return np.asarray(apart / np.linalg.norm(vibration.amplitudes(td)))
 
 
-def mismatch_shares(vibration: Vibration, tr: float, td: float) -> Samples:
+def mismatch_shares(vibration: Deformation, tr: float, td: float) -> Samples:
     """Give the share of each mode or part in D^2, shape (k,) [-]; zero where nothing is off."""
     square = _apart(vibration, tr, td) ** 2
     total = square.sum()
     return square / total if total > 0 else square
 
 
-def sign_match(vibration: Vibration, tr: Samples | float, td: float) -> NDArray[np.bool_]:
+def sign_match(vibration: Deformation, tr: Samples | float, td: float) -> NDArray[np.bool_]:
     """Whether the deformations at tr and td point the same way, of the shape of ``tr``.
 
     For one mode or part: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a part which is
@@ -92,7 +94,7 @@ def sign_match(vibration: Vibration, tr: Samples | float, td: float) -> NDArray[
     return np.asarray(np.tensordot(at_td, vibration.amplitudes(tr), axes=1) >= 0)
 
 
-def _apart(vibration: Vibration, tr: Samples | float, td: float) -> Samples:
+def _apart(vibration: Deformation, tr: Samples | float, td: float) -> Samples:
     """q(tr) - q(td), of the shape of ``tr`` with an axis for modes or parts before it [sqrt(energy)]."""
     at_tr = vibration.amplitudes(tr)
     return np.asarray((at_tr.T - vibration.amplitudes(td)).T)
@@ -158,8 +160,5 @@ def _leaving(mode: Mode, tr: Samples, turns: Samples, wanted: Samples, room: Sam
     first = np.argmax(outside, axis=0)
     column = np.arange(tr.size)
     inner, outer = edges[np.maximum(first - 1, 0), column], edges[first, column]
-    for _ in range(50):  # halvings, to rounding
-        middle = (inner + outer) / 2
-        left = np.abs(mode.deformation(middle) - wanted) > room
-        inner, outer = np.where(left, inner, middle), np.where(left, middle, outer)
-    return np.where(first > 0, np.abs(inner - tr), np.inf)
+    found = narrow(lambda t: ~(np.abs(mode.deformation(t) - wanted) > room), inner, outer)
+    return np.where(first > 0, np.abs(found.within - tr), np.inf)

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.choice.uncertainty import curvature, fitted_reach, reach, sampled_reach
 from d2rpick.histories.crossings import find_crossings
 from d2rpick.histories.history import History, Precision
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Modes
 from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.uncertainty import curvature, fitted_reach, reach, sampled_reach
 
 
 def rounded(values: np.ndarray, digits: int) -> np.ndarray:

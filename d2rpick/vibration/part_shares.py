@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.choice import measures
+from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.situation import Situation
+    from d2rpick.vibration.part_signs import PartVibration
 
 # The parts that are named together make up this much of the mismatch.
 _MOST = 0.8
@@ -27,11 +27,8 @@ class PartMatch(NamedTuple):
     reason: str | None = None
 
 
-def contributions(situation: Situation, tr: float) -> tuple[PartMatch, ...]:
-    """Give the match of each part, that with the largest share first; nothing where single parts are not known."""
-    vibration, td = situation.part_vibration, situation.td
-    if vibration is None:
-        return ()
+def contributions(vibration: PartVibration, tr: float, td: float) -> tuple[PartMatch, ...]:
+    """Give the match of each part, that with the largest share first, then those without a sign."""
     shares = measures.mismatch_shares(vibration, tr, td).tolist()
     same = (vibration.amplitudes(tr) * vibration.amplitudes(td) >= 0).tolist()
     matches = [PartMatch(*row) for row in zip(vibration.parts.names, same, shares, strict=True)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.choice import measures
-from d2rpick.choice.lock_in_profile import Profile
+from d2rpick.vibration import measures
+from d2rpick.vibration.lock_in_profile import Profile
 from d2rpick.vibration.one_mode import Mode
 
 MODE = Mode(omega=2 * np.pi, alpha=0.2, cosine=0.0, sine=1.0, origin=0.0)

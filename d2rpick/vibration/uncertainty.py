@@ -85,8 +85,8 @@ def fitted_reach(history: History, fit: Identification, mode: Mode | Modes, time
 
 def _local_rest(history: History, fit: Identification, mode: Mode | Modes, at: Samples) -> Samples:
     """Systematic rest of a fit near each time: its rms, and more where the vibration is above its own rms [energy]."""
-    window = slice(*np.searchsorted(history.time, [fit.start, np.nextafter(fit.end, np.inf)]))
-    usual = np.sqrt(np.mean(mode.vibration_energy(history.time[window]) ** 2))
+    time, _ = history.between(fit.start, fit.end)
+    usual = np.sqrt(np.mean(mode.vibration_energy(time) ** 2))
     return np.asarray(fit.structure * np.maximum(1.0, mode.vibration_energy(at) / usual))
 
 

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.choice import measures
+from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
-    from d2rpick.choice.measures import Vibration
+    from collections.abc import Sequence
+
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.measures import Deformation
+    from d2rpick.vibration.moments import Moment
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +25,7 @@ class Profile:
     error: Samples
 
     @classmethod
-    def of(cls, vibration: Vibration, time: Samples, td: float) -> Profile:
+    def of(cls, vibration: Deformation, time: Samples, td: float) -> Profile:
         """Profile at the times before ``td``."""
         before = time[time < td]
         return cls(before, measures.lock_in_error(vibration, before, td))
@@ -43,6 +46,11 @@ class Profile:
         """Interval between the two times around each of ``at`` [time]."""
         after = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
         return np.asarray(self.time[after] - self.time[after - 1])
+
+    def bounding(self, moments: Sequence[Moment], reach: Samples) -> Samples:
+        """Give ``reach`` of each moment, of a match half of its cell: it lies where the error is least [time]."""
+        times = np.array([moment.tr for moment in moments])
+        return np.where([moment.kind == "match" for moment in moments], self.cell(times) / 2, reach)
 
     def tolerance(self, tr: float, error: float) -> float:
         """How far ``tr`` may be off before ``error``, the one there, grows by 0.05; at most over all times [time]."""

@@ -1,0 +1,146 @@
+"""What is known of the vibration at one td: one protocol, and which of its three models can be relied on there.
+
+The signs of parts are worth more than an oscillator that describes the record, and that more than the energy alone.
+A further kind of vibration is a module with these methods and a line in `model_at`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+from d2rpick.vibration.moments import SUNK
+from d2rpick.vibration.of_energy import OfEnergy
+from d2rpick.vibration.of_modes import OfModes
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.identify import Identification
+    from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.moments import Measured, Moment
+    from d2rpick.vibration.one_mode import Mode
+    from d2rpick.vibration.part_shares import PartMatch
+    from d2rpick.vibration.part_signs import Parts, PartVibration, Unsigned
+    from d2rpick.vibration.span import Span
+
+
+class Vibration(Protocol):
+    """A vibration seen from one td."""
+
+    @property
+    def basis(self) -> str:
+        """Name of the model: "parts", "oscillator" or "energy"."""
+
+    @property
+    def unknown(self) -> str | None:
+        """Why no deformation with its sign is known; None where one is."""
+
+    @property
+    def undescribed(self) -> str:
+        """Why a single tr has no measures although deformations are known."""
+
+    @property
+    def estimated(self) -> str | None:
+        """Why the kinetic share is an estimate; None where it is none."""
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why the level at td means nothing, so that no tr can be trusted."""
+
+    @property
+    def unsigned(self) -> tuple[Unsigned, ...]:
+        """Parts that were left out, since their deformation has no sign."""
+
+    @property
+    def signed(self) -> tuple[str, ...]:
+        """Names of the parts whose signs are known."""
+
+    @property
+    def mode(self) -> Mode | Modes | None:
+        """Closed form of the whole energy, where there is one."""
+
+    @property
+    def kinetic_share(self) -> float | None:
+        """K at td, None where it is not known [-]."""
+
+    def energy(self, time: float) -> float:
+        """E at a time: of the model where it describes the record, of the samples elsewhere [energy]."""
+
+    def described(self, time: float) -> bool:
+        """Whether the energy at a time is the model's own."""
+
+    def peaks(self, start: float, end: float) -> tuple[float, ...]:
+        """Times in (start, end], ascending, where the energy peaks [time]."""
+
+    def moments(self, tolerance: float) -> Sequence[Moment]:
+        """Times before td that may serve as tr; standstills only where their error is within the tolerance."""
+
+    def measured(self, times: Samples) -> Sequence[Measured | None]:
+        """Measures of each time as tr, None where its deformation cannot be compared with that at td."""
+
+    def errors(self, times: Samples) -> Samples:
+        """What a tolerance is held against, of the shape of ``times``; infinite where no tolerance would help [-]."""
+
+    def knots(self) -> Samples:
+        """Times before td between which the errors run monotone [time]."""
+
+    def reach(self, moments: Sequence[Moment]) -> Samples:
+        """How far the true time of each moment may lie away [time]."""
+
+    def part_matches(self, tr: float) -> tuple[PartMatch, ...]:
+        """What each part has of the mismatch; nothing where single parts are not known."""
+
+
+class Evidence(NamedTuple):
+    """What was found in a record, whatever it is worth at one td.
+
+    ``fit`` is None only where no oscillator was looked for; ``span`` is the window in which it describes the record.
+    ``given``: the oscillator was given; ``prescribed``: it, or the window to identify it in.  ``parts`` are the
+    deformations of single parts, ``signed`` is their vibration, where they have a sign.
+    """
+
+    fit: Identification | None = None
+    span: Span | None = None
+    given: bool = False
+    prescribed: bool = False
+    parts: Parts | None = None
+    signed: PartVibration | None = None
+
+
+def model_at(history: History, td: float, evidence: Evidence) -> Vibration:
+    """Give the best model that can be relied on at ``td``."""
+    from d2rpick.vibration.of_parts import OfParts
+
+    whole, signed = energy_at(history, td, evidence), evidence.signed
+    sunk = signed is not None and signed.sunk(td)
+    if signed and not sunk:
+        return OfParts(whole, signed)
+    if isinstance(whole, OfModes):
+        return replace(whole, doubts=(SUNK,)) if sunk else whole
+    return whole.without_parts(evidence.parts, sunk=sunk)
+
+
+def energy_at(history: History, td: float, evidence: Evidence) -> OfModes | OfEnergy:
+    """Give the model of the whole energy to be relied on at ``td``: an oscillator, else the samples."""
+    fit = evidence.fit
+    if fit is None:
+        return OfEnergy(history, td, "no oscillator was looked for (--no-verify)")
+    prescribed = ("the prescribed oscillator does not describe the record at td",) * evidence.prescribed
+    if fit.reason:
+        what = "the given oscillator does not describe" if evidence.given else "no single oscillator describes"
+        return OfEnergy(history, td, f"{what} the record: {fit.reason}", prescribed)
+    model = describing(history, td, evidence)
+    if not model.described(td):
+        return OfEnergy(history, td, "the oscillator does not describe the record at td", prescribed)
+    sunk = model.sunk
+    return OfEnergy(history, td, sunk, (SUNK, *prescribed)) if sunk else model
+
+
+def describing(history: History, td: float, evidence: Evidence) -> OfModes | OfEnergy:
+    """Give the model of the energy whatever it is worth at ``td``: an oscillator where it describes a window."""
+    fit, span = evidence.fit, evidence.span
+    if fit and fit.mode and span:
+        return OfModes(history, td, fit, fit.mode, span)
+    return OfEnergy(history, td, "no oscillator describes the record")

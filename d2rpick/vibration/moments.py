@@ -1,0 +1,31 @@
+"""Times that may serve as tr, and what is measured at them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Moment(NamedTuple):
+    """A time that may serve as tr, before anything is measured; ``rising`` None where the energy turns.
+
+    ``kind``: "crossing" of the level, "extremum" near it, "match" of the deformations of several parts or modes, or
+    "given".
+    """
+
+    tr: float
+    kind: str
+    rising: bool | None
+
+
+class Measured(NamedTuple):
+    """Measures that only known deformations give."""
+
+    sign_match: bool
+    lock_in_error: float
+    residual: float
+    timing_tolerance: float
+    part_mismatch: float | None
+
+
+# Why no tr can be trusted where the vibration is known but cannot be made out at td.
+SUNK = "the level at td has sunk into the scatter of the record"

@@ -1,0 +1,104 @@
+"""The energy alone: no deformation is known, so a tr is judged by the level that is locked in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.histories.crossings import find_crossings, find_extrema
+from d2rpick.vibration import measures
+from d2rpick.vibration.moments import SUNK, Moment
+from d2rpick.vibration.uncertainty import sampled_reach
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.part_shares import PartMatch
+    from d2rpick.vibration.part_signs import Parts
+
+
+@dataclass(frozen=True, eq=False)
+class OfEnergy:
+    """The samples of a record seen from ``td``; ``unknown`` says why no deformation is known."""
+
+    history: History
+    td: float
+    unknown: str
+    doubts: tuple[str, ...] = ()
+
+    basis = "energy"
+    undescribed = ""
+    estimated = mode = kinetic_share = sunk = None
+    unsigned = signed = ()
+
+    def without_parts(self, parts: Parts | None, *, sunk: bool) -> OfEnergy:
+        """Say too why single parts do not tell the deformation: without a sign, or ``sunk`` at td."""
+        reasons = [self.unknown]
+        reasons += ["at td the parts vibrate no more than a solver errs"] * sunk
+        reasons += [f"{part.name}: {part.reason}" for part in (parts.unsigned if parts else ())]
+        doubts = (SUNK, *(doubt for doubt in self.doubts if doubt != SUNK)) if sunk else self.doubts
+        return replace(self, unknown="; ".join(reasons), doubts=doubts)
+
+    def energy(self, time: float) -> float:
+        """E of the samples, linear between them [energy]."""
+        return self.history.energy_at(time)
+
+    def described(self, time: float) -> bool:  # noqa: ARG002  by the protocol
+        """Never: there is no model but the samples."""
+        return False
+
+    def peaks(self, start: float, end: float) -> tuple[float, ...]:
+        """Samples in (start, end] at which the energy peaks [time]."""
+        turns = find_extrema(self.history.time, self.history.energy)
+        return tuple(turn.time for turn in turns if turn.peak and start < turn.time <= end)
+
+    def moments(self, tolerance: float) -> list[Moment]:
+        """Crossings of the level at td, and samples where the energy turns near it."""
+        time, energy = sampled_before(self.history, self.td, level := self.energy(self.td))
+        errors = ((turn.time, measures.level_error(turn.energy, level)) for turn in find_extrema(time, energy))
+        return [
+            *(Moment(c.time, "crossing", c.rising) for c in find_crossings(time, energy, level) if c.time < self.td),
+            *(Moment(t, "extremum", None) for t, error in errors if error is not None and error <= tolerance),
+        ]
+
+    def measured(self, times: Samples) -> list[None]:
+        """Nothing: no deformation is known."""
+        return [None] * times.size
+
+    def errors(self, times: Samples) -> Samples:
+        """Level errors, of the shape of ``times``; infinite where an energy is not positive [-]."""
+        energy, level = np.interp(times, self.history.time, self.history.energy), self.energy(self.td)
+        if not level > 0:
+            return np.full(times.shape, np.inf)
+        with np.errstate(over="ignore"):  # a level next to nothing: any other energy is infinitely far off
+            errors = np.abs(np.sqrt(np.maximum(energy, 0.0) / level) - 1)
+        return np.where(energy >= 0, errors, np.inf)
+
+    def knots(self) -> Samples:
+        """None but the samples, between which the energy is linear."""
+        return self.edges()
+
+    def edges(self) -> Samples:
+        """None but the samples."""
+        return np.zeros(0)
+
+    def reach(self, moments: Sequence[Moment]) -> Samples:
+        """How far sampling and printed digits leave the true time open [time]."""
+        return self.level_reach(np.array([moment.tr for moment in moments]))
+
+    def level_reach(self, times: Samples) -> Samples:
+        """How far from each time the energy may have the level at td [time]."""
+        return sampled_reach(self.history, times, self.td, self.energy(self.td))
+
+    def part_matches(self, tr: float) -> tuple[PartMatch, ...]:  # noqa: ARG002  by the protocol
+        """Nothing: single parts are not known."""
+        return ()
+
+
+def sampled_before(history: History, td: float, level: float) -> tuple[Samples, Samples]:
+    """Times and energies of the samples before ``td``, and td itself with its ``level`` at the end."""
+    before = history.time < td
+    return np.append(history.time[before], td), np.append(history.energy[before], level)

@@ -1,0 +1,164 @@
+"""One or several modes that describe the record: energies, crossings and deformations in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.histories.crossings import find_crossings
+from d2rpick.vibration import measures
+from d2rpick.vibration.lock_in_profile import Profile
+from d2rpick.vibration.moments import Measured, Moment
+from d2rpick.vibration.of_energy import sampled_before
+from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.replay import replayed_residual
+from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.identify import Identification
+    from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.part_shares import PartMatch
+    from d2rpick.vibration.span import Span
+
+# Of the fastest mode: what a parabola through three of them misses of a minimum is of the order of 1e-4 of a period.
+_POINTS_PER_PERIOD = 64
+# Where the scatter of the last period exceeds this share of the vibration energy at td, the vibration has sunk
+# into it: its sign is no longer certain.
+_DROWNED = 0.2
+# Of a radian: below, a time is the same but for rounding.
+_ZERO = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class OfModes:
+    """The ``mode`` of a ``fit``, or several, that describes a record within ``span``, seen from a ``td`` in it."""
+
+    history: History
+    td: float
+    fit: Identification
+    mode: Mode | Modes
+    span: Span
+
+    doubts: tuple[str, ...] = ()
+
+    basis = "oscillator"
+    undescribed = "not described by the oscillator"
+    unknown = estimated = None
+    unsigned = signed = ()
+
+    @cached_property
+    def sunk(self) -> str | None:
+        """Say so when the vibration at td is no more than the scatter of the record about it."""
+        start, end = max(self.td - 2 * np.pi / self.mode.omega, self.span.start), max(self.td, self.span.start)
+        time, energy = self.history.between(start, end)
+        scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
+        vibration = float(self.mode.vibration_energy(self.td))
+        if scatter <= _DROWNED * vibration:
+            return None
+        return (
+            f"at td the vibration energy {vibration:.3g} has sunk into the scatter of the record, {scatter:.3g}: "
+            "the sign of the deformation cannot be told"
+        )
+
+    @property
+    def kinetic_share(self) -> float:
+        """K at td [-]."""
+        return measures.kinetic_share(self.mode, self.td)
+
+    def energy(self, time: float) -> float:
+        """E of the mode where it describes the record, of the samples elsewhere [energy]."""
+        return float(self.mode.energy(time)) if self.described(time) else self.history.energy_at(time)
+
+    def described(self, time: float) -> bool:
+        """Whether ``time`` lies in the window that the mode describes."""
+        return self.span.start <= time <= self.span.end
+
+    def peaks(self, start: float, end: float) -> tuple[float, ...]:
+        """Times in (start, end], within the span, where the energy of the mode peaks [time]."""
+        return self.mode.peaks(max(start, self.span.start), min(end, self.span.end))
+
+    def moments(self, tolerance: float) -> list[Moment]:
+        """Crossings of the level at td, standstills near it and closest matches."""
+        turns = np.array(self.standstills())
+        near = measures.lock_in_error(self.mode, turns, self.td) <= tolerance
+        turning = [Moment(t, "extremum", None) for t in turns[near].tolist()]
+        matches = [Moment(t, "match", None) for t in (self.profile.minima() if self.profile else ())]
+        return [*self.crossings(), *turning, *matches]
+
+    def crossings(self) -> list[Moment]:
+        """Crossings of the level at td: of the samples before the span, exact ones within it."""
+        start, level = self.span.start, self.energy(self.td)
+        sampled = find_crossings(*sampled_before(self.history, self.td, level), level)
+        found = [Moment(one.time, "crossing", one.rising) for one in sampled if one.time < start]
+        before = start - _ZERO / self.mode.fastest  # the first sample counts like any other
+        times = np.maximum(self.mode.level_crossings(self.td, before), start)
+        slopes = self.mode.energy_slopes(times)[0]
+        return found + [Moment(t, "crossing", bool(up > 0)) for t, up in zip(times.tolist(), slopes, strict=True)]
+
+    def standstills(self) -> list[float]:
+        """Times within the span, up to td itself, where the energy turns [time]."""
+        start, after = self.span.start, self.td - _ZERO / self.mode.fastest  # td may be an extremum itself
+        times = np.maximum(self.mode.extrema(start - _ZERO / self.mode.fastest, after), start)
+        return [t for t in times if self.described(float(t))]
+
+    @cached_property
+    def profile(self) -> Profile | None:
+        """Lock-in error over the span before td; None for one mode, for which all has a closed form."""
+        if isinstance(self.mode, Mode):
+            return None
+        step = 2 * np.pi / self.mode.fastest / _POINTS_PER_PERIOD
+        count = max(3, int(np.ceil((self.td - self.span.start) / step)) + 1)
+        return Profile.of(self.mode, np.linspace(self.span.start, self.td, count), self.td)
+
+    def measured(self, times: Samples) -> list[Measured | None]:
+        """Measures of each time, None outside of the span."""
+        inside = [self.described(float(t)) for t in times]
+        tr = times[inside]
+        if not tr.size:
+            return [None] * times.size
+        lock_in = measures.lock_in_error(self.mode, tr, self.td)
+        if isinstance(self.mode, Mode):
+            tolerance = measures.timing_tolerance(self.mode, tr, self.td).tolist()
+        else:
+            assert self.profile is not None
+            tolerance = [self.profile.tolerance(*one) for one in zip(tr.tolist(), lock_in.tolist(), strict=True)]
+        residual = replayed_residual(self.mode, tr, self.td).tolist()
+        signs = measures.sign_match(self.mode, tr, self.td).tolist()
+        rows = zip(signs, lock_in.tolist(), residual, tolerance, strict=True)
+        found = (Measured(*row, part_mismatch=None) for row in rows)
+        return [next(found) if one else None for one in inside]
+
+    def errors(self, times: Samples) -> Samples:
+        """Lock-in errors where the signs match and the mode describes the record, else infinite [-]."""
+        comparable = (times >= self.span.start) & (times <= self.span.end)
+        comparable &= measures.sign_match(self.mode, times, self.td)
+        return np.where(comparable, measures.lock_in_error(self.mode, times, self.td), np.inf)
+
+    def knots(self) -> Samples:
+        """Standstills, ends of the span and times of the profile [time]."""
+        return np.append(self.edges(), self.profile.time if self.profile else ())
+
+    def edges(self) -> Samples:
+        """Standstills and ends of the span, between which the energy runs monotone [time]."""
+        return np.concatenate([self.mode.extrema(float(self.history.time[0]), self.td), self.span])
+
+    def reach(self, moments: Sequence[Moment]) -> Samples:
+        """How far fit, sampling and printed digits leave the true time open; half a cell of the profile for a match."""
+        reach = self.level_reach(np.array([moment.tr for moment in moments]))
+        return self.profile.bounding(moments, reach) if self.profile else reach
+
+    def level_reach(self, times: Samples) -> Samples:
+        """How far from each time the energy may have the level at td [time]."""
+        sampled = sampled_reach(self.history, times, self.td, self.energy(self.td))
+        described = np.array([self.described(float(t)) for t in times])
+        return np.where(described, fitted_reach(self.history, self.fit, self.mode, times, self.td), sampled)
+
+    def part_matches(self, tr: float) -> tuple[PartMatch, ...]:  # noqa: ARG002  by the protocol
+        """Nothing: single parts are not known."""
+        return ()
