@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.measures import run_time_share
+from d2rpick.vibration.measures import run_time_share
 from d2rpick.models.exhibit import Curve, Exhibit, Panel
 
 # Hours of the pick-up truck without and with switching; neither its times nor its elements are published.
