@@ -16,7 +16,7 @@ from d2rpick.vibration.span import Span, described_span, identify_within, span_o
 
 if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
-    from d2rpick.flight.momentum import FreeFlight
+    from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import History, Samples
 
 # Beyond, squares of energies are no numbers any more; no unit system comes near.
@@ -37,13 +37,14 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
         raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
     if settings.after is not None:
         _inside(history, settings.after, "--after")
-    seen = seen_flight(history, td) if history.momenta else None
-    fit, span = _oscillator(history, td, settings, seen)
+    seen = seen_flight(history, td)
+    flying = None if seen.refusal else seen.flight
+    fit, span = _oscillator(history, td, settings, flying)
     situation = Situation(history, td, settings, find_flight(history, td, settings.after, seen, span), fit, span)
     if history.part_energies is None or not settings.replay:
         return situation
     # without a sign of the next contact nothing is known of what comes after td
-    end = situation.flight.end or (float(history.time[-1]) if seen or span else td)
+    end = situation.flight.end or (float(history.time[-1]) if flying or span else td)
     return _with_parts(situation, history.part_energies, end)
 
 

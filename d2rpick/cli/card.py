@@ -94,7 +94,7 @@ def _judged(
 
     run, settings = reference
     parts = () if options["energy"] or not run.parts else options["part"]
-    history = run.history(shared.selection({**options, "part": ()})._replace(parts=parts), with_momenta=True)
+    history = run.history(shared.selection({**options, "part": ()})._replace(parts=parts))
     card, verdict = judged(write, history, settings)
     output.notes(history.notes, all_cautions(verdict))
     return card, verdict.verified

@@ -70,7 +70,7 @@ def command(
     with reading(options["history"], quiet=options["quiet"]):
         run = shared.open_run(options)
         output = Output.of(options, *run.sources)
-        history = run.history(shared.selection(options), with_momenta=True)
+        history = run.history(shared.selection(options))
     answer = _answer(history, td, td_window, shared.settings(options))
     if balance := balance_of(run, history.parts, answer.situation.td):
         answer = with_health(answer, balance)

@@ -66,7 +66,7 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
         run = shared.open_run(options)
         switched = _switched(options)
         output = Output.of(options, *run.sources, *(switched.sources if switched else ()))
-        history = run.history(shared.selection(options), with_momenta=True)
+        history = run.history(shared.selection(options))
     answer = verify(history, tr, td, shared.settings(options))
     if balance := balance_of(run, history.parts, td):
         answer = with_health(answer, balance)

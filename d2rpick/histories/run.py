@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.database import Legs
+    from d2rpick.histories.energy_balance import Balance
     from d2rpick.histories.history import Part, Samples
     from d2rpick.histories.selection import Selection
 
@@ -49,17 +50,14 @@ class Run:
         own = (note for database in self.databases for note in database.notes)
         return tuple(dict.fromkeys([*own, *doubts(self.databases)]))
 
-    def history(self, selection: Selection, *, with_momenta: bool = False) -> History:
+    def history(self, selection: Selection) -> History:
         """Take the selected energy: of parts, of named channels, or by default of the whole model.
 
-        ``with_momenta`` reads the momenta of the parts too, where there are any.  FormatError when something is not
-        there, with what there is.
+        FormatError when something is not there, with what there is.
         """
         history = self._energy(selection)
-        if not with_momenta:
-            return history
         flying = select_parts(selection.flying, self.parts, self.name) if selection.flying else None
-        return replace(history, momenta=self.momenta(history.parts, flying))
+        return replace(history, evidence=_Written(self, history.parts, flying))
 
     def momenta(self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> tuple[Momenta, ...]:
         """Give the momentum of the parts and that of the whole model, as far as they are written.
@@ -79,11 +77,17 @@ class Run:
                 known = tuple(ids.index(part.id) for part in flying) if flying else None
                 precision = holder.precisions(())[1]
                 found.append(Momenta(holder.part_time, values, holder.parts, precision, members, known))
-        whole = next((one for one in self.databases if set(_AXES) <= set(one.channels)), None)
-        if whole:
-            values = np.stack([whole.channel(axis) for axis in _AXES], axis=1)[:, np.newaxis]
-            found.append(Momenta(whole.time, values, None, whole.precisions(_AXES)[1], (0,)))
-        return tuple(found)
+        return (*found, *filter(None, [self._momentum_of_model()]))
+
+    def _momentum_of_model(self) -> Momenta | None:
+        """Momentum of the whole model, or its velocity, which is the same but for the mass; None if not written."""
+        from d2rpick.histories.balance_terms import velocity_of
+
+        for database in self.databases:
+            velocity = velocity_of(database) if database.channels else None
+            if velocity:
+                return Momenta(database.time, velocity.values[:, np.newaxis], None, velocity.precision, (0,))
+        return None
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
         """Give the momentum of some parts together, or of the whole model; None where it is not written."""
@@ -190,6 +194,25 @@ class Run:
             complete=all(one.complete for one in self.databases),
             notes=(*self.notes, *notes),
         )
+
+
+class _Written:
+    """Evidence that the files of a run hold for some parts, read when it is asked for."""
+
+    def __init__(self, run: Run, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> None:
+        self._run, self._chosen, self._flying = run, chosen, flying
+
+    @cached_property
+    def momenta(self) -> tuple[Momenta, ...]:
+        """Momenta of the parts, then of the whole model."""
+        return self._run.momenta(self._chosen, self._flying)
+
+    @cached_property
+    def balance(self) -> Balance | None:
+        """Energies of the whole model."""
+        from d2rpick.histories.balance_terms import terms_of
+
+        return terms_of(self._run)
 
 
 def _with_terms(history: History, names: Sequence[str], energies: Samples) -> History:

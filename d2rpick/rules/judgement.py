@@ -12,6 +12,7 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.suggest import better_pair, suggest
 from d2rpick.choice.verify import Verdict, verify
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution
+from d2rpick.histories.history import Given
 from d2rpick.rules.base import Fault, name_units
 
 if TYPE_CHECKING:
@@ -64,9 +65,10 @@ class HistoryJudge:
         if part not in self._histories:
             selection = self.selection if part is None else self.selection._replace(parts=(str(part),))
             known = next(iter(self._histories.values()), None)  # all parts share the momenta, which take long to read
-            history = self.run.history(selection, with_momenta=known is None)
-            momenta = history.momenta if known is None else known.momenta
-            self._histories[part] = replace(history, momenta=tuple(_seen_from(part, one) for one in momenta))
+            history = self.run.history(selection)
+            shared = history if known is None else known
+            momenta = tuple(_seen_from(part, one) for one in shared.momenta)
+            self._histories[part] = replace(history, evidence=Given(momenta, shared.balance))
         return self._histories[part]
 
     def faults(self, window: Window) -> tuple[Fault, ...]:

@@ -154,7 +154,7 @@ def ask(question: Question, source: str) -> Row:
     files = stamps(source)
     try:
         run = open_run([source], question.selection, question.input_format)
-        history = run.history(question.selection, with_momenta=True)
+        history = run.history(question.selection)
         answer = suggest(history, question.td, question.settings)
         if balance := balance_of(run, history.parts, question.td):
             answer = with_health(answer, balance)

@@ -186,7 +186,7 @@ def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
 
 def read_t01() -> History:
     selection = Selection(parts=("spring1,spring2",))
-    return open_run([str(shared("openradioss/chain_referenceT01.gz"))], selection).history(selection, with_momenta=True)
+    return open_run([str(shared("openradioss/chain_referenceT01.gz"))], selection).history(selection)
 
 
 @pytest.mark.parametrize("source", ["csv", "T01"])
@@ -227,7 +227,7 @@ def test_the_parts_that_contribute_most_are_named() -> None:
 def test_the_rollover_has_no_signs_and_says_why() -> None:
     selection = Selection(parts=("box,step",))
     run = open_run([str(shared("openradioss/rollover_referenceT01.gz"))], selection)
-    answer = suggest(run.history(selection, with_momenta=True), 0.37, PLAIN)
+    answer = suggest(run.history(selection), 0.37, PLAIN)
     assert answer.situation.basis == "energy"
     best = answer.candidates[0]
     assert (best.sign_match, best.residual, best.part_mismatch, best.parts) == (None, None, None, ())
