@@ -142,12 +142,12 @@ def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
     assert not modules & HEAVY
 
 
-# What a plain table without parts, balance or a window of td does without.
+# What a plain table without parts, momenta or a window of td does without.
 UNNEEDED = {
     f"d2rpick.{name}"
     for name in (
         "choice.suggest_td", "vibration.part_signs", "vibration.envelope", "choice.lock_in_profile", "vibration.modes",
-        "vibration.fit_several", "flight.momentum", "choice.health", "histories.energy_balance", "choice.judged_card",
+        "vibration.fit_several", "flight.momentum", "choice.health", "choice.judged_card",
         "deck.printing.common", "report.figures", "report.page", "report.health", "histories.formats.fixed_text",
         "histories.formats.lsda",
     )

@@ -98,9 +98,9 @@ def compare(
         short = min(reference, switched, key=lambda history: history.time[-1])
         found = f"fewer than 3 states from td {td:g} to {end:g}"
         raise RangeError(f"{', '.join(short.source)}: {found}; nothing can be compared there")
-    before = switched.energy[switched.time < td]
-    if before.size and after[0] == before[-1] and _reported_wrong(before[-1], after[1:]):
-        after = after[1:]  # the switch comes at the first step from td on: this state was still rigid
+    before, rest = switched.energy[switched.time < td], switched.between(td, np.inf)[1]
+    if before.size and after[0] == before[-1] and _reported_wrong(before[-1], rest[1:]):
+        after, rest = after[1:], rest[1:]  # the switch comes at the first step from td on: this state was still rigid
     frozen, wanted = float(after[0]), reference.energy_at(td)
     notes = tuple(note for note in switched.notes if note not in reference.notes)
     error, rigid = _relative(*momenta, td, end), _rigid_window(switched, tr, td)
@@ -127,7 +127,7 @@ def compare(
         rigid_from=rigid[0] if rigid else None,
         rigid_to=rigid[1] if rigid else None,
         objections=tuple(objections),
-        notes=(*notes, *(_reported(float(before[-1]), after) if before.size else ())),
+        notes=(*notes, *(_reported(float(before[-1]), rest) if before.size else ())),
     )
 
 

@@ -17,7 +17,7 @@ from d2rpick.vibration.span import Span, described_span, identify_within, span_o
 
 if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
-    from d2rpick.flight.momentum import FreeFlight
+    from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import History
 
 # Beyond, squares of energies are no numbers any more; no unit system comes near.
@@ -38,14 +38,15 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
         raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
     if settings.after is not None:
         _inside(history, settings.after, "--after")
-    seen = seen_flight(history, td) if history.momenta else None
-    fit, span = _oscillator(history, td, settings, seen)
+    seen = seen_flight(history, td)
+    flying = None if seen.refusal else seen.flight
+    fit, span = _oscillator(history, td, settings, flying)
     flight = find_flight(history, td, settings.after, seen, span)
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
     if history.part_energies is not None and settings.replay:
         # without a sign of the next contact nothing is known of what comes after td
-        end = flight.end or (float(history.time[-1]) if seen or span else td)
+        end = flight.end or (float(history.time[-1]) if flying or span else td)
         start = min(td, float(history.time[0]) if flight.start is None else flight.start)
         evidence = _with_parts(evidence, history, td, Span(start, end))
     return Situation(history, td, settings, flight, evidence)

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from d2rpick.choice.warnings import Caution
+from d2rpick.flight.flight import MOST_WORK
+from d2rpick.flight.work import work_beyond_gravity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,10 +30,8 @@ MOST_IMBALANCE = 0.10
 # (dynasupport.com/howtos/general/contact-energy).  Negative energy has no physical cause but comes from penetrations;
 # a twentieth is what Oasys' energy check allows of either sign.
 MOST_SLIDING, MOST_NEGATIVE_SLIDING = 0.10, 0.05
-# In free flight neither contacts nor loads work.  An energy that is off by 4 % is a deformation that is off by 0.02,
-# within which two candidates count as equally good.  For the same reason deleted elements may not hold more: LS-DYNA
-# keeps their energy in the internal energy of the model (ftp.lstc.com, FAQ energy_balance).
-MOST_WORK = 0.04
+# In free flight contacts do not work either.  Deleted elements may not hold more: LS-DYNA keeps their energy in the
+# internal energy of the model (ftp.lstc.com, FAQ energy_balance).
 
 # Below a millionth of the largest energy of the run, internal energy is rounding: single precision and glstat print
 # six to seven digits of the sum.  LS-DYNA's internal energy begins at a floor of 2e-20 per process.
@@ -41,8 +41,6 @@ _SMALL_PART = 0.01
 # Where the run has hardly any energy yet, a small error is a large ratio (Altair, Radioss FAQ on the energy error): the
 # ratio counts where its reference exceeds a tenth of its peak, so that the tenth allowed is 1 % of that peak or more.
 _COUNTING_REFERENCE = 0.1
-# States that the five unknowns of the work of gravity and damping need, twice over.
-_FEWEST_STATES = 10
 
 
 @dataclass(frozen=True)
@@ -202,38 +200,10 @@ def _in_window(balance: Balance, start: float, end: float, locked: float | None)
     for name, energy in (("window_sliding", balance.sliding), ("window_eroded", balance.eroded)):
         if energy is not None and energy[inside].size:
             found[name] = _beyond_print(balance, energy[inside], float(np.ptp(energy[inside]))) / locked
-    work = balance.external_work
-    if work is not None and work[inside].size >= _FEWEST_STATES:
-        rest = float(np.abs(_beyond_gravity(balance, inside)).max())
-        found["window_work"] = _beyond_print(balance, work[inside], rest) / locked
+    work = work_beyond_gravity(balance, start, end)
+    if work is not None:
+        found["window_work"] = work / locked
     return found
-
-
-def _beyond_gravity(balance: Balance, inside: slice) -> Samples:
-    """External work in a window without what gravity and damping proportional to mass explain [energy].
-
-    Gravity works by m g s with the way s of the centre of mass, such damping by -2 alpha times the integral of the
-    kinetic energy (Radioss counts it as external work).  Both are linear in integrals that are known but for
-    factors; where no velocity is written, s is taken as a parabola of time.
-    """
-    assert balance.external_work is not None
-    time, work = balance.time[inside], balance.external_work[inside]
-    elapsed = time - time[0]
-    if balance.velocity is None:
-        columns = [elapsed, elapsed**2]
-    else:
-        columns = [_integral(time, component) for component in balance.velocity[inside].T]
-    if balance.kinetic is not None:
-        columns.append(_integral(time, balance.kinetic[inside]))
-    scaled = [column / np.abs(column).max() for column in columns if column.any()]
-    table = np.stack([np.ones_like(time), *scaled], axis=1)
-    factors, *_ = np.linalg.lstsq(table, work, rcond=None)
-    return np.asarray(work - table @ factors)
-
-
-def _integral(time: Samples, values: Samples) -> Samples:
-    """Integral from the first time on, by trapezia; shape of ``time``."""
-    return np.append(0.0, np.cumsum(np.diff(time) * (values[1:] + values[:-1]) / 2))
 
 
 def _beyond_print(balance: Balance, energy: Samples, change: float) -> float:

@@ -9,14 +9,15 @@ import numpy as np
 
 from d2rpick.choice.health import Health, assess
 from d2rpick.errors import FormatError
-from d2rpick.flight.momentum import FreeFlight, all_flights, to_be_asked
+from d2rpick.flight.flight import all_seen
 from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.companions import doubts
 from d2rpick.histories.selection import select_parts
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
+    from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import Part
     from d2rpick.histories.opening import Run, Selection
@@ -46,8 +47,8 @@ class Overview:
     Times in the unit of the run, which ``time_unit`` gives only where a file names it.  ``sampling`` is None where
     there is a single state; it and the times are None where there is no state, and they and ``states`` where the time
     has to be chosen among several columns.
-    ``flights`` are the windows in which the parts asked for, or all, fly freely by their momentum, ``health`` is that
-    of the run, with the longest of them as its window; None without energies.
+    ``flights`` are the windows in which the parts asked for, or all, fly freely, each with its source; ``health`` is
+    that of the run, with the longest of them as its window; None without energies.
     """
 
     source: tuple[str, ...]
@@ -62,7 +63,7 @@ class Overview:
     complete: bool
     channels: tuple[str, ...]
     parts: tuple[PartOverview, ...]
-    flights: tuple[FreeFlight, ...]
+    flights: tuple[tuple[str, FreeFlight], ...]
     health: Health | None
     notes: tuple[str, ...]
 
@@ -95,7 +96,7 @@ def survey(run: Run, selection: Selection) -> Overview:
         channels=tuple(dict.fromkeys(name for database in run.databases for name in database.channels)),
         parts=tuple(_overviews(run)),
         flights=flights,
-        health=_health(run, flights),
+        health=_health(run, [flight for _, flight in flights]),
         notes=tuple(dict.fromkeys(notes)),
     )
 
@@ -124,7 +125,7 @@ def _highest(run: Run, part: Part) -> float | None:
         return None
 
 
-def _health(run: Run, flights: tuple[FreeFlight, ...]) -> Health | None:
+def _health(run: Run, flights: Sequence[FreeFlight]) -> Health | None:
     balance = balance_of(run, run.parts)
     if balance is None:
         return None
@@ -132,8 +133,12 @@ def _health(run: Run, flights: tuple[FreeFlight, ...]) -> Health | None:
     return assess(balance, (longest.start, longest.end) if longest else None)
 
 
-def _flights(run: Run, selection: Selection) -> tuple[FreeFlight, ...]:
-    parts = select_parts(selection.parts, run.parts, run.name) if selection.parts else None
-    flying = select_parts(selection.flying, run.parts, run.name) if selection.flying else None
-    found = (all_flights(momenta) for momenta in to_be_asked(run.momenta(parts, flying)))
-    return next(filter(None, found), ())
+def _flights(run: Run, selection: Selection) -> tuple[tuple[str, FreeFlight], ...]:
+    for wanted in (selection.parts, selection.flying):
+        if wanted:
+            select_parts(wanted, run.parts, run.name)
+    try:
+        history = run.history(selection._replace(energy=(), time=None))
+    except FormatError:  # an energy has to be chosen first, or there is no state
+        return ()
+    return all_seen(history) if history.time.size > 1 else ()

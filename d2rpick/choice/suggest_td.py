@@ -11,7 +11,7 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import expectation, mean_in_flight, shortfall
 from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, rank
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
-from d2rpick.flight.momentum import all_flights, to_be_asked
+from d2rpick.flight.flight import SOURCES, all_seen
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 # Peaks of a window that are tried, the highest first: the higher a peak of several modes, the less energy is kinetic.
 _MOST_PEAKS = 12
-# Where a flight may be known from, best first.
-_SOURCES = ("given", "momentum", "oscillator", "energy", None)
 
 
 def suggest_in_window(history: History, window: tuple[float, float], settings: Settings) -> Suggestion:
@@ -53,7 +51,7 @@ def suggest_in_window(history: History, window: tuple[float, float], settings: S
 def advice(history: History, settings: Settings) -> str:
     """Tell where td should lie when none was given: before the end of the flight, on the last peak before it."""
     time = history.time
-    flights = next(filter(None, (all_flights(momenta) for momenta in to_be_asked(history.momenta))), ())
+    flights = [flight for _, flight in all_seen(history)]
     if flights:
         longest = max(flights, key=lambda flight: flight.end - flight.start)
         start, end, seen = longest.start, longest.end, longest.end_seen
@@ -71,7 +69,7 @@ def _flying(look: Look, window: tuple[float, float]) -> Situation:
     """Situation at the start, middle or end of the window: in the flight that is known best, the first of these."""
     low, high = window
     situations = [look(td) for td in (low, (low + high) / 2, high)]
-    return min(situations, key=lambda one: (not one.in_flight, _SOURCES.index(one.flight.source)))
+    return min(situations, key=lambda one: (not one.in_flight, SOURCES.index(one.flight.source)))
 
 
 def _best(situation: Situation, times: tuple[float, ...], look: Look) -> Situation | None:

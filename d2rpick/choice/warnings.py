@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.choice.situation import Situation
+    from d2rpick.flight.flight import Flight
 
 # Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.
 POOR_KINETIC_SHARE = 0.5
@@ -57,9 +58,10 @@ def _of_parts(situation: Situation) -> Iterator[Caution]:
 
 def _of_flight(situation: Situation) -> Iterator[Caution]:
     flight, td, earliest = situation.flight, situation.td, situation.earliest_tr
-    if situation.history.momenta and flight.source in ("oscillator", "energy"):
-        found = f"the momentum shows no free flight around td = {td:.6g}"
-        yield Caution("no-free-flight", f"{found}; its start was read off the {flight.source} instead")
+    if flight.refusal:
+        yield Caution("no-free-flight", f"{flight.refusal}{_nearest_flight(flight)}")
+    for doubt in flight.doubts:
+        yield Caution("flight-sources-disagree", doubt)
     if flight.source == "energy":
         found = f"the end of the load, {flight.start:.6g}, was read off the energy alone"
         yield Caution("flight-from-energy", f"{found}; give it with --after where it is known")
@@ -83,3 +85,12 @@ def end_of_flight(situation: Situation) -> str:
 
 def _margin(situation: Situation) -> str:
     return f" with the margin {situation.settings.margin:.6g}" if situation.settings.margin else ""
+
+
+def _nearest_flight(flight: Flight) -> str:
+    """Name the flight that is nearest to td, and the last td in it."""
+    if flight.start is None or flight.source == "given":
+        return ""
+    if flight.end is None:
+        return f"; the next flight begins at {flight.start:.6g}"
+    return f"; the nearest flight lasts from {flight.start:.6g} to {flight.end:.6g}, the last td in it"

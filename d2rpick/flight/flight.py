@@ -1,23 +1,41 @@
-"""When the load is over: which evidence counts for the window around td in which the parts fly freely."""
+"""When the parts fly: which evidence counts for the window around td in which nothing but gravity acts on them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
 
 from d2rpick.flight.energy_alone import end_of_load
+from d2rpick.flight.window import all_windows
 
 if TYPE_CHECKING:
-    from d2rpick.flight.momentum import FreeFlight
-    from d2rpick.histories.history import History, Part
+    from collections.abc import Callable, Iterator, Sequence
+
+    from d2rpick.flight.window import FreeFlight
+    from d2rpick.histories.history import History, Momenta, Part, Samples
     from d2rpick.vibration.span import Span
+
+# Where a flight may be known from, best first.
+SOURCES: Final = ("given", "momentum", "contact-energy", "energy-balance", "oscillator", "energy", None)
+# In free flight no load works.  An energy that is off by 4 % is a deformation that is off by 0.02, within which two
+# candidates count as equally good.
+MOST_WORK: Final = 0.04
+# What must show every flight that a better source shows: a contact of any part is a contact.
+_AGREEING: Final = ("contact-energy",)
+# Ends of a flight by two sources are the same within this share of it, or so many output intervals.
+_SAME, _SAME_STATES = 0.01, 3
 
 
 class Flight(NamedTuple):
     """Window of free flight [time]; ``start`` None when unknown, ``end`` None when no next contact was seen.
 
-    ``source`` tells how the start was found: "given", "momentum", "oscillator", "energy", or None.  ``parts`` are
-    those that were seen to fly together, None where the momentum did not tell, or told it of the whole model.
-    ``damping`` is alpha of their momentum [1/time], 0 where it did not tell.
+    Where nothing flies at td, it is the last flight before td, or else the first after it, and ``refusal`` says what
+    shows that.  ``source`` tells how the start was found, one of `SOURCES`.  ``parts`` are those that were seen to
+    fly together, None where the momentum did not tell, or told it of the whole model.  ``damping`` is alpha of their
+    momentum [1/time], 0 where it did not tell.  ``doubts`` say which sources contradict each other.
     """
 
     start: float | None
@@ -25,29 +43,195 @@ class Flight(NamedTuple):
     source: str | None
     parts: tuple[Part, ...] | None = None
     damping: float = 0.0
+    refusal: str | None = None
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def certain(self) -> bool:
+        """Whether more than the level of the energy shows it."""
+        return self.source not in ("energy", None)
 
 
-def seen_flight(history: History, td: float) -> FreeFlight | None:
-    """Find the free flight around ``td`` in the momenta."""
-    from d2rpick.flight.momentum import flight_around, to_be_asked
+@dataclass(frozen=True)
+class Witness:
+    """One source of evidence: the flight that it shows around a time, over the times of its record.
 
-    return next(filter(None, (flight_around(momenta, td) for momenta in to_be_asked(history.momenta))), None)
+    ``decisive``: where it shows none, there is none, even if it shows none anywhere.
+    """
+
+    source: str
+    time: Samples
+    around: Callable[[float], FreeFlight | None]
+    decisive: bool
+
+    def flights(self) -> tuple[FreeFlight, ...]:
+        """All flights that it shows, ascending in time."""
+        return all_windows(self.time, self.around)
+
+    def counts(self) -> bool:
+        """Whether there is no flight where it shows none."""
+        return self.decisive or bool(self.flights())
 
 
-def find_flight(history: History, td: float, after: float | None, seen: FreeFlight | None, span: Span | None) -> Flight:
-    """Choose the best answer to when the load is over: given, by the momentum, by the oscillator, by the energy.
+class Seen(NamedTuple):
+    """What the evidence says of a td: the flight around it, or the one nearest to it and what denies one at td."""
 
-    ``after`` is given as the end of the load [time]; ``seen`` what the momenta show; ``span`` the window that an
+    flight: FreeFlight | None
+    source: str | None
+    refusal: str | None = None
+    doubts: tuple[str, ...] = ()
+
+
+def find_flight(history: History, td: float, after: float | None, seen: Seen, span: Span | None) -> Flight:
+    """Choose the best answer to when the load is over: given, seen, by the oscillator, by the energy.
+
+    ``after`` is given as the end of the load [time]; ``seen`` what the evidence shows; ``span`` the window that an
     oscillator describes.
     """
-    if seen:
-        end = seen.end if seen.end_seen else None
-        start, source = (seen.start, "momentum") if after is None else (after, "given")
-        return Flight(start, end, source, seen.parts, seen.damping)
-    end = span.end if span and span.end < history.time[-1] else None
+    if seen.flight:
+        first, last, parts, end_seen, damping = seen.flight
+        given = after is not None and not (seen.refusal and first > td)
+        start, source = (after, "given") if given else (first, seen.source)
+        return Flight(start, last if end_seen else None, source, parts, damping, seen.refusal, seen.doubts)
     if after is not None:
-        return Flight(after, end, "given")
+        end = span.end if span and span.end < history.time[-1] and not seen.refusal else None
+        return Flight(after, end, "given", refusal=seen.refusal, doubts=seen.doubts)
+    if seen.refusal:
+        return Flight(None, None, None, refusal=seen.refusal, doubts=seen.doubts)
     if span:
-        return Flight(span.start, end, "oscillator")
+        return Flight(span.start, span.end if span.end < history.time[-1] else None, "oscillator")
     fallen = end_of_load(history, td)
     return Flight(fallen, None, None if fallen is None else "energy")
+
+
+def seen_flight(history: History, td: float) -> Seen:
+    """Find the free flight around ``td`` [time] in everything but the energy of the parts.
+
+    The best source that shows a flight counts.  A better one that shows none at td is never overruled, nor is the
+    contact energy; where two sources show different ends, the later start and the earlier end count.
+    """
+    found: list[tuple[str, FreeFlight]] = []
+    for witness in witnesses(history):
+        flight = witness.around(td)
+        if flight:
+            found.append((witness.source, flight))
+        elif (not found or witness.source in _AGREEING) and witness.counts():
+            doubts = _contradicting(found, witness, td)
+            return _nearest(witness, td, _no_flight(witness.source, td), doubts)
+    return _confirmed(history, found, td) if found else Seen(None, None)
+
+
+def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
+    """Find all flights that the best source shows and no other denies, each with its source, ascending in time."""
+    asked = tuple(witnesses(history))
+    for place, witness in enumerate(asked):
+        kept = []
+        for flight in witness.flights():
+            middle = (flight.start + flight.end) / 2
+            others = [(one.source, one.around(middle)) for one in asked[place + 1 :] if one.source in _AGREEING]
+            if not all(other for _, other in others):
+                continue
+            found = [(witness.source, flight), *((source, other) for source, other in others if other)]
+            seen = _confirmed(history, found, middle)
+            if seen.flight and not seen.refusal:
+                kept.append((witness.source, seen.flight))
+        if kept or witness.decisive:
+            return tuple(kept)
+    return ()
+
+
+def witnesses(history: History) -> Iterator[Witness]:
+    """Give the sources of evidence that a history has, best first."""
+    if history.momenta:
+        from d2rpick.flight import momentum
+
+        momenta = momentum.to_be_asked(history.momenta)
+        around = partial(_first, momenta)
+        decisive = any(one.parts is not None and momentum.tells(one) for one in momenta)
+        yield Witness("momentum", momenta[0].time, around, decisive)
+    balance = history.balance
+    if balance is None:
+        return
+    from d2rpick.flight import contact_energy, work
+
+    if contact_energy.shows_contacts(balance):
+        yield Witness("contact-energy", balance.time, partial(contact_energy.plateau_around, balance), False)
+    if work.can_tell(balance):
+        worked = balance.external_work is not None and bool(np.ptp(balance.external_work))
+        yield Witness("energy-balance", balance.time, partial(work.balanced_around, balance), worked)
+
+
+def _first(momenta: Sequence[Momenta], td: float) -> FreeFlight | None:
+    """Give the flight by the momentum of the parts, or else of the whole model."""
+    from d2rpick.flight.momentum import flight_around
+
+    return next(filter(None, (flight_around(one, td) for one in momenta)), None)
+
+
+def _nearest(witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]) -> Seen:
+    """Give the last flight before ``td``, or else the first one after it, where nothing flies at td."""
+    flights = witness.flights()
+    before = [one for one in flights if one.end < td]
+    nearest = before[-1] if before else flights[0] if flights else None
+    return Seen(nearest, witness.source if nearest else None, refusal, doubts)
+
+
+def _no_flight(source: str, td: float) -> str:
+    return f"the {_spoken(source)} shows no free flight at td = {td:.6g}"
+
+
+def _spoken(source: str) -> str:
+    return source.replace("-", " ")
+
+
+def _contradicting(found: list[tuple[str, FreeFlight]], witness: Witness, td: float) -> tuple[str, ...]:
+    return tuple(f"the {source} shows a flight there, but {_no_flight(witness.source, td)}" for source, _ in found)
+
+
+def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]], td: float) -> Seen:
+    """Give what is flight by the best source and those that should agree with it, and say where they do not."""
+    source, best = found[0]
+    refusal = _driven(history, source, best, td)
+    if refusal:
+        return Seen(None, None, refusal)
+    start, end, end_seen = best.start, best.end, best.end_seen
+    doubts = []
+    room = max(_SAME * (end - start), _SAME_STATES * history.step)
+    for other, flight in found[1:]:
+        if other not in _AGREEING:
+            continue
+        if abs(flight.start - best.start) > room or abs(flight.end - best.end) > room:
+            one, two = (f"{f.start:.6g} to {f.end:.6g} by the {_spoken(n)}" for n, f in (found[0], (other, flight)))
+            doubts.append(f"the flight lasts from {one}, from {two}; the later start and the earlier end count")
+        if flight.end < end:
+            end, end_seen = flight.end, flight.end_seen
+        start = max(start, flight.start)
+    return Seen(best._replace(start=start, end=end, end_seen=end_seen), source, doubts=tuple(doubts))
+
+
+def _driven(history: History, source: str, flight: FreeFlight, td: float) -> str | None:
+    """Say so when a load works on the model until ``td``, unless it may work on other parts than those that fly."""
+    from d2rpick.flight.work import work_beyond_gravity
+
+    balance = history.balance
+    if balance is None or (source == "momentum" and _is_subset(history, flight)):
+        return None
+    end = min(flight.end, max(td, flight.start))
+    work = work_beyond_gravity(balance, flight.start, end)
+    energy = history.mean_energy(flight.start, end)
+    if work is None or energy is None or work <= MOST_WORK * max(energy, 0.0):
+        return None
+    return (
+        f"the {_spoken(source)} shows a flight from {flight.start:.6g} to {flight.end:.6g}, but there the "
+        f"external work beyond gravity and damping is {work:.3g} at a mean energy of {energy:.3g}: it is driven"
+    )
+
+
+def _is_subset(history: History, flight: FreeFlight) -> bool:
+    """Whether other parts than those that fly move, too."""
+    members = {part.id for part in flight.parts or ()}
+    for momenta in history.momenta:
+        if momenta.parts is not None and flight.parts is not None:
+            moving = np.ptp(momenta.values, axis=0).any(axis=1)
+            return any(moves and part.id not in members for part, moves in zip(momenta.parts, moving, strict=True))
+    return False

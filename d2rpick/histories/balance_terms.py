@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -14,8 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.database import Legs
     from d2rpick.histories.energy_balance import Balance
-    from d2rpick.histories.history import Part, Samples
-    from d2rpick.histories.run import Run
+    from d2rpick.histories.history import Part, Precision, Samples
 
 # Normalised names, see `d2rpick.histories.names`: glstat and binout, Radioss, Abaqus (ALLAE is its hourglass energy),
 # tables.  Names are taken whole: "eroded hourglass energy" is another quantity.
@@ -35,18 +35,28 @@ _JUDGED: Final = frozenset(
     name for term in ("hourglass", "sliding", "external_work", "total", "ratio", "eroded") for name in _NAMES[term]
 )
 _TOTAL_INTERNAL: Final = ("ietotal", "totalinternalenergy")
+# Of the centre of mass of the model; a planar one has two of the three.
 _VELOCITIES: Final = (
     ("globalxvelocity", "globalyvelocity", "globalzvelocity"),
     ("xmomentum", "ymomentum", "zmomentum"),
+    ("momentumx", "momentumy", "momentumz"),
 )
 
 
-def balance_of(run: Run, parts: Sequence[Part] | None, until: float = np.inf) -> Balance | None:
+class Files(Protocol):
+    """The files of a run."""
+
+    @property
+    def databases(self) -> tuple[Legs, ...]:
+        """One for each format."""
+
+
+def balance_of(run: Files, parts: Sequence[Part] | None, until: float = np.inf) -> Balance | None:
     """Read the balance of the whole model, and the hourglass energy of ``parts``, up to a time [time].
 
     None where the files have nothing of it that can be judged, or leave open which columns are meant.
     """
-    whole = next((database for database in run.databases if database.channels), None)
+    whole = _whole(run)
     of_parts = _hourglass_of(run, parts, until) if parts else ()
     judged = whole is not None and not _JUDGED.isdisjoint(map(normalised, whole.channels))
     if not (judged or of_parts):
@@ -55,6 +65,46 @@ def balance_of(run: Run, parts: Sequence[Part] | None, until: float = np.inf) ->
 
     if whole is None:
         return Balance(run.databases[0].part_time, hourglass_of_parts=of_parts)
+    terms = _terms(whole, until)
+    return terms and replace(terms, hourglass_of_parts=of_parts)
+
+
+def terms_of(run: Files) -> Balance | None:
+    """Read the balance of the whole model, be it enough to judge the health of the run or not.
+
+    None where the files have no energy beside the internal one, or leave open which columns are meant.
+    """
+    whole = _whole(run)
+    known = {name for names in _NAMES.values() for name in names}
+    return None if whole is None or known.isdisjoint(map(normalised, whole.channels)) else _terms(whole, np.inf)
+
+
+class Velocity(NamedTuple):
+    """Velocity of the centre of mass, up to a factor, shape (n, 3), and how finely it was printed."""
+
+    values: Samples
+    precision: Precision
+
+
+def velocity_of(database: Legs) -> Velocity | None:
+    """Read the velocity or momentum of the whole model; None where it is not written."""
+    if not any({normalised(name) for name in database.channels} & {*axes} for axes in _VELOCITIES):
+        return None
+    try:
+        columns = _Columns(database, database.time.size)
+    except FormatError:
+        return None
+    values = columns.velocity()
+    return None if values is None else Velocity(values, database.precisions(columns.used)[1])
+
+
+def _whole(run: Files) -> Legs | None:
+    return next((database for database in run.databases if database.channels), None)
+
+
+def _terms(whole: Legs, until: float) -> Balance | None:
+    from d2rpick.histories.energy_balance import Balance
+
     try:
         columns = _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
     except FormatError:
@@ -66,8 +116,8 @@ def balance_of(run: Run, parts: Sequence[Part] | None, until: float = np.inf) ->
     return Balance(
         time=whole.time[: columns.states],
         internal=columns.internal(),
-        velocity=next(filter(lambda v: v is not None, map(columns.all, _VELOCITIES)), None),
-        hourglass_of_parts=of_parts,
+        velocity=columns.velocity(),
+        hourglass_of_parts=(),
         precision=whole.precisions(columns.used)[1],
         **found,
     )
@@ -90,10 +140,15 @@ class _Columns:
         name = next((self._names[name] for name in names if name in self._names), None)
         return None if name is None else self._values(name)
 
-    def all(self, names: Sequence[str]) -> Samples | None:
-        """Give these columns side by side if all are there."""
-        columns = [column for column in map(self.first, names) if column is not None]
-        return np.stack(columns, axis=1) if len(columns) == len(names) else None
+    def velocity(self) -> Samples | None:
+        """Give the velocity of the centre of mass, up to a factor, shape (n, 3)."""
+        for axes in _VELOCITIES:
+            columns = [self.first(axis) for axis in axes]
+            known = [column for column in columns if column is not None]
+            if len(known) > 1:
+                still = np.zeros_like(known[0])
+                return np.stack([still if column is None else column for column in columns], axis=1)
+        return None
 
     def internal(self) -> Samples | None:
         """Give the internal energy of the whole model."""
@@ -111,7 +166,7 @@ class _Columns:
         return values
 
 
-def _hourglass_of(run: Run, parts: Sequence[Part], until: float) -> tuple[tuple[Part, float, float], ...]:
+def _hourglass_of(run: Files, parts: Sequence[Part], until: float) -> tuple[tuple[Part, float, float], ...]:
     """Highest hourglass and internal energy of each part, where they are written."""
     ids = [part.id for part in parts]
     for database in run.databases:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from d2rpick.histories.energy_balance import Balance
     from d2rpick.histories.source import Source
 
 # in quotes: numpy.typing costs start-up
@@ -90,6 +91,28 @@ class Track(NamedTuple):
     values: Samples
 
 
+class Evidence(Protocol):
+    """What tells when the parts fly, beside their energy."""
+
+    @property
+    def momenta(self) -> tuple[Momenta, ...]:
+        """Momenta of the parts, then of the whole model, as far as they are written."""
+
+    @property
+    def balance(self) -> Balance | None:
+        """Energies of the whole model; None where none are written beside the internal energy."""
+
+
+class Given(NamedTuple):
+    """Evidence at hand."""
+
+    momenta: tuple[Momenta, ...] = ()
+    balance: Balance | None = None
+
+
+NO_EVIDENCE = Given()
+
+
 @dataclass(frozen=True, eq=False)
 class History:
     """Internal energy of the parts to be switched, over time, in the run's own consistent units.
@@ -100,8 +123,8 @@ class History:
     is False when a file stopped inside a state; ``notes`` say in plain sentences what was left out or assumed.
     ``files`` are the contents that were read.
     Where the energy is a sum, ``part_names`` (k,) and ``part_energies`` (n, k) are its terms that are not always zero.
-    ``time_unit`` is given only where the file names it; solver databases do not.  ``momenta`` tell when parts fly
-    freely, where the files have them: of the parts, then of the whole model.
+    ``time_unit`` is given only where the file names it; solver databases do not.  ``evidence`` tells when parts fly
+    freely; that of a file is read when it is first asked for.
     """
 
     time: Samples
@@ -115,7 +138,7 @@ class History:
     time_unit: str = ""
     part_names: tuple[str, ...] = ()
     part_energies: Samples | None = None
-    momenta: tuple[Momenta, ...] = ()
+    evidence: Evidence = NO_EVIDENCE
     complete: bool = True
     notes: tuple[str, ...] = ()
     files: tuple[Source, ...] = ()
@@ -146,6 +169,16 @@ class History:
             object.__setattr__(self, "part_energies", terms)
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "energy", energy)
+
+    @property
+    def momenta(self) -> tuple[Momenta, ...]:
+        """Momenta of the parts, then of the whole model, as far as they are known."""
+        return self.evidence.momenta
+
+    @property
+    def balance(self) -> Balance | None:
+        """Energies of the whole model, as far as they are known."""
+        return self.evidence.balance
 
     @property
     def step(self) -> float:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.database import Legs
+    from d2rpick.histories.energy_balance import Balance
     from d2rpick.histories.history import Part, Samples
     from d2rpick.histories.selection import Selection
     from d2rpick.histories.source import Source
@@ -57,11 +58,11 @@ class Run:
     def history(self, selection: Selection) -> History:
         """Take the selected energy: of parts, of named channels, or by default of the whole model.
 
-        The momenta come with it, where there are any.  FormatError when something is not there, with what there is.
+        FormatError when something is not there, with what there is.
         """
         history = self._energy(selection)
         flying = select_parts(selection.flying, self.parts, self.name) if selection.flying else None
-        return replace(history, momenta=self.momenta(history.parts, flying))
+        return replace(history, evidence=_Written(self, history.parts, flying))
 
     def momenta(self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> tuple[Momenta, ...]:
         """Give the momentum of the parts and that of the whole model, as far as they are written.
@@ -90,12 +91,14 @@ class Run:
 
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
-        """Momentum of the whole model; None where it is not written."""
-        whole = next((one for one in self.databases if set(_AXES) <= set(one.channels)), None)
-        if whole is None:
-            return None
-        values = np.stack([whole.channel(axis) for axis in _AXES], axis=1)[:, np.newaxis]
-        return Momenta(whole.time, values, None, whole.precisions(_AXES)[1], (0,))
+        """Momentum of the whole model, or its velocity, which is the same but for the mass; None if not written."""
+        from d2rpick.histories.balance_terms import velocity_of
+
+        for database in self.databases:
+            velocity = velocity_of(database) if database.channels else None
+            if velocity:
+                return Momenta(database.time, velocity.values[:, np.newaxis], None, velocity.precision, (0,))
+        return None
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
         """Give the momentum of some parts together, or of the whole model; None where it is not written."""
@@ -203,6 +206,25 @@ class Run:
             complete=all(one.complete for one in self.databases),
             notes=(*self.notes, *notes),
         )
+
+
+class _Written:
+    """Evidence that the files of a run hold for some parts, read when it is asked for."""
+
+    def __init__(self, run: Run, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> None:
+        self._run, self._chosen, self._flying = run, chosen, flying
+
+    @cached_property
+    def momenta(self) -> tuple[Momenta, ...]:
+        """Momenta of the parts, then of the whole model."""
+        return self._run.momenta(self._chosen, self._flying)
+
+    @cached_property
+    def balance(self) -> Balance | None:
+        """Energies of the whole model."""
+        from d2rpick.histories.balance_terms import terms_of
+
+        return terms_of(self._run)
 
 
 def _with_terms(history: History, names: Sequence[str], energies: Samples) -> History:

@@ -11,8 +11,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.vibration.measures import run_time_share
 from d2rpick.models.exhibit import Curve, Exhibit, Panel
+from d2rpick.vibration.measures import run_time_share
 
 # Hours of the pick-up truck without and with switching; neither its times nor its elements are published.
 PICK_UP: Final = (25.5, 6.5)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice import health as limits
+from d2rpick.flight.flight import MOST_WORK
 
 if TYPE_CHECKING:
     from d2rpick.choice.health import Health
@@ -38,12 +39,12 @@ def measures_of(health: Health) -> list[Measure]:
         ),
         _share("contact energy", health.sliding_share, limits.MOST_SLIDING),
         _share("negative contact energy", health.negative_sliding_share, limits.MOST_NEGATIVE_SLIDING),
-        _share("energy of deleted elements", health.eroded_share, limits.MOST_WORK),
+        _share("energy of deleted elements", health.eroded_share, MOST_WORK),
     ]
     if health.window:
         found += [
-            _share("change of contact energy in the window", health.window_sliding, limits.MOST_WORK),
-            _share("work beyond gravity and damping there", health.window_work, limits.MOST_WORK),
+            _share("change of contact energy in the window", health.window_sliding, MOST_WORK),
+            _share("work beyond gravity and damping there", health.window_work, MOST_WORK),
             _share("energy deleted there", health.window_eroded, 0.0),
         ]
     return found

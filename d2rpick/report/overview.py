@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.overview import Overview
     from d2rpick.choice.warnings import Caution
-    from d2rpick.flight.momentum import FreeFlight
+    from d2rpick.flight.window import FreeFlight
 
 SCHEMA = "d2rpick/info/1"
 _PARTS_HEAD = ("part", "title", "highest internal energy")
@@ -58,7 +58,7 @@ def as_csv(overview: Overview) -> str:
         **{f"sampling_{name}": getattr(sampling, name) if sampling else None for name in ("min", "median", "max")},
         "channels": "; ".join(overview.channels),
         "parts": "; ".join(f"{one.part.id} {one.part.title}".rstrip() for one in overview.parts),
-        "flights": "; ".join(map(_flight, overview.flights)),
+        "flights": "; ".join(_flight(*flight) for flight in overview.flights),
         "health": "; ".join(f"{what} {value}" for what, value, *_ in _health(overview)),
         "notes": "; ".join(overview.notes),
     }
@@ -74,8 +74,9 @@ def as_json(overview: Overview, command: Sequence[str]) -> str:
             "start": f.start,
             "end": f.end if f.end_seen else None,
             "parts": [asdict(p) for p in f.parts] if f.parts else None,
+            "source": source,
         }
-        for f in overview.flights
+        for source, f in overview.flights
     ]
     front: dict[str, Any] = {"schema": SCHEMA, "tool_version": __version__, "command": list(command)}
     front["warnings"] = [caution._asdict() for caution in cautions(overview)]
@@ -99,7 +100,7 @@ def _rows(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("complete", overview.complete),
         ("channels", ", ".join(overview.channels) or None),
     ]
-    rows += [("flight", _flight(flight)) for flight in overview.flights]
+    rows += [("flight", _flight(*flight)) for flight in overview.flights]
     return rows
 
 
@@ -115,7 +116,7 @@ def _parts(overview: Overview) -> list[list[tables.Cell]]:
     return [[one.part.id, one.part.title, one.energy_max] for one in overview.parts]
 
 
-def _flight(flight: FreeFlight) -> str:
+def _flight(source: str, flight: FreeFlight) -> str:
     who = ", ".join(part.title or str(part.id) for part in flight.parts) if flight.parts else "the whole model"
     end = f"to {flight.end:.6g}" if flight.end_seen else f"to the end of the record, {flight.end:.6g}"
-    return f"{who} from {flight.start:.6g} {end}"
+    return f"{who} from {flight.start:.6g} {end} ({source})"

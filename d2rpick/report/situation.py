@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.warnings import Caution
+    from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import Part
 
 
@@ -32,8 +33,12 @@ def heading(situation: Situation) -> list[str]:
     else:
         end = "no next contact seen" if flight.end is None else f"to {flight.end:.6g}"
         who = f" of {', '.join(part.title or str(part.id) for part in flight.parts)}" if flight.parts else ""
-        lines.append(f"flight   from {flight.start:.6g} ({flight.source}{who}), {end}")
+        lines.append(f"flight   from {flight.start:.6g} ({_source(flight)}{who}), {end}")
     return lines
+
+
+def _source(flight: Flight) -> str:
+    return "energy alone, not certain" if flight.source == "energy" else str(flight.source)
 
 
 def _basis(situation: Situation) -> str:
@@ -90,7 +95,13 @@ def mechanics(situation: Situation) -> dict[str, Any]:
         "kinetic_share": situation.kinetic_share,
         "kinetic_share_estimated": situation.vibration.estimated is not None,
         "basis": situation.basis,
-        "flight": {"start": flight.start, "end": flight.end, "source": flight.source, "parts": parts_of(flight.parts)},
+        "flight": {
+            "start": flight.start,
+            "end": flight.end,
+            "source": flight.source,
+            "certain": flight.certain,
+            "parts": parts_of(flight.parts),
+        },
         "oscillator": _oscillator(situation),
         "modes": _modes(situation),
         "unsigned_parts": [part._asdict() for part in parts.unsigned] if parts else None,

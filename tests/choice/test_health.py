@@ -118,8 +118,10 @@ def test_a_ratio_is_not_judged_where_the_run_has_hardly_any_energy_yet() -> None
 def test_damping_that_counts_as_external_work_is_no_load() -> None:
     decaying = 50 * np.exp(-3 * TIME) * (1.2 + np.cos(60 * TIME))
     spent = -3 * np.append(0, np.cumsum((decaying[1:] + decaying[:-1]) / 2 * np.diff(TIME)))
-    velocity = np.stack([np.exp(-3 * TIME), ONES, 1 - 2 * TIME], axis=1)
-    damped = replace(HEALTHY, kinetic=decaying, external_work=WORK + spent, velocity=velocity)
+    fall = 4 * np.exp(-3 * TIME) - 2  # of v' = g - 3 v with g = -6
+    velocity = np.stack([np.exp(-3 * TIME), 0 * TIME, fall], axis=1)
+    gravity = -30 * np.append(0, np.cumsum((fall[1:] + fall[:-1]) / 2 * np.diff(TIME)))
+    damped = replace(HEALTHY, kinetic=decaying, external_work=gravity + spent, velocity=velocity)
     assert "work-in-window" not in warned(damped)
     assert "work-in-window" in warned(replace(damped, kinetic=None))
 

@@ -52,7 +52,7 @@ def test_info_tells_format_states_span_and_channels(
     assert channel in found["channels"]
     assert found["sampling"]["min"] <= found["sampling"]["median"] <= found["sampling"]["max"]
     assert found["sampling"]["median"] == pytest.approx(end / (states - 1), rel=0.01)
-    assert (found["complete"], found["parts"], found["flights"]) == (True, [], [])
+    assert (found["complete"], found["parts"]) == (True, [])
 
 
 def test_info_tells_version_parts_and_flight_of_a_matsum(matsum: Path) -> None:
@@ -63,7 +63,7 @@ def test_info_tells_version_parts_and_flight_of_a_matsum(matsum: Path) -> None:
         (1, "frame"), (2, "suspended mass"), (3, "spring"),
     ]  # fmt: skip
     assert [part["energy_max"] for part in found["parts"]] == [0.0, 0.0, pytest.approx(140.36, rel=1e-4)]
-    assert found["flights"] == [{"start": 0.0, "end": None, "parts": [
+    assert found["flights"] == [{"start": 0.0, "end": None, "source": "momentum", "parts": [
         {"id": part["id"], "title": part["title"]} for part in found["parts"]
     ]}]  # fmt: skip
 

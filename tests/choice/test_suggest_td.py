@@ -14,7 +14,7 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.errors import RangeError
-from d2rpick.histories.history import EXACT, History, Momenta, Part
+from d2rpick.histories.history import EXACT, Given, History, Momenta, Part
 from d2rpick.histories.opening import Selection, open_run
 from tests import chain, paper
 from tests.command import ENERGY, ROLLOVER, answer, run
@@ -181,7 +181,7 @@ def test_what_many_modes_give_back_is_expected(alpha: float) -> None:
     locked = rest + np.sum(deformations(np.array([tr])) ** 2)
     momentum = np.exp(-alpha * time)[:, None, None] * np.array([700.0, 0.0, 0.0])
     flying = Momenta(time, momentum, (Part(1, "box"),), EXACT, chosen=(0,))
-    history = History(time, energy, source=("made",), format="made", channel="energy", momenta=(flying,))
+    history = History(time, energy, source=("made",), format="made", channel="energy", evidence=Given((flying,)))
     after = (time > td) & (time < td + 0.2)
     released = deformations(np.array([tr])) * np.cos(rates[:, None] * (time[after] - td))
     switched = rest + np.mean(np.sum(released**2, axis=0) * np.exp(-alpha * (time[after] - td)))

@@ -10,7 +10,7 @@ import pytest
 from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.warnings import cautions_of
-from d2rpick.histories.history import EXACT, History, Momenta, Part
+from d2rpick.histories.history import EXACT, Given, History, Momenta, Part
 from tests.cli.test_output import check_by_schema
 from tests.command import OSCILLATOR, answer, codes, run
 from tests.records import ENERGY, TIME
@@ -108,7 +108,7 @@ def test_an_oscillator_that_its_momentum_does_not_show_to_fly_is_said_so() -> No
     shaken = np.zeros((TIME.size, 1, 3))
     shaken[:, 0, 0] = np.sin(300 * TIME)
     momenta = (Momenta(TIME, shaken, (Part(1, "box"),), EXACT, chosen=(0,)),)
-    history = History(TIME, ENERGY, source=("run",), format="matsum", channel="E", momenta=momenta)
+    history = History(TIME, ENERGY, source=("run",), format="matsum", channel="E", evidence=Given(momenta))
     found = {c.code: c.message for c in cautions_of(examine(history, 0.0687, Settings()))}
     assert found["no-free-flight"].endswith("its start was read off the oscillator instead")
     plain = History(TIME, ENERGY, source=("run",), format="matsum", channel="E")

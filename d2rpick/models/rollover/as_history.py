@@ -8,7 +8,7 @@ import numpy as np
 
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.histories.history import EXACT, History, Momenta, Part
+from d2rpick.histories.history import EXACT, Given, History, Momenta, Part
 from d2rpick.models.rollover.record import BOX, PARTS
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def history_of(record: Record) -> History:
         format="rollover",
         channel="internal energy of box",
         parts=parts[:1],
-        momenta=(Momenta(record.time, momentum, parts, EXACT, chosen=(BOX,)),),
+        evidence=Given((Momenta(record.time, momentum, parts, EXACT, chosen=(BOX,)),)),
         time_unit="s",
     )
 

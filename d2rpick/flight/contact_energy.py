@@ -1,0 +1,55 @@
+"""Free flight, seen in the contact energy of the model: while nothing touches, it does not change."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.flight.window import FEWEST, FreeFlight, lasting_window
+
+if TYPE_CHECKING:
+    from d2rpick.histories.energy_balance import Balance
+    from d2rpick.histories.history import Samples
+
+# A contact energy that never exceeds its printed digits by this factor shows no contact at all.
+_VISIBLE = 100
+
+
+def shows_contacts(balance: Balance) -> bool:
+    """Whether the model has contacts that were ever closed, as far as the contact energy tells."""
+    energy = balance.sliding
+    return energy is not None and energy.size >= FEWEST and float(np.ptp(energy)) > _VISIBLE * _noise(balance)
+
+
+def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
+    """Find the window around ``td`` [time] in which the contact energy is constant, or None.
+
+    Where it has been constant since the first state no contact has ended, and a load of another kind may act: such a
+    window counts only where the external work is written too, which shows that load.
+    """
+    time, energy = balance.time, balance.sliding
+    if energy is None or not time[0] <= td <= time[-1]:
+        return None
+    window = lasting_window(_Constant(time, energy), td, float(np.ptp(energy)), _noise(balance))
+    if window is None or (window[0] == 0 and balance.external_work is None):
+        return None
+    first, last = window
+    return FreeFlight(float(time[first]), float(time[last]), None, last < time.size - 1)
+
+
+def _noise(balance: Balance) -> float:
+    """What the printed digits leave open [energy]."""
+    assert balance.sliding is not None
+    return balance.precision.quantum(float(np.abs(balance.sliding).max())) / 2
+
+
+class _Constant:
+    """One quantity that does not change, a `Law`."""
+
+    def __init__(self, time: Samples, values: Samples) -> None:
+        self.time, self.values = time, values
+
+    def misfit(self, first: int, last: int) -> float:
+        """Half the range between two states."""
+        return float(np.ptp(self.values[min(first, last) : max(first, last) + 1])) / 2

@@ -1,0 +1,158 @@
+"""Windows around a time in which a record obeys a law of free flight, as long as they can be and no longer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from d2rpick.histories.history import Part, Samples
+
+# Misfit that free flight may leave at first, as a share of the range over the record: contact shows at once.
+TOLERANCE = 1e-3
+# Any smooth motion obeys a law for a moment; what is left of it there grows with the cube of time or faster.  At a
+# tenth of the tolerance such a moment shrinks by the cube root, free flight hardly does: the limit lies halfway.
+_TIGHTER = 0.1
+# No window is shorter than this share of the record, or holds fewer states.
+SHORTEST, FEWEST = 0.05, 12
+# The misfit of the middle of a window, without this share at each end, is that of free flight itself.  The window may
+# leave so many times as much of what printed digits leave open, which has a bound, and of the rest, which has none: its
+# largest deviation is looked for among more states and over a longer time.
+_ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
+# Nothing is known more exactly than this share of its range: solvers add up in single precision.
+_ROUND_OFF = 1e-7
+# Each time the window shrinks its middle is clearer of the contacts; it soon stays.
+_MOST_SHRINKS = 8
+
+
+class FreeFlight(NamedTuple):
+    """Window [time] in which ``parts`` fly freely together; None for parts: the whole model.
+
+    ``end_seen`` is False where the record ends while it still flies.  ``damping`` is alpha, by which the momentum
+    decays there [1/time].
+    """
+
+    start: float
+    end: float
+    parts: tuple[Part, ...] | None
+    end_seen: bool
+    damping: float = 0.0
+
+
+class Law(Protocol):
+    """What free flight obeys, and how far a record is off."""
+
+    @property
+    def time(self) -> Samples:
+        """Times of the record, shape (n,)."""
+
+    def misfit(self, first: int, last: int) -> float:
+        """Largest deviation of the states ``first`` to ``last`` from the law that suits them best."""
+
+
+def lasting_window(law: Law, td: float, extent: float, noise: float) -> tuple[int, int] | None:
+    """Find the states around ``td`` that obey the law and go on doing so when it is taken strictly.
+
+    Parameters
+    ----------
+    law : Law
+    td : float
+        [time]
+    extent, noise : float
+        Range over the record, and what printed digits leave open, in the unit of the misfit.
+
+    Returns
+    -------
+    (int, int) or None
+        First and last state; None where no window is long enough, or a strict one does not hold td.
+    """
+    time = law.time
+    at = min(int(np.searchsorted(time, td)), time.size - 1)
+    room, strict = TOLERANCE * extent + noise, _TIGHTER * TOLERANCE * extent + noise
+    window = longest_window(law, at, room)
+    length = _length(time, window)
+    if not _long_enough(time, window):
+        return None
+    if _length(time, longest_window(law, at, strict)) < (1 + np.cbrt(strict / room)) / 2 * length:
+        return None
+    first, last = _tightened(law, window, max(noise, _ROUND_OFF * extent))
+    return (first, last) if time[first] <= td <= time[last] and _long_enough(time, (first, last)) else None
+
+
+def longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
+    """First and last state of the longest window around the state ``at`` with a misfit below ``room``.
+
+    Near an end of the flight a short window may reach across it: the side that is grown first decides, so both
+    orders are tried.
+    """
+    last_state = law.time.size - 1
+    first = _farthest(at, 0, lambda i: law.misfit(i, at) <= room)
+    one = first, _farthest(at, last_state, lambda j: law.misfit(first, j) <= room)
+    last = _farthest(at, last_state, lambda j: law.misfit(at, j) <= room)
+    other = _farthest(at, 0, lambda i: law.misfit(i, last) <= room), last
+    return max(one, other, key=lambda window: _length(law.time, window))
+
+
+def moments(time: Samples) -> Iterator[float]:
+    """Give times so close together that each flight that is long enough holds one."""
+    yield from np.linspace(time[0], time[-1], round(1 / SHORTEST) + 1).tolist()
+
+
+def all_windows(time: Samples, around: Callable[[float], FreeFlight | None]) -> tuple[FreeFlight, ...]:
+    """Find all flights of a record, ascending in time, where ``around`` gives the one around a time."""
+    found: list[FreeFlight] = []
+    for moment in moments(time):
+        if not found or moment > found[-1].end:
+            flight = around(moment)
+            if flight:  # the tolerance may let it begin some samples before the last one has ended
+                found.append(flight._replace(start=max(flight.start, found[-1].end)) if found else flight)
+    return tuple(found)
+
+
+def _tightened(law: Law, window: tuple[int, int], noise: float) -> tuple[int, int]:
+    """Shrink a window until its ends deviate no more than its middle: what is left of a load there is cut off.
+
+    The tolerance hides the last, weak pushes of a load.  The middle of the flight knows how exactly the run obeys
+    the law, be that by printed digits, round-off or the solver's own errors.
+    """
+    start = window[0]
+    for _ in range(_MOST_SHRINKS):
+        first, last = window
+        inset = round(_ENDS * (last - first))
+        own = law.misfit(first + inset, last - inset)
+        room = _REACH_OF_DIGITS * noise + _REACH * max(0.0, own - noise)
+        tight = longest_window(law, (first + last) // 2, room)
+        tighter = max(first, tight[0]), min(last, tight[1])
+        if tighter == window:
+            break
+        window = tighter
+    # a solver may write the first state before its first step, with what belongs half a step earlier
+    return (0 if window[0] == 1 and start == 0 else window[0]), window[1]
+
+
+def _long_enough(time: Samples, window: tuple[int, int]) -> bool:
+    shortest = SHORTEST * float(time[-1] - time[0])
+    return window[1] - window[0] + 1 >= FEWEST and _length(time, window) >= shortest
+
+
+def _length(time: Samples, window: tuple[int, int]) -> float:
+    return float(time[window[1]] - time[window[0]])
+
+
+def _farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
+    """Walk from ``start`` towards ``limit`` in doubling steps while it fits, then halve the last step."""
+    sign, good, step = (1 if limit > start else -1), start, 1
+    while good != limit:
+        ahead = good + sign * min(step, abs(limit - good))
+        if not fits(ahead):
+            break
+        good, step = ahead, 2 * step
+    while step > 1:
+        step //= 2
+        ahead = good + sign * min(step, abs(limit - good))
+        if ahead != good and fits(ahead):
+            good = ahead
+    return good
