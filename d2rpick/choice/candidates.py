@@ -13,6 +13,7 @@ from d2rpick.choice.uncertainty import fitted_reach, sampled_reach
 from d2rpick.histories.crossings import find_crossings, find_extrema
 from d2rpick.vibration.one_mode import Mode
 from d2rpick.vibration.replay import replayed_residual
+from d2rpick.vibration.second_mode import residual_bound
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -28,6 +29,8 @@ _UNDESCRIBED = {
     "parts": "the signs of the parts cannot be followed from here to td",
     "oscillator": "not described by the oscillator",
 }
+# A residual that may be so much higher is worth a note.
+_MUCH_HIGHER = 0.1
 _SAME_SWING = ("on the same swing as td: hardly anything is saved",)
 
 
@@ -40,6 +43,7 @@ class Candidate:
     parts or modes come closest ("given" for a pair to be verified).  ``acceptable``: in the flight, same sign, error
     within tolerance; else ``notes`` say why not.  ``run_time_share``: expected run time over that of the reference.
     ``same_swing``: the energy turns less than twice from tr to td, so that hardly anything is saved.
+    ``residual_high``: how large the residual may be if what the oscillator leaves over is a further mode.
     ``parts``: what each part has of the mismatch, empty where single parts are not known.
     """
 
@@ -65,6 +69,7 @@ class Candidate:
     run_time_share: float | None = None
     same_swing: bool = False
     parts: tuple[PartMatch, ...] = ()
+    residual_high: float | None = None
 
     @property
     def error(self) -> float:
@@ -149,6 +154,7 @@ class _OfVibration(NamedTuple):
     residual: float
     timing_tolerance: float
     part_mismatch: float | None
+    residual_high: float
 
 
 def _measured(situation: Situation, times: Samples) -> list[_OfVibration | None]:
@@ -171,9 +177,17 @@ def _measured(situation: Situation, times: Samples) -> list[_OfVibration | None]
     else:
         assert situation.mode is not None
         mismatch, residual = [None] * tr.size, replayed_residual(situation.mode, tr, td).tolist()
-    columns = (measures.sign_match(vibration, tr, td).tolist(), lock_in.tolist(), residual, tolerance, mismatch)
+    signs, high = measures.sign_match(vibration, tr, td).tolist(), _highest(situation, tr, np.array(residual))
+    columns = (signs, lock_in.tolist(), residual, tolerance, mismatch, high.tolist())
     found = (_OfVibration(*row) for row in zip(*columns, strict=True))
     return [next(found) if one else None for one in measured]
+
+
+def _highest(situation: Situation, tr: Samples, residual: Samples) -> Samples:
+    """How large each residual may be for what the oscillator leaves unexplained; that of parts needs none."""
+    if situation.part_vibration or situation.fit is None:
+        return residual
+    return residual_bound(residual, situation.fit, tr, situation.td)
 
 
 def _reach(situation: Situation, found: Sequence[Found], times: Samples) -> Samples:
@@ -221,6 +235,7 @@ def _candidate(situation: Situation, found: Found, known: _OfVibration | None, *
         run_time_share=_run_time_share(situation, rigid_fraction),
         same_swing=same_swing,
         parts=parts,
+        residual_high=known and known.residual_high,
     )
 
 
@@ -260,6 +275,8 @@ def _remarks(
         yield f"sign, lock-in error and residual unknown: {_UNDESCRIBED[situation.basis]}"
     if known and known.lock_in_error > measures.TOLERATED_GROWTH and parts:
         yield f"mismatch of {main_contributors(parts)}"
+    if known and known.residual_high > known.residual + _MUCH_HIGHER:
+        yield f"residual up to {known.residual_high:.2g} if what the oscillator leaves over is a further mode"
     if known and reach > known.timing_tolerance:
         yield f"tr is known to ±{reach:.2g} only, its timing tolerance is {known.timing_tolerance:.2g}"
     if known is None and reach >= situation.history.step:

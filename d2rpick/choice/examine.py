@@ -12,7 +12,8 @@ from d2rpick.choice.situation import Situation
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.vibration.identify import Identification, assess, identify, identify_several
-from d2rpick.vibration.span import Span, described_span, identify_within, span_of
+from d2rpick.vibration.second_mode import resolved
+from d2rpick.vibration.span import Span, described_span, identify_within, samples, span_of
 
 if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
@@ -60,7 +61,7 @@ def _oscillator(
         for bound in settings.fit_window:
             _inside(history, bound, "--fit-window")
         fit = identify_within(history, Span(*settings.fit_window))
-        return fit, span_of(history, td, fit, bounds) if fit.describes_record else None
+        return _resolved(history, fit), span_of(history, td, fit, bounds) if fit.describes_record else None
     if settings.oscillator:
         span, fit = described_span(history, td, bounds, partial(assess, settings.oscillator), whole=seen is not None)
         return fit, span
@@ -68,7 +69,12 @@ def _oscillator(
     if span is None:
         span, several = described_span(history, td, bounds, identify_several, whole=seen is not None)
         fit = several if span else fit
-    return fit, span
+    return _resolved(history, fit), span
+
+
+def _resolved(history: History, fit: Identification) -> Identification:
+    """Look for a small second mode in what an accepted oscillator leaves over."""
+    return resolved(*samples(history, Span(fit.start, fit.end)), fit) if fit.describes_record else fit
 
 
 def _with_parts(situation: Situation, energies: Samples, end: float) -> Situation:

@@ -91,7 +91,7 @@ def span_of(history: History, anchor: float, fit: Identification, bounds: Span) 
     It ends where the energy drifts off the fit; None when it is off at the anchor itself.
     """
     assert fit.mode is not None
-    time, energy = _samples(history, bounds)
+    time, energy = samples(history, bounds)
     period = 2 * np.pi / fit.mode.fastest
     typical = float(np.partition(np.diff(time), (time.size - 1) // 2)[(time.size - 1) // 2])
     width = max(3, round(period / _MEANS_PER_PERIOD / typical))
@@ -122,7 +122,7 @@ def _means(values: Samples, first: int, behind: int, ahead: int) -> Samples:
 
 def identify_within(history: History, window: Span) -> Identification:
     """Identify the oscillator from the samples in a window."""
-    return identify(*_samples(history, window))
+    return identify(*samples(history, window))
 
 
 def _windows(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
@@ -137,7 +137,7 @@ def _windows(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
             yield from (Span(beginning, end) for beginning in beginnings if beginning < end)
 
 
-def _samples(history: History, window: Span) -> tuple[Samples, Samples]:
+def samples(history: History, window: Span) -> tuple[Samples, Samples]:
     """Times and energies of the samples in a window."""
     inside = slice(*np.searchsorted(history.time, [window.start, np.nextafter(window.end, np.inf)]))
     return history.time[inside], history.energy[inside]
@@ -147,7 +147,7 @@ def _grow(
     history: History, td: float, window: Span, bounds: Span, fitter: Fitter
 ) -> tuple[Span | None, Identification]:
     """Fit a window, extend it while the record stays with the fit, refit, repeat until it stays."""
-    fit, span = fitter(*_samples(history, window)), window
+    fit, span = fitter(*samples(history, window)), window
     for _ in range(_MOST_REFITS):
         if not fit.describes_record or fit.mode is None:
             return None, fit
@@ -159,7 +159,7 @@ def _grow(
         if grown == (fit.start, fit.end):
             return _cleared(history, grown, fit, bounds, fitter)
         span = grown
-        fit = fitter(*_samples(history, span))
+        fit = fitter(*samples(history, span))
     return (span, fit) if fit.describes_record else (None, fit)
 
 
@@ -179,7 +179,7 @@ def _cleared(
     )
     if inner == span or inner.end - inner.start < 2 * _LEAST_PERIODS * 2 * inset:
         return span, fit
-    core = fitter(*_samples(history, inner))
+    core = fitter(*samples(history, inner))
     if not core.describes_record or core.rms > _MUCH_BETTER * fit.rms:
         return span, fit
     return span_of(history, (inner.start + inner.end) / 2, core, bounds) or span, core
