@@ -65,6 +65,8 @@ class Identification(NamedTuple):
         Window of the fit [time].
     covariance : array of shape (p, p)
         Of the parameters in the order of ``mode.energy_gradient``, for independent errors of the samples.
+    vibration : float
+        Root mean square of the vibration energy over the window [energy]; NaN without a mode.
     hidden_share : float
         Of the vibration energy, what a further mode may hold unseen; zero where none was looked for [-].
     """
@@ -78,6 +80,7 @@ class Identification(NamedTuple):
     start: float
     end: float
     covariance: Samples
+    vibration: float = np.nan
     hidden_share: float = 0.0
 
     def energy_deviation(self, times: Samples | float) -> Samples:
@@ -302,6 +305,7 @@ def _judged(
         start=record.start,
         end=record.end,
         covariance=_covariance(attempt.jacobian, rest) * attempt.units * attempt.units[:, None],
+        vibration=float(np.sqrt(np.mean(vibration**2))) * record.scale,
     )
     return found, loose is None
 

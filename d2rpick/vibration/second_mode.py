@@ -29,7 +29,8 @@ _STARTS: Final = 3  # strongest lines that a second mode is begun from
 class _Spectrum(NamedTuple):
     """Lines of a rest that decay like the vibration: ``rate`` [rad over the record].
 
-    ``amplitude`` is that at the start, over the vibration energy there [-]; ``chance`` is the power of each over the mean power of white noise with the same scatter.
+    ``amplitude`` is that at the start, over the vibration energy there [-]; ``chance`` is the power of each over the
+    mean power of white noise with the same scatter.
     """
 
     rate: Samples
