@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_shares import PartMatch
 
 
+# A residual that may be so much higher is worth a note.
+_MUCH_HIGHER = 0.1
 _SAME_SWING = ("on the same swing as td: hardly anything is saved",)
 
 
@@ -31,6 +33,7 @@ class Candidate:
     parts or modes come closest ("given" for a pair to be verified).  ``acceptable``: in the flight, same sign, error
     within tolerance; else ``notes`` say why not.  ``run_time_share``: expected run time over that of the reference.
     ``same_swing``: the energy turns less than twice from tr to td, so that hardly anything is saved.
+    ``residual_high``: how large the residual may be if what the oscillator leaves over is a further mode.
     ``parts``: what each part has of the mismatch, empty where single parts are not known.
     """
 
@@ -56,6 +59,7 @@ class Candidate:
     run_time_share: float | None = None
     same_swing: bool = False
     parts: tuple[PartMatch, ...] = ()
+    residual_high: float | None = None
 
     @property
     def error(self) -> float:
@@ -116,6 +120,7 @@ def _candidate(situation: Situation, found: Moment, known: Measured | None, *, l
         run_time_share=_run_time_share(situation, rigid_fraction),
         same_swing=same_swing,
         parts=parts,
+        residual_high=known and known.residual_high,
     )
 
 
@@ -147,6 +152,8 @@ def _remarks(situation: Situation, reach: float, known: Measured | None, parts: 
         yield f"sign, lock-in error and residual unknown: {reason}"
     if known and known.lock_in_error > measures.TOLERATED_GROWTH and parts:
         yield f"mismatch of {main_contributors(parts)}"
+    if known and known.residual_high > known.residual + _MUCH_HIGHER:
+        yield f"residual up to {known.residual_high:.2g} if what the oscillator leaves over is a further mode"
     if known and reach > known.timing_tolerance:
         yield f"tr is known to ±{reach:.2g} only, its timing tolerance is {known.timing_tolerance:.2g}"
     if known is None and reach >= situation.history.step:

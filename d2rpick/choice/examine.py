@@ -13,6 +13,7 @@ from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.histories.history import window
 from d2rpick.vibration.identify import Identification, assess, identify, identify_several
 from d2rpick.vibration.model import Evidence, energy_at
+from d2rpick.vibration.second_mode import resolved
 from d2rpick.vibration.span import Span, described_span, identify_within, span_of
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def _oscillator(
         for bound in settings.fit_window:
             _inside(history, bound, "--fit-window")
         fit = identify_within(history, Span(*settings.fit_window))
-        return fit, span_of(history, td, fit, bounds) if fit.describes_record else None
+        return _resolved(history, fit), span_of(history, td, fit, bounds) if fit.describes_record else None
     if settings.oscillator:
         span, fit = described_span(history, td, bounds, partial(assess, settings.oscillator), whole=seen is not None)
         return fit, span
@@ -73,7 +74,12 @@ def _oscillator(
     if span is None:
         span, several = described_span(history, td, bounds, identify_several, whole=seen is not None)
         fit = several if span else fit
-    return fit, span
+    return _resolved(history, fit), span
+
+
+def _resolved(history: History, fit: Identification) -> Identification:
+    """Look for a small second mode in what an accepted oscillator leaves over."""
+    return resolved(*history.between(fit.start, fit.end), fit) if fit.describes_record else fit
 
 
 def _with_parts(evidence: Evidence, history: History, td: float, within: Span) -> Evidence:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
@@ -180,7 +181,7 @@ class History:
         """Energies of the whole model, as far as they are known."""
         return self.evidence.balance
 
-    @property
+    @cached_property
     def step(self) -> float:
         """Largest output interval [time]: how coarsely the record samples its vibration."""
         return float(np.max(np.diff(self.time)))
@@ -190,7 +191,9 @@ class History:
         if not self.time[0] <= time <= self.time[-1]:
             span = f"{self.time[0]:g} to {self.time[-1]:g}"
             raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}")
-        return float(np.interp(time, self.time, self.energy))
+        before = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
+        cell = slice(before, before + 2)  # of whole arrays that are read-only, numpy would make copies
+        return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def mean_energy(self, start: float, end: float) -> float | None:
         """Mean energy of the states in a window; None where there is none [energy]."""

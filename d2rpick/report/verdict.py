@@ -109,6 +109,7 @@ def measures(answer: Verdict) -> dict[str, Any]:
         "sign_match": c.sign_match,
         "lock_in_error": c.lock_in_error,
         "residual": c.residual,
+        "residual_high": c.residual_high,
         "part_mismatch": c.part_mismatch,
         "timing_tolerance": c.timing_tolerance,
         "rigid_time": c.rigid_time,

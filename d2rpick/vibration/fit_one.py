@@ -86,12 +86,11 @@ def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[
     each by exp(p h).  Means over cells of an exponential are the same exponential, so cells also serve
     dense records.
     """
-    integral = np.concatenate(([0.0], np.cumsum((e[1:] + e[:-1]) / 2 * np.diff(s))))
-    fine = np.diff(np.interp(np.linspace(0, 1, min(s.size, _MAX_CELLS + 1)), s, integral))
+    fine = cell_means(s, e, min(s.size - 1, _MAX_CELLS))
     power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
     periods = int(np.argmax(power * np.arange(power.size)))  # per octave: decay alone must not win
     count = min(max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS)
-    cells = np.diff(np.interp(np.linspace(0, 1, count + 1), s, integral)) * count
+    cells = cell_means(s, e, count)
     hankel = np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
     vectors = np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1]
     found = []
@@ -102,6 +101,12 @@ def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[
     z = z[(z.imag > 0) & (np.abs(z) > 0)]
     poles: NDArray[np.complex128] = np.log(z) * count
     return poles
+
+
+def cell_means(s: Samples, e: Samples, count: int) -> Samples:
+    """Means of E(s) over equal cells of [0, 1]."""
+    integral = np.concatenate(([0.0], np.cumsum((e[1:] + e[:-1]) / 2 * np.diff(s))))
+    return np.asarray(np.diff(np.interp(np.linspace(0, 1, count + 1), s, integral)) * count)
 
 
 def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) -> list[Samples]:

@@ -46,11 +46,11 @@ def _starts(s: Samples, e: Samples, coarse_s: Samples, coarse_e: Samples, count:
     for chosen in combinations(range(poles.size), count):
         members = list(chosen)
         if np.diff(np.sort(omega[members])).min() >= _APART:
-            found.append(_linear(omega[members], float(np.median(alpha[members])), coarse_s, coarse_e))
+            found.append(linear_fit(omega[members], float(np.median(alpha[members])), coarse_s, coarse_e))
     return [start for misfit, start in sorted(found, key=lambda one: one[0])[:STARTS] if misfit < hopeless]
 
 
-def _linear(omega: Samples, alpha: float, s: Samples, e: Samples) -> tuple[float, Samples]:
+def linear_fit(omega: Samples, alpha: float, s: Samples, e: Samples) -> tuple[float, Samples]:
     """Fit the amplitudes for known rates; return the sum of squares and the parameters."""
     angle = 2 * omega[:, np.newaxis] * s
     basis = np.exp(-alpha * s) * np.concatenate([np.ones((1, s.size)), np.cos(angle), np.sin(angle)])

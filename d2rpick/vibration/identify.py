@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.vibration.fit_one import COARSE, VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, rates
+from d2rpick.vibration.fit_one import COARSE, VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, minimise, rates
 from d2rpick.vibration.one_mode import Mode, energy_and_jacobian
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ MAX_STRUCTURE: Final = 0.02  # of std(E): thirty times what one real solver leav
 MAX_LOCAL_STRUCTURE: Final = 0.1  # of the fit's energy at that time: a second mode that outlives the first
 MIN_SAMPLES: Final = 24  # four for each parameter of the richest model
 MIN_SAMPLES_PER_PERIOD: Final = 10  # of the energy, pi / omega: below, an aliased fast mode passes for a slow one
+MIN_SAMPLES_BESIDE: Final = 4  # of a mode beside one that is certain: below, cells would hide most of it
 MAX_GROWTH: Final = 0.3  # -alpha x record length: a free vibration only decays, noise hides no more than this
 MIN_PLASTIC: Final = -0.05  # of the energy range: plastic work is positive but for the scatter of its fit
 
@@ -64,6 +65,10 @@ class Identification(NamedTuple):
         Window of the fit [time].
     covariance : array of shape (p, p)
         Of the parameters in the order of ``mode.energy_gradient``, for independent errors of the samples.
+    vibration : float
+        Root mean square of the vibration energy over the window [energy]; NaN without a mode.
+    hidden_share : float
+        Of the vibration energy, what a further mode may hold unseen; zero where none was looked for [-].
     """
 
     mode: Mode | Modes | None
@@ -75,6 +80,8 @@ class Identification(NamedTuple):
     start: float
     end: float
     covariance: Samples
+    vibration: float = np.nan
+    hidden_share: float = 0.0
 
     def energy_deviation(self, times: Samples | float) -> Samples:
         """Return the standard deviation of the fitted energy at ``times`` [energy]; NaN without a mode.
@@ -174,6 +181,19 @@ def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> 
     return _least_wrong(refused, time)
 
 
+def identify_beside(time: Samples, energy: Samples, mode: Mode, rates: Samples) -> Identification:
+    """Fit a second mode beside ``mode``, from each of ``rates`` [1/time], and judge the best fit of both."""
+    from d2rpick.vibration.fit_several import linear_fit
+    from d2rpick.vibration.modes import sum_and_jacobian
+
+    record = _Record.scaled(time, energy)
+    span = record.end - record.start
+    starts = [linear_fit(span * np.array([mode.omega, rate]), span * mode.alpha, record.s, record.e) for rate in rates]
+    ends = [minimise(start, sum_and_jacobian, record.s, record.e) for _, start in starts]
+    best = _sum(min(ends, key=lambda end: end[1])[0], record)
+    return _judged(best, _PERIODS_OF_SEVERAL, record, MIN_SAMPLES_BESIDE)[0]
+
+
 def _least_wrong(refused: list[Identification], time: Samples) -> Identification:
     """Give the refused fit that is nearest to the record."""
     if not refused:
@@ -262,8 +282,10 @@ def _sum(parameters: Samples, record: _Record) -> _Attempt:
     return _Attempt(f"a sum of {count} modes", scaled, modes, fitted, jacobian, units)
 
 
-def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> tuple[Identification, bool]:
-    """Return a fit with its verdict, and whether it follows the samples."""
+def _judged(
+    attempt: _Attempt, least_periods: float, record: _Record, density: float = MIN_SAMPLES_PER_PERIOD
+) -> tuple[Identification, bool]:
+    """Return a fit with its verdict, and whether it follows the samples; ``density`` is the least per period."""
     s, e = record.s, record.e
     rest = e - attempt.energy
     rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), _structure(rest)
@@ -271,9 +293,8 @@ def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> tuple[I
     # where noise exceeds the vibration, a rest says nothing about a further mode
     local_structure = _structure(rest / np.maximum(vibration, max(rms, _FLOOR * np.max(vibration))))
     loose = _loose(attempt.name, rms / spread, structure / spread, local_structure)
-    # the interval that a moment of the record lies in, on average: gaps count by their length
-    interval = float(np.sum(np.diff(s) ** 2))
-    reason = loose or _implausible(attempt.scaled, interval, least_periods, record.end - record.start)
+    found_density = samples_per_period(s, attempt.scaled)
+    reason = loose or _implausible(attempt.scaled, found_density, density, least_periods, record.end - record.start)
     found = Identification(
         mode=attempt.mode,
         describes_record=reason is None,
@@ -284,6 +305,7 @@ def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> tuple[I
         start=record.start,
         end=record.end,
         covariance=_covariance(attempt.jacobian, rest) * attempt.units * attempt.units[:, None],
+        vibration=float(np.sqrt(np.mean(vibration**2))) * record.scale,
     )
     return found, loose is None
 
@@ -305,7 +327,16 @@ def _loose(name: str, misfit: float, structure: float, local_structure: float) -
     return None
 
 
-def _implausible(mode: Mode | Modes, interval: float, least_periods: float, span: float) -> str | None:
+def samples_per_period(time: Samples, mode: Mode | Modes) -> float:
+    """Samples per period of the energy of the fastest mode, two in one of the vibration [-]."""
+    # the interval that a moment of the record lies in, on average: gaps count by their length
+    interval = float(np.sum(np.diff(time) ** 2)) / float(time[-1] - time[0])
+    return float(np.pi / mode.fastest / interval)
+
+
+def _implausible(
+    mode: Mode | Modes, density: float, least_density: float, least_periods: float, span: float
+) -> str | None:
     """Say why a scaled fit that follows the samples is still no evidence of one free vibration."""
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
@@ -323,13 +354,11 @@ def _implausible(mode: Mode | Modes, interval: float, least_periods: float, span
     if mode.energy_plastic < MIN_PLASTIC:
         share = mode.energy_plastic
         return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
-    fastest = mode.fastest / (2 * np.pi)
-    density = 1 / (2 * fastest * interval)  # the energy has two periods in one of the vibration
-    if density < MIN_SAMPLES_PER_PERIOD:
+    if density < least_density:
         # a tenth finer than the limit, so that rounding to two digits stays on its safe side
-        finer = span / (2 * fastest) / (1.1 * MIN_SAMPLES_PER_PERIOD)
+        finer = np.pi * span / mode.fastest / (1.1 * least_density)
         return (
-            f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}, and "
+            f"the energy has {density:.2f} samples per period, fewer than {least_density}, and "
             f"aliasing may fake this mode: ask for an output interval of {finer:.2g} or less"
         )
     return None

@@ -18,11 +18,12 @@ class Moment(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """Measures that only known deformations give."""
+    """Measures that only known deformations give; ``residual_high``: at worst, with what a fit may have missed."""
 
     sign_match: bool
     lock_in_error: float
     residual: float
+    residual_high: float
     timing_tolerance: float
     part_mismatch: float | None
 

@@ -15,6 +15,7 @@ from d2rpick.vibration.moments import Measured, Moment
 from d2rpick.vibration.of_energy import sampled_before
 from d2rpick.vibration.one_mode import Mode
 from d2rpick.vibration.replay import replayed_residual
+from d2rpick.vibration.second_mode import residual_bound
 from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
 if TYPE_CHECKING:
@@ -128,9 +129,10 @@ class OfModes:
         else:
             assert self.profile is not None
             tolerance = [self.profile.tolerance(*one) for one in zip(tr.tolist(), lock_in.tolist(), strict=True)]
-        residual = replayed_residual(self.mode, tr, self.td).tolist()
+        residual = replayed_residual(self.mode, tr, self.td)
+        highest = residual_bound(residual, self.fit, tr, self.td)
         signs = measures.sign_match(self.mode, tr, self.td).tolist()
-        rows = zip(signs, lock_in.tolist(), residual, tolerance, strict=True)
+        rows = zip(signs, lock_in.tolist(), residual.tolist(), highest.tolist(), tolerance, strict=True)
         found = (Measured(*row, part_mismatch=None) for row in rows)
         return [next(found) if one else None for one in inside]
 

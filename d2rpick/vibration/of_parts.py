@@ -115,7 +115,7 @@ class OfParts:
         residual = [measures.residual(error, self.kinetic_share) for error in lock_in]
         signs = measures.sign_match(self.parts, tr, self.td).tolist()
         mismatch = measures.part_mismatch(self.parts, tr, self.td).tolist()
-        found = (Measured(*row) for row in zip(signs, lock_in, residual, tolerance, mismatch, strict=True))
+        found = (Measured(*row) for row in zip(signs, lock_in, residual, residual, tolerance, mismatch, strict=True))
         return [next(found) if one else None for one in inside]
 
     def errors(self, times: Samples) -> Samples:

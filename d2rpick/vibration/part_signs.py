@@ -74,7 +74,11 @@ class Parts:
 
     def amplitudes(self, t: Samples | float) -> Samples:
         """Signed deformations, of the shape of ``t`` with an axis for the parts before it [sqrt(energy)]."""
-        return np.stack([np.interp(t, self.time, column) for column in self.deformation])
+        time = np.clip(t, self.time[0], self.time[-1])
+        cell = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, self.time.size - 2)
+        left, right = self.deformation[:, cell], self.deformation[:, cell + 1]
+        slope = (right - left) / (self.time[cell + 1] - self.time[cell])
+        return np.asarray(left + slope * (time - self.time[cell]))
 
     def comparable_since(self, td: float) -> float:
         """Earliest time whose signs can be compared with those at ``td`` [time]."""

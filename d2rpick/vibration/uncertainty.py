@@ -71,7 +71,7 @@ def fitted_reach(history: History, fit: Identification, mode: Mode | Modes, time
     record about it, and what of the misfit is no scatter.  Arguments and result as in ``sampled_reach``, without level.
     """
     both = np.append(times, td)
-    off = _DEVIATIONS * fit.energy_deviation(both) + _PEAK_OF_REST * _local_rest(history, fit, mode, both)
+    off = _DEVIATIONS * fit.energy_deviation(both) + _PEAK_OF_REST * _local_rest(fit, mode, both)
     error = off[:-1] + off[-1]
     slope, bend = mode.energy_slopes(times)
     distance = reach(np.abs(slope), np.abs(bend), error)
@@ -83,11 +83,9 @@ def fitted_reach(history: History, fit: Identification, mode: Mode | Modes, time
     )
 
 
-def _local_rest(history: History, fit: Identification, mode: Mode | Modes, at: Samples) -> Samples:
+def _local_rest(fit: Identification, mode: Mode | Modes, at: Samples) -> Samples:
     """Systematic rest of a fit near each time: its rms, and more where the vibration is above its own rms [energy]."""
-    time, _ = history.between(fit.start, fit.end)
-    usual = np.sqrt(np.mean(mode.vibration_energy(time) ** 2))
-    return np.asarray(fit.structure * np.maximum(1.0, mode.vibration_energy(at) / usual))
+    return np.asarray(fit.structure * np.maximum(1.0, mode.vibration_energy(at) / fit.vibration))
 
 
 def _cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
@@ -102,9 +100,9 @@ def _rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
     Energy and time of both neighbours are off by up to half a quantum each, any value as likely as another.
     """
     cell, interval = _cells(history.time, at)
-    share = (at - history.time[cell]) / interval
-    slope = np.diff(history.energy)[cell] / interval
-    energies = _half_quanta(history.energy_precision, np.interp(at, history.time, history.energy))
+    off = at - history.time[cell]
+    share, slope = off / interval, (history.energy[cell + 1] - history.energy[cell]) / interval
+    energies = _half_quanta(history.energy_precision, history.energy[cell] + slope * off)
     times = slope * _half_quanta(history.time_precision, at)
     square = (energies**2 + times**2) / 3 * ((1 - share) ** 2 + share**2)
     return energies + np.abs(times), square
@@ -126,11 +124,12 @@ def curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
     at = np.asarray(at, dtype=np.float64)
     if time.size < 3:
         return np.zeros(at.shape)
-    slope = np.diff(energy) / np.diff(time)
-    second = np.abs(2 * np.diff(slope) / (time[2:] - time[:-2]))
     cell = np.searchsorted(time, at, side="right") - 1
-    around = np.clip(cell[..., np.newaxis] + np.arange(-2, 2), 0, second.size - 1)
-    return np.asarray(second[around].max(axis=-1))
+    first = np.clip(cell[..., np.newaxis] + np.arange(-2, 2), 0, time.size - 3)
+    t0, t1, t2 = (time[first + i] for i in range(3))
+    e0, e1, e2 = (energy[first + i] for i in range(3))
+    second = np.abs(2 * ((e2 - e1) / (t2 - t1) - (e1 - e0) / (t1 - t0)) / (t2 - t0))
+    return np.asarray(second.max(axis=-1))
 
 
 def reach(slope: Samples | float, bend: Samples | float, error: Samples | float) -> Samples:

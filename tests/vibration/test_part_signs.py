@@ -243,3 +243,12 @@ def test_several_energies_are_carried_but_for_those_that_are_always_zero() -> No
     table = chain.history()
     assert table.part_energies is not None
     np.testing.assert_array_equal(table.part_energies.sum(axis=1), table.energy)
+
+
+def test_deformations_between_the_states_are_linear() -> None:
+    time = np.linspace(0, 2, 201)
+    found = read_parts(time, two_springs(time) ** 2, NAMES)
+    assert found.names
+    for t in (np.array([-1.0, 0.0, 0.123, 1.0, 1.9999, 2.0, 3.0]), np.float64(0.777)):
+        expected = [np.interp(t, time, column) for column in found.deformation]
+        np.testing.assert_allclose(found.amplitudes(t), expected, rtol=1e-12, atol=1e-12)

@@ -1,0 +1,59 @@
+"""The window in which a record stays with an oscillator, and what is tried to find it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from d2rpick.histories.history import History
+from d2rpick.vibration.identify import assess, identify, identify_several
+from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.span import Span, described_span, span_of
+from tests.records import ENERGY, MODE, TIME, noisy
+
+
+def of(energy: np.ndarray) -> History:
+    return History(TIME, energy, source=("test",), format="csv", channel="E")
+
+
+def by_convolution(energy: np.ndarray, anchor: float) -> tuple[float, float]:
+    """Where means over a twenty-fifth of a period leave the paper's mode by more than 1 % of its energy."""
+    width = round(2 * np.pi / MODE.omega / 25 / 1e-4)
+    gone = np.abs(np.convolve(energy - ENERGY, np.ones(width) / width, mode="same")) > 0.01 * MODE.vibration_energy(
+        TIME
+    )
+    at = int(np.searchsorted(TIME, anchor))
+    left, right = np.flatnonzero(gone[:at])[-1] + 1 + width // 2, at + np.flatnonzero(gone[at:])[0] - 1 - width // 2
+    return float(TIME[left]), float(TIME[right])
+
+
+@pytest.mark.parametrize("anchor", [0.06, 0.08, 0.1])
+@pytest.mark.parametrize("size", [1e-2, 1.0, 1e300])
+def test_a_span_ends_where_running_means_leave_the_fit(size: float, anchor: float) -> None:
+    energy = ENERGY + size * MODE.vibration_energy(TIME) * ((TIME < 0.0311) | (TIME > 0.1234))
+    fit = assess(MODE, TIME, ENERGY)
+    assert span_of(of(energy), anchor, fit, Span(0.0, 0.15)) == by_convolution(energy, anchor)
+
+
+def test_a_refusal_on_a_few_samples_names_the_misfit_of_all() -> None:
+    rng = np.random.default_rng(1)
+    energy = rng.normal(size=TIME.size)
+    span, fit = described_span(of(energy), 0.1, Span(0.0, 0.15))
+    assert span is None
+    before = TIME <= 0.1
+    assert fit.reason == identify(TIME[before], energy[before]).reason
+    for found in (
+        identify(TIME, energy, quick=True),
+        identify_several(TIME, energy, quick=True),
+        assess(MODE, TIME, energy, quick=True),
+    ):
+        assert (found.mode, found.describes_record) == (None, False)
+        assert found.reason
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_what_is_accepted_is_the_same_when_refusals_are_quick(noise: float) -> None:
+    energy = noisy(ENERGY, noise, seed=2)
+    quick, thorough = identify(TIME, energy, quick=True), identify(TIME, energy)
+    assert isinstance(quick.mode, Mode)
+    assert (quick.mode, quick.reason, quick.rms) == (thorough.mode, None, thorough.rms)
