@@ -96,8 +96,10 @@ def needed(solver: Solver) -> str:
 
 
 def prints_card(options: dict[str, Any], output_format: str) -> bool:
-    """Whether a card is asked for, by itself or in a report; UsageError where options are about none."""
+    """Whether a card is asked for, by itself or in a report; UsageError where options make no sense together."""
     prints = output_format == "card" or options["report"] is not None
+    if not prints:
+        shared.selection(options)
     if not prints and (given := _given(options)):
         raise click.UsageError(
             f"--{given[0].replace('_', '-')} is about the card; ask for one with -f card or --report"

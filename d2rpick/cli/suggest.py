@@ -85,9 +85,7 @@ def command(
     if options["report"]:
         output.write(options["report"], text_bytes(_page(answer, run, options)))
     if output_format == "card":
-        written = _card(answer, run, options, output)
-        finish(ctx, objection=not written, exit_zero=exit_zero)
-        return
+        return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
     texts = {
         "table": lambda: report.as_table(answer, limit),
         "markdown": lambda: report.as_markdown(answer, limit),
@@ -96,7 +94,7 @@ def command(
         "value": lambda: report.as_value(answer),
     }
     output.result(texts[output_format]())
-    finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
+    return finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
 
 
 def _only_in_environment(ctx: click.Context, option: str, *, overruled_by: str) -> bool:
