@@ -33,6 +33,8 @@ NODES: Final = {
     "SPRING": 2,
 }
 _UNFOLLOWED: Final = {"BRIC20", "TETRA10", "SHEL16", "SPHCEL", "XELEM"}
+WITHOUT_FRAME: Final = {"TETRA4", "TETRA10", "BRIC20", "SHEL16"}  # their stresses do not turn with a rigid body
+_SUBMODEL: Final = ""  # before the second slash of //SUBMODEL
 _GROUP_FIELD: Final = 6  # of the first line of /RBODY, in columns of 10: the mass before it takes two
 _ICOROTATIONAL: Final = 2  # Iframe
 _NOT_TURNED: Final = {1, 2}  # Isolid of bricks without a co-rotating frame
@@ -67,11 +69,19 @@ class Starter:
     subsets: dict[int, tuple[int, ...]] = field(default_factory=dict)
     groups: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
     timed: dict[int, tuple[float, float]] = field(default_factory=dict)  # sensors: active from, to
-    unturned: set[int] = field(default_factory=set)  # properties of solids without a co-rotating frame
+    unturned: set[int] = field(default_factory=set)  # properties of bricks without a co-rotating frame
+    unturned_parts: set[int] = field(default_factory=set)  # of elements that have none
+    moved: bool = False  # whether a submodel may offset its ids
     sources: list[SourceFile] = field(default_factory=list)
 
     def take(self, card: Card, words: tuple[str, ...]) -> None:
         """Keep what a card says."""
+        if words[0] == _SUBMODEL:
+            self.moved = True
+            return
+        if words[0] in WITHOUT_FRAME:
+            self.unturned_parts.add(whole(words[1]) if words[1:] else 0)
+            return
         rows = [row for row in card.rows if not row.blank]
         id_ = whole(words[_ID_AT.get(words[0], 1)]) if len(words) > _ID_AT.get(words[0], 1) else 0
         if words[0] == "BEGIN" and rows:
@@ -140,7 +150,7 @@ class Starter:
 
 
 _ID_AT: Final = {"GRNOD": 2, "SENSOR": 2, "PROP": 2}  # where a keyword has its id; others behind their name
-KEPT: Final = {"BEGIN", "RBODY", "PART", "SUBSET", "GRNOD", "SENSOR", "PROP"}
+KEPT: Final = {*WITHOUT_FRAME, _SUBMODEL, "BEGIN", "RBODY", "PART", "SUBSET", "GRNOD", "SENSOR", "PROP"}
 
 
 def card_or_none(source: SourceFile) -> Iterator[tuple[Card, tuple[str, ...]]]:

@@ -98,6 +98,28 @@ def test_a_time_sensor_releases_a_body(tmp_path: Path, sensor: str, expected: li
     assert found == ({"D2R104"} if len(expected) == 2 else set() if expected else {"D2R302"})
 
 
+SOLID = "/PROP/SOLID/1\nsolid\n" + "".join(f"{n:10d}" for n in (1, 0, 0, 0, 0, 0, 0, 0)) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "found"),
+    [
+        (SOLID, True),
+        (SOLID.replace("         1", "        17", 1), False),
+        (SOLID.replace("         0\n", "         2\n"), False),
+        ("/TETRA4/1\n         9         1         2         3         4\n", True),
+    ],
+)
+def test_stresses_of_solids_without_a_frame_do_not_turn(tmp_path: Path, more: str, found: bool) -> None:
+    path = place(tmp_path, EXAMPLE.deck.replace("/END", f"{more}/END"))
+    assert {finding.rule for finding in check_deck(path).findings} == ({"D2R116"} if found else set())
+    start = place(
+        tmp_path, EXAMPLE.deck.replace("/END", f"{more}/END"), (("0.09", f"{ON}/DTIX\n1e-6 1e-6\n"), ("0.2", OFF))
+    )
+    (tmp_path / "box_0003.rad").unlink()
+    assert check_deck(start).findings == ()  # without stress there is nothing to turn
+
+
 def test_files_of_a_run_are_found_by_name_or_by_what_they_hold(tmp_path: Path) -> None:
     path = place(tmp_path)
     files = [str(tmp_path / f"box_000{n}.rad") for n in range(4)]
@@ -118,6 +140,19 @@ def test_an_include_of_the_starter_deck_is_read(tmp_path: Path) -> None:
     assert check_deck(path).findings == ()
     (tmp_path / "inner.inc").write_text("#include inner.inc\n")
     assert {finding.rule for finding in check_deck(path).findings} == {"D2R003"}
+
+
+def test_ids_of_a_submodel_are_not_followed(tmp_path: Path) -> None:
+    path = place(
+        tmp_path, EXAMPLE.deck.replace("/RBODY", "//SUBMODEL/1\nmoved\n      1000\n/RBODY").replace("1808", " 808")
+    )
+    assert spans(path) == [(1808, "main node", 0.02, 0.09)]
+    assert check_deck(path).findings == ()
+
+
+def test_a_run_that_switches_nobody_may_have_any_legs(tmp_path: Path) -> None:
+    files = {"box_0001.rad": "/RUN/box\n1.0\n/VERS/44\n", "box_0003.rad": "/RUN/other/3\n0.5\n/VERS/2022\n"}
+    assert check_deck(write(tmp_path, EXAMPLE.deck, files, EXAMPLE.name)).findings == ()
 
 
 def test_a_comment_silences_a_rule(tmp_path: Path) -> None:
