@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.card_options import all_cautions, card_options, card_wish, energy_of, need_ids, prints_card
+from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
@@ -136,8 +136,8 @@ def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
     drawn = {caption: figures.both_widths(figures.draw_suggestion, answer, "choice")}
     if better_pair(answer):
         drawn["The better pair"] = figures.both_widths(figures.draw_better, answer, "better")
-    wish = card_wish(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, wish))
+    request = card_request(run, options, answer.situation.history)
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, request))
 
 
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:
@@ -148,10 +148,10 @@ def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output)
     if pair is None:
         output.content(b"")
         return False
-    wish = card_wish(run, options, situation.history)
-    found = judged_card([(pair.tr, pair.td)], situation.history, situation.settings, wish)
+    request = card_request(run, options, situation.history)
+    found = judged_card([(pair.tr, pair.td)], situation.history, situation.settings, request)
     if found is None:
-        raise click.UsageError(need_ids(wish, situation.history))
+        raise click.UsageError(need_ids(request, situation.history))
     card, (verdict,) = found
     said = set(answer.cautions)
     output.notes(card.notes, [caution for caution in all_cautions(verdict) if caution not in said])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.card_options import card_options, card_wish, energy_of, prints_card
+from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
@@ -100,8 +100,8 @@ def _page(answer: Verdict, run: Run, options: dict[str, Any]) -> str:
 
     caption = "Internal energy with its level at td, and the pair"
     drawn = {caption: figures.both_widths(figures.draw_verdict, answer, "pair")}
-    wish = card_wish(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, wish))
+    request = card_request(run, options, answer.situation.history)
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, request))
 
 
 def _switched(options: dict[str, Any]) -> Run | None:
