@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class CardWish:
+class CardRequest:
     """What is known of a card before its times: ``solver`` None is the one that wrote the history.
 
     What ``printing`` leaves open the history fills in: its chosen parts, and its end for that of the run.
@@ -34,13 +34,13 @@ class CardWish:
 
 
 def judged_card(
-    windows: Sequence[Times], history: History, judge: Callable[[float, float], Verdict], wish: CardWish
+    windows: Sequence[Times], history: History, judge: Callable[[float, float], Verdict], request: CardRequest
 ) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
     """Print the card of windows, let ``judge`` judge each tr and td as printed, and print it with what it found.
 
     None where nobody says whom the card switches: the chosen parts, or main nodes for a solver that asks for these.
     """
-    solver, printing = wish.of(history)
+    solver, printing = request.of(history)
     if not getattr(printing, SOLVERS[solver].SWITCHES):
         return None
     plain = cards(windows, printing, solver)

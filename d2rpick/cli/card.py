@@ -11,7 +11,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import (
     all_cautions,
     card_options,
-    card_wish,
+    card_request,
     check_solver,
     energy_of,
     need_ids,
@@ -123,14 +123,14 @@ def _judged(
 
     run, settings = reference
     history = energy_of(run, options, prints=True)
-    wish = card_wish(run, options, history)
-    module = SOLVERS[wish.of(history)[0]]
-    if wish.printing.part and module.SWITCHES != "part":
+    request = card_request(run, options, history)
+    module = SOLVERS[request.of(history)[0]]
+    if request.printing.part and module.SWITCHES != "part":
         raise click.UsageError(_ONLY_JUDGED.format(module.TITLE))
     judge = partial(verify_of, Reference(run, history), settings=settings)
-    found = judged_card(windows, history, judge, wish)
+    found = judged_card(windows, history, judge, request)
     if found is None:
-        raise click.UsageError(need_ids(wish, history))
+        raise click.UsageError(need_ids(request, history))
     card, verdicts = found
     output.notes(history.notes, dict.fromkeys(caution for verdict in verdicts for caution in all_cautions(verdict)))
     return card, all(verdict.verified for verdict in verdicts)

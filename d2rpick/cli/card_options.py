@@ -12,26 +12,54 @@ from d2rpick.cli import options as shared
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.judged_card import CardWish
+    from click.shell_completion import CompletionItem
+
+    from d2rpick.choice.judged_card import CardRequest
     from d2rpick.choice.verify import Verdict
     from d2rpick.choice.warnings import Caution
-    from d2rpick.deck.printing.common import Printing, Solver
+    from d2rpick.deck.printing.common import Printing
+    from d2rpick.deck.printing.common import Solver as Module
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
-
-# of d2rpick.deck.printing, which --help does without; a test holds them together
-SOLVERS: Final = ("ls-dyna", "radioss")
 
 _RANGE: Final = re.compile(r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?", re.ASCII)
 _MOST_IDS: Final = 100_000
 _NAMES: Final = ("node", "merge", "swset", "step_cap", "end", "name")
 
 
+class Solver(click.ParamType[str]):
+    """Name of a solver whose input can be printed; the table of solvers is read when it is asked."""
+
+    name = "solver"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Take a name or fail with those there are."""
+        from d2rpick.deck.printing import SOLVERS
+
+        if value not in SOLVERS:
+            self.fail(f"{value!r} was found, one of {', '.join(SOLVERS)} was expected", param, ctx)
+        return str(value)
+
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        """Show the names in the help."""
+        from d2rpick.deck.printing import SOLVERS
+
+        return f"[{'|'.join(SOLVERS)}]"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        """Offer the names that begin so."""
+        from click.shell_completion import CompletionItem
+
+        from d2rpick.deck.printing import SOLVERS
+
+        return [CompletionItem(name) for name in SOLVERS if name.startswith(incomplete)]
+
+
 def card_options(function: shared.Decorated) -> shared.Decorated:
-    """How a card is printed; collected by ``wish``."""
+    """How a card is printed; collected by ``card_request``."""
     options = (
         click.option(
-            "--solver", type=click.Choice(SOLVERS),
+            "--solver", type=Solver(),
             help="Whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]",
         ),
         click.option(
@@ -81,23 +109,25 @@ def check_solver(options: dict[str, Any], solver: str) -> None:
             raise click.UsageError(f"--{name.replace('_', '-')} is an option of --solver {owner}{hint}")
 
 
-def need_ids(wish: CardWish, history: History) -> str:
+def need_ids(request: CardRequest, history: History) -> str:
     """Say which option names whom the card of the history's solver switches."""
     from d2rpick.deck.printing import SOLVERS as MODULES
 
-    solver, _ = wish.of(history)
+    solver, _ = request.of(history)
     return needed(MODULES[solver])
 
 
-def needed(solver: Solver) -> str:
+def needed(solver: Module) -> str:
     """Say which option names whom the card of ``solver`` switches."""
     what = {"part": "the parts to be switched", "node": "the main nodes of the rigid bodies"}
     return f"a card for {solver.TITLE} needs --{solver.SWITCHES}, {what[solver.SWITCHES]}"
 
 
 def prints_card(options: dict[str, Any], output_format: str) -> bool:
-    """Whether a card is asked for, by itself or in a report; UsageError where options are about none."""
+    """Whether a card is asked for, by itself or in a report; UsageError where options make no sense together."""
     prints = output_format == "card" or options["report"] is not None
+    if not prints:
+        shared.selection(options)
     if not prints and (given := _given(options)):
         raise click.UsageError(
             f"--{given[0].replace('_', '-')} is about the card; ask for one with -f card or --report"
@@ -111,14 +141,14 @@ def energy_of(run: Run, options: dict[str, Any], *, prints: bool) -> History:
     return run.history(shared.selection(chosen))
 
 
-def card_wish(run: Run, options: dict[str, Any], history: History) -> CardWish:
+def card_request(run: Run, options: dict[str, Any], history: History) -> CardRequest:
     """Say how a card is printed; UsageError where an option does not suit its solver."""
-    from d2rpick.choice.judged_card import CardWish
+    from d2rpick.choice.judged_card import CardRequest
 
     ids = numbers("--part", options["part"]) if _only_printed(run, options) else []
-    wish = CardWish(options["solver"], printing(options, ids))
-    check_solver(options, wish.of(history)[0])
-    return wish
+    request = CardRequest(options["solver"], printing(options, ids))
+    check_solver(options, request.of(history)[0])
+    return request
 
 
 def _only_printed(run: Run, options: dict[str, Any]) -> bool:

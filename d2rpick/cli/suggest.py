@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.card_options import all_cautions, card_options, card_wish, energy_of, need_ids, prints_card
+from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
@@ -82,9 +82,7 @@ def command(
     if options["report"]:
         output.write(options["report"], text_bytes(_page(answer, run, options)))
     if output_format == "card":
-        written = _card(answer, run, options, output)
-        finish(ctx, objection=not written, exit_zero=exit_zero)
-        return
+        return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
     texts = {
         "table": lambda: report.as_table(answer, limit),
         "markdown": lambda: report.as_markdown(answer, limit),
@@ -93,7 +91,7 @@ def command(
         "value": lambda: report.as_value(answer),
     }
     output.result(texts[output_format]())
-    finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
+    return finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
 
 
 def _only_in_environment(ctx: click.Context, option: str, *, overruled_by: str) -> bool:
@@ -128,8 +126,8 @@ def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
     from d2rpick.report.page import Record
     from d2rpick.report.suggestion_page import as_page, drawn
 
-    wish = card_wish(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), wish))
+    request = card_request(run, options, answer.situation.history)
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), request))
 
 
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:
@@ -141,10 +139,12 @@ def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output)
     if pair is None:
         output.content(b"")
         return False
-    wish = card_wish(run, options, situation.history)
-    found = judged_card([(pair.tr, pair.td)], situation.history, lambda tr, td: verify_at(situation.at(td), tr), wish)
+    request = card_request(run, options, situation.history)
+    found = judged_card(
+        [(pair.tr, pair.td)], situation.history, lambda tr, td: verify_at(situation.at(td), tr), request
+    )
     if found is None:
-        raise click.UsageError(need_ids(wish, situation.history))
+        raise click.UsageError(need_ids(request, situation.history))
     card, (verdict,) = found
     said = set(answer.cautions)
     output.notes(card.notes, [caution for caution in all_cautions(verdict) if caution not in said])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.card_options import card_options, card_wish, energy_of, prints_card
+from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
@@ -90,8 +90,8 @@ def _page(answer: Verdict, run: Run, switched: Run | None, options: dict[str, An
     from d2rpick.report.page import Record
     from d2rpick.report.verdict_page import as_page, drawn
 
-    wish = card_wish(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), wish, switched))
+    request = card_request(run, options, answer.situation.history)
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), request, switched))
 
 
 def _switched(options: dict[str, Any]) -> Run | None:

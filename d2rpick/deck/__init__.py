@@ -1,4 +1,4 @@
-"""LS-DYNA keyword decks: cards with file, line and column; includes, parameters, switching windows."""
+"""Decks: cards with file, line and column; includes, parameters, switching windows; `radioss` has its own files."""
 
 from d2rpick.deck.parts import Parts, read_parts
 from d2rpick.deck.reader import Deck, read_deck

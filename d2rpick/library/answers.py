@@ -73,10 +73,10 @@ class Answer:
         raise NotImplementedError
 
     def _record(self, figures: dict[str, tuple[str, str]]) -> Record:
-        from d2rpick.choice.judged_card import CardWish
+        from d2rpick.choice.judged_card import CardRequest
         from d2rpick.report.page import Record
 
-        return Record(self.run.files, ("d2rpick", *self.command), (), figures, CardWish())
+        return Record(self.run.files, ("d2rpick", *self.command), (), figures, CardRequest())
 
 
 @dataclass(frozen=True, eq=False)

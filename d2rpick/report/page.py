@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.health import Health
-    from d2rpick.choice.judged_card import CardWish
+    from d2rpick.choice.judged_card import CardRequest
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
@@ -33,14 +33,14 @@ class Record:
 
     ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the
     options of ``card`` that judge by the same history.  ``figures`` are SVG elements by caption, for a wide and for a
-    narrow page, with ids of their own.  ``wish`` says how the card is printed.
+    narrow page, with ids of their own.  ``request`` says how the card is printed.
     """
 
     run: Run
     command: Sequence[str]
     judging: Sequence[str]
     figures: Mapping[str, tuple[str, str]]
-    wish: CardWish
+    request: CardRequest
     switched: Run | None = None
 
 
@@ -93,12 +93,12 @@ def solver_input(situation: Situation, times: tuple[float, float], record: Recor
     """Give the solver's card where it is known whom it switches, else the command that prints it."""
     history, title = situation.history, "For the solver's input"
     try:
-        found = judged_card([times], history, lambda tr, td: verify_at(situation.at(td), tr), record.wish)
+        found = judged_card([times], history, lambda tr, td: verify_at(situation.at(td), tr), record.request)
     except D2RPickError as error:
         return section(title, tag("p", f"There is no card for these times: {error}"))
     if found:
         return section(title, tag("pre", found[0].text))
-    solver, _ = record.wish.of(history)
+    solver, _ = record.request.of(history)
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += [] if solver == DEFAULT else ["--solver", solver]
     line = tag("pre", shlex.join([*command, f"--{SOLVERS[solver].SWITCHES}", "IDS", *record.judging]), class_="wrap")

@@ -116,21 +116,7 @@ def check_deck(
     configuration = configuration or Configuration()
     configuration.verify(RULES)
     case = _read(path, content, judge)
-    findings = [
-        Finding(
-            rule.id,
-            Severity(configuration.severity.get(rule.id, weight[0] if weight else rule.severity)),
-            message,
-            path,
-            place.file,
-            place.line,
-            place.column,
-        )
-        for rule in RULES.values()
-        if configuration.selects(rule.id) and case.solver in rule.solvers
-        for place, message, *weight in rule.check(case)
-        if not case.deck.silences(rule.id, place.file, place.line)
-    ]
+    findings = list(_findings(case, configuration))
     order = {path: 0}  # the deck itself first, its includes as they come
     for finding in findings:
         order.setdefault(finding.file, len(order))
@@ -138,6 +124,18 @@ def check_deck(
     return Checked(
         path, case.windows.windows, tuple(findings), len(case.sets), tuple(case.deck.files), tuple(_remarks(case.deck))
     )
+
+
+def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
+    """Apply the rules that count to what they look at; what a comment silences is left out."""
+    for rule in RULES.values():
+        if not configuration.selects(rule.id) or case.solver not in rule.solvers:
+            continue
+        for place, message, *weight in rule.check(case):
+            if case.deck.silences(rule.id, place.file, place.line):
+                continue
+            severity = Severity(configuration.severity.get(rule.id, weight[0] if weight else rule.severity))
+            yield Finding(rule.id, severity, message, case.deck.path, place.file, place.line, place.column)
 
 
 def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:

@@ -89,12 +89,13 @@ class RunCase(Case):
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
-        """Parts of bricks without a co-rotating frame."""
+        """Parts of elements without a co-rotating frame."""
         starter = self.run.starter
         if starter is None:
             return {}
-        what = "Isolid 1 or 2 without Iframe 2"
-        return {part: what for part, line in starter.parts.items() if line.prop in starter.unturned}
+        bricks = {part for part, line in starter.parts.items() if line.prop in starter.unturned}
+        found = dict.fromkeys(bricks, "Isolid 1 or 2 without Iframe 2")
+        return found | dict.fromkeys(starter.unturned_parts, "tetrahedra, 20-node bricks or 16-node shells")
 
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[Window]]]:

@@ -11,16 +11,21 @@ from d2rpick.rules.run_case import RunCase
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from d2rpick.deck.radioss.engine import Leg
     from d2rpick.rules.base import Case, Objection
 
 _MOST_CAP = 0.01  # of the rigid window: the release comes up to a step late
 _MOST_LISTED = 8
 
 
+def _switching_legs(case: Case) -> list[Leg]:
+    """Legs of a run in which one switches a body; none of any other, whose legs are nobody's business here."""
+    legs = case.run.legs if isinstance(case, RunCase) else []
+    return legs if any(leg.switched for leg in legs) else []
+
+
 def _order(case: Case) -> Iterator[Objection]:
-    if not isinstance(case, RunCase):
-        return
-    legs = case.run.legs
+    legs = _switching_legs(case)
     for expected, leg in enumerate(legs, start=1):
         if leg.number != expected:
             yield leg.run.here, f"leg {leg.number} of the run, leg {expected} was expected; name or write the others"
@@ -30,12 +35,12 @@ def _order(case: Case) -> Iterator[Objection]:
             place = before.stop.field
             found = f"leg {leg.number} ends at {leg.stop.value:g}, before leg {before.number} at {before.stop.value:g}"
             yield leg.stop.field, f"{found} ({place.file}:{place.line}); the end of each leg must follow the one before"
-        if leg.name != before.name:
+        if leg.name.casefold() != before.name.casefold():
             yield leg.run.here, f"leg {leg.number} belongs to run {leg.name!r}, the one before to {before.name!r}"
 
 
 def _main_nodes(case: Case) -> Iterator[Objection]:
-    if not isinstance(case, RunCase) or case.run.starter is None or case.unread:
+    if not isinstance(case, RunCase) or case.run.starter is None or case.run.starter.moved or case.unread:
         return
     bodies = {body.node.value: body for body in case.run.starter.bodies}
     by_id = {body.id: body for body in bodies.values()}
@@ -89,9 +94,7 @@ def _deformable_left(case: RunCase, rigid: set[int]) -> bool:
 
 
 def _versions(case: Case) -> Iterator[Objection]:
-    if not isinstance(case, RunCase):
-        return
-    for before, leg in pairwise([leg for leg in case.run.legs if leg.version]):
+    for before, leg in pairwise([leg for leg in _switching_legs(case) if leg.version]):
         if leg.version != before.version:
             found = f"/VERS/{leg.version} in leg {leg.number}, /VERS/{before.version} in leg {before.number}"
             yield leg.run.here, f"{found}; fields are read by the version: give the same in all legs"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.choice import examine
-from d2rpick.choice.judged_card import CardWish, judged_card
+from d2rpick.choice.judged_card import CardRequest, judged_card
 from d2rpick.choice.of_run import Reference, read, suggest_of, verify_of
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.verify import verify_at
@@ -96,9 +96,11 @@ def test_a_record_is_examined_once_per_question(examined: Callable[[], int]) -> 
     box = suggest_of(read([T01], BOX), 0.37, PLAIN)
     examined()
     assert box.recommended is not None
-    wish = CardWish("ls-dyna")
+    request = CardRequest("ls-dyna")
     situation = box.situation
-    assert judged_card([box.recommended[:2]], situation.history, lambda tr, td: verify_at(situation.at(td), tr), wish)
+    assert judged_card(
+        [box.recommended[:2]], situation.history, lambda tr, td: verify_at(situation.at(td), tr), request
+    )
     assert examined() == 0
 
 

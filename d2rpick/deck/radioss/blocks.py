@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.source import SourceFile
 
 _INCLUDE = b"#include"
+_DIGITS = 10  # of an id
 
 
 def blocks(source: SourceFile) -> Iterator[Block]:
@@ -38,6 +39,12 @@ def keyword(block: Block) -> tuple[str, ...]:
     The name of the run in ``/RUN/name/1`` is in upper case too: `Card.block` has it as written.
     """
     return tuple(word.strip().upper() for word in block.head[1:].split("/")) if block.head.startswith("/") else ()
+
+
+def whole(text: str) -> int:
+    """Read an id of a keyword line or of 10 columns; 0 for what is none."""
+    text = text.strip()
+    return int(text) if text.isdecimal() and len(text) <= _DIGITS else 0
 
 
 def card_of(block: Block) -> Card:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from d2rpick.deck.expression import ExpressionError, number
-from d2rpick.deck.radioss.blocks import blocks, card_of, keyword
+from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
 from d2rpick.deck.rows import Field, Value
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def _leg(block: Block, words: tuple[str, ...]) -> Leg:
     stop = next(_numbers(block), None)
     missing = Value(0.0, card.here, "the end of the run is missing below /RUN")
     name = block.head.split("/")[2].strip() if len(words) > 1 else ""
-    return Leg(card, name, int(words[2]) if words[2:] and words[2].isdigit() else 0, stop or missing)
+    return Leg(card, name, whole(words[2]) if words[2:] else 0, stop or missing)
 
 
 def _take(leg: Leg, block: Block, words: tuple[str, ...]) -> None:
@@ -60,7 +60,7 @@ def _take(leg: Leg, block: Block, words: tuple[str, ...]) -> None:
         nodes = tuple(_integer(value) for value in _numbers(block))
         leg.switched.append((card_of(block), words[1] == "ON", nodes))
     elif words == ("DTIX",):
-        leg.cap = list(_numbers(block))[-1] if any(True for _ in _numbers(block)) else None
+        leg.cap = next(reversed(list(_numbers(block))), None)
     elif words and words[0] == "VERS":
         leg.version = words[1] if words[1:] else ""
 

@@ -49,14 +49,16 @@ def run_files(path: str) -> list[str]:
     together; a file of another name goes by the name of the run that it holds.
     """
     try:
+        if not Path(path).is_file():
+            return []  # a pipe gives its bytes once
         with Path(path).open("rb") as stream:
             head = stream.read(_HEAD)
+        beside = {one.name: str(Path(path).parent / one.name) for one in Path(path).parent.iterdir() if one.is_file()}
     except (OSError, ValueError):
-        return []
+        return []  # said by who reads it
     if not recognises(head):
         return []
     name = _run_name(path, head)
-    beside = {one.name: str(Path(path).parent / one.name) for one in Path(path).parent.iterdir() if one.is_file()}
     mine = sorted(key for key in beside if (match := _NUMBERED.fullmatch(key)) and match[1] == name)
     files = [beside[key] for key in mine]
     return files if any(Path(path).samefile(one) for one in files) else [path, *files]
@@ -84,9 +86,9 @@ def read_run(path: str, content: bytes | None = None) -> Run:
         source = SourceFile(name, content)
         head = source.read(0, _HEAD)
         run.deck.files.append(name)
-        if _ENGINE.search(head) and not _STARTER.search(head):
+        if _ENGINE.search(head):
             run.legs += read_legs(source)
-        else:
+        if _STARTER.search(head) or not _ENGINE.search(head):
             run.starter = run.starter or Starter()
             _read_starter(source, run, ())
     run.legs.sort(key=lambda leg: leg.number)

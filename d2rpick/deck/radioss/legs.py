@@ -67,11 +67,12 @@ def find_run_windows(run: Run) -> RunWindows:
     A body whose parts are not known is one unit, named by its main node.  Legs that are not in order have no windows.
     """
     sets = tuple(_switches(run.legs)) if in_order(run.legs) else ()
-    bodies = {body.node.value: body for body in run.starter.bodies} if run.starter else {}
+    starter = None if run.starter and run.starter.moved else run.starter
+    bodies = {body.node.value: body for body in starter.bodies} if starter else {}
     switched = {value.value for one in sets for value in _nodes(one) if value.value}
     sensors = {node for node, body in bodies.items() if body.sensor and node not in switched}
     groups = {node: bodies[node].group for node in (*switched, *sensors) if node in bodies}
-    parts = rigid_parts(run.starter, groups) if run.starter and groups else {}
+    parts = rigid_parts(starter, groups) if starter and groups else {}
     windows: list[Window] = []
     for node in sorted(switched):
         if not bodies or (node in bodies and not bodies[node].sensor):

@@ -9,7 +9,8 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.deck.radioss.blocks import blocks, card_of, keyword
+from d2rpick.deck.expression import ExpressionError, number
+from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -32,6 +33,8 @@ NODES: Final = {
     "SPRING": 2,
 }
 _UNFOLLOWED: Final = {"BRIC20", "TETRA10", "SHEL16", "SPHCEL", "XELEM"}
+WITHOUT_FRAME: Final = {"TETRA4", "TETRA10", "BRIC20", "SHEL16"}  # their stresses do not turn with a rigid body
+_SUBMODEL: Final = ""  # before the second slash of //SUBMODEL
 _GROUP_FIELD: Final = 6  # of the first line of /RBODY, in columns of 10: the mass before it takes two
 _ICOROTATIONAL: Final = 2  # Iframe
 _NOT_TURNED: Final = {1, 2}  # Isolid of bricks without a co-rotating frame
@@ -66,44 +69,52 @@ class Starter:
     subsets: dict[int, tuple[int, ...]] = field(default_factory=dict)
     groups: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
     timed: dict[int, tuple[float, float]] = field(default_factory=dict)  # sensors: active from, to
-    unturned: set[int] = field(default_factory=set)  # properties of solids without a co-rotating frame
+    unturned: set[int] = field(default_factory=set)  # properties of bricks without a co-rotating frame
+    unturned_parts: set[int] = field(default_factory=set)  # of elements that have none
+    moved: bool = False  # whether a submodel may offset its ids
     sources: list[SourceFile] = field(default_factory=list)
 
     def take(self, card: Card, words: tuple[str, ...]) -> None:
         """Keep what a card says."""
+        if words[0] == _SUBMODEL:
+            self.moved = True
+            return
+        if words[0] in WITHOUT_FRAME:
+            self.unturned_parts.add(whole(words[1]) if words[1:] else 0)
+            return
         rows = [row for row in card.rows if not row.blank]
-        number = int(words[-1]) if words[-1].isdigit() else int(words[1]) if words[1:] and words[1].isdigit() else 0
+        id_ = whole(words[_ID_AT.get(words[0], 1)]) if len(words) > _ID_AT.get(words[0], 1) else 0
         if words[0] == "BEGIN" and rows:
             self.name = rows[0].text.strip()
         elif words[0] == "RBODY" and len(rows) > 1:
             first = rows[1]
             sensor, group = card.integer(first, 1).value, card.integer(first, _GROUP_FIELD).value
-            self.bodies.append(Body(number, card.integer(first, 0), sensor, group, card))
+            self.bodies.append(Body(id_, card.integer(first, 0), sensor, group, card))
         elif words[0] == "PART" and len(rows) > 1:
             prop, subset = card.integer(rows[1], 0).value, card.integer(rows[1], 2).value
-            self.parts[number] = PartLine(rows[0].text.strip(), prop, subset)
+            self.parts[id_] = PartLine(rows[0].text.strip(), prop, subset)
         elif words[0] == "SUBSET":
-            self.subsets[number] = _ids(rows[1:])
-        elif words[0] == "GRNOD":
-            self.groups[number] = words[1], _ids(rows[1:])
+            self.subsets[id_] = _ids(rows[1:])
+        elif words[0] == "GRNOD" and words[1:]:
+            self.groups[id_] = words[1], _ids(rows[1:])
         elif words[:2] == ("SENSOR", "TIME") and len(rows) > 1:
-            stop = card.real(rows[1], 2)
-            self.timed[number] = _first_number(rows[1]), stop.value if stop.value > 0 else math.inf
+            start, stop = (_real(rows[1].text[at : at + 2 * _WIDTH]) for at in (0, 2 * _WIDTH))
+            self.timed[id_] = start, stop if stop > 0 else math.inf
         elif words[:2] in {("PROP", "SOLID"), ("PROP", "TYPE14")} and len(rows) > 1:
             isolid, iframe = card.integer(rows[1], 0).value, card.integer(rows[1], 7).value
             if isolid in _NOT_TURNED and iframe != _ICOROTATIONAL:
-                self.unturned.add(number)
+                self.unturned.add(id_)
 
     def elements(self) -> Iterator[tuple[int, frozenset[int]]]:
         """Part and nodes of every element; no nodes for one whose lines are not followed."""
         for source in self.sources:
             for block in blocks(source):
                 words = keyword(block)
-                if words[1:] and words[0] in NODES and words[1].isdigit():
-                    for _, line in block.lines():
-                        yield int(words[1]), _nodes(line, NODES[words[0]])
-                elif words[1:] and words[0] in _UNFOLLOWED and words[1].isdigit():
-                    yield int(words[1]), frozenset()
+                if words[1:] and words[0] in NODES:
+                    part = whole(words[1])
+                    yield from ((part, _nodes(line, NODES[words[0]])) for _, line in block.lines() if line.strip())
+                elif words[1:] and words[0] in _UNFOLLOWED:
+                    yield whole(words[1]), frozenset()
 
     def parts_in(self, subset: int) -> set[int]:
         """Parts of a subset and of those below it."""
@@ -138,7 +149,8 @@ class Starter:
         return nodes, parts
 
 
-KEPT: Final = {"BEGIN", "RBODY", "PART", "SUBSET", "GRNOD", "SENSOR", "PROP"}
+_ID_AT: Final = {"GRNOD": 2, "SENSOR": 2, "PROP": 2}  # where a keyword has its id; others behind their name
+KEPT: Final = {*WITHOUT_FRAME, _SUBMODEL, "BEGIN", "RBODY", "PART", "SUBSET", "GRNOD", "SENSOR", "PROP"}
 
 
 def card_or_none(source: SourceFile) -> Iterator[tuple[Card, tuple[str, ...]]]:
@@ -181,17 +193,18 @@ def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[in
 
 def _nodes(line: str, count: int) -> frozenset[int]:
     cells = (line[start : start + _WIDTH].strip() for start in range(_WIDTH, _WIDTH * (count + 1), _WIDTH))
-    return frozenset(int(cell) for cell in cells if cell.isdigit())
+    return frozenset(node for cell in cells if (node := whole(cell)))
 
 
 def _ids(rows: Iterable[Row]) -> tuple[int, ...]:
     """Ids on lines of 10 columns; a word ends what can be followed and counts as -1."""
     cells = [row.text[start : start + _WIDTH].strip() for row in rows for start in range(0, len(row.text), _WIDTH)]
-    return tuple(int(cell) if cell.isdigit() else -1 for cell in cells if cell)
+    return tuple(whole(cell) or -1 for cell in cells if cell)
 
 
-def _first_number(row: Row) -> float:
+def _real(text: str) -> float:
+    """Read a number; a blank is 0, and what is none is not known."""
     try:
-        return float(row.text.split()[0])
-    except ValueError:
+        return float(number(text)) if text.strip() else 0.0
+    except ExpressionError:
         return math.nan

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.cli import card_options
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
 from d2rpick.deck.printing.common import LONGEST, Printing, check_windows, read_windows, shortest
 from d2rpick.errors import DeckError
 from d2rpick.histories.opening import READERS
+from tests.command import run
 
 TIMES = st.floats(1e-9, 1e9)
 ALL = Printing(part=(11,), node=(1001,), end=1e6)
@@ -80,7 +80,10 @@ def test_the_solver_is_that_of_the_history() -> None:
 
 
 def test_the_command_line_offers_the_solvers_there_are() -> None:
-    assert tuple(SOLVERS) == card_options.SOLVERS
+    assert f"[{'|'.join(SOLVERS)}]" in run("card", "--help").stdout
+    refused = run("card", "--solver", "abaqus", "--tr", "1", "--td", "2", "--part", "1")
+    assert refused.exit_code == 2
+    assert f"'abaqus' was found, one of {', '.join(SOLVERS)} was expected" in refused.stderr
 
 
 def test_a_file_of_windows() -> None:

@@ -1,0 +1,52 @@
+"""Cards judged as they are printed: for which solver, whom they switch, and what their comments say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import pytest
+
+from d2rpick.choice.judged_card import CardRequest, judged_card
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.verify import verify
+from d2rpick.deck.printing.common import Printing
+from tests.command import ENERGY, GLSTAT
+from tests.reading import read_history
+
+PAIR = (0.0135867, 0.0687534)
+HISTORY = read_history([ENERGY])
+JUDGE = partial(verify, HISTORY, settings=Settings())
+
+
+@pytest.mark.parametrize(
+    ("written", "solver", "expected"),
+    [("csv", None, "ls-dyna"), ("radioss-th", None, "radioss"), ("radioss-th", "ls-dyna", "ls-dyna")],
+)
+def test_the_solver_is_that_of_the_history_unless_asked_for(written: str, solver: str | None, expected: str) -> None:
+    request = CardRequest(solver, Printing(part=(1,)))
+    assert request.of(replace(HISTORY, format=written))[0] == expected
+
+
+def test_the_run_ends_with_the_history_unless_told() -> None:
+    assert CardRequest().of(HISTORY)[1].end == HISTORY.time[-1]
+    assert CardRequest(printing=Printing(end=7.0)).of(HISTORY)[1].end == 7.0
+
+
+def test_without_anybody_to_switch_there_is_no_card() -> None:
+    assert judged_card([PAIR], HISTORY, JUDGE, CardRequest()) is None
+    assert judged_card([PAIR], HISTORY, JUDGE, CardRequest("radioss", Printing(part=(1,)))) is None
+
+
+def test_each_window_has_its_verdict_in_the_comments() -> None:
+    windows = [PAIR, (0.0939, 0.119)]
+    history = read_history([GLSTAT])
+    judge = partial(verify, history, settings=Settings())
+    found = judged_card(windows, history, judge, CardRequest(printing=Printing(part=(1,))))
+    assert found is not None
+    card, verdicts = found
+    assert card.windows == tuple(windows)
+    assert [verdict.verified for verdict in verdicts] == [True, False]
+    lines = " ".join(line.removeprefix("$ ").strip() for line in card.text.splitlines())
+    assert "0.0135867 to 0.0687534 verified." in lines
+    assert "0.0939 to 0.119 NOT verified" in lines
