@@ -48,7 +48,7 @@ def balance_of(run: Run, parts: Sequence[Part] | None, until: float = np.inf) ->
     """
     whole = next((database for database in run.databases if database.channels), None)
     of_parts = _hourglass_of(run, parts, until) if parts else ()
-    judged = whole is not None and not _JUDGED.isdisjoint(map(normalised, whole.channels))
+    judged = whole is not None and not _JUDGED.isdisjoint(map(normalised, (*whole.channels, *whole.quantities)))
     if not (judged or of_parts):
         return None
     from d2rpick.histories.energy_balance import Balance  # not above: plain tables do without it
@@ -83,6 +83,7 @@ class _Columns:
         self._database = database
         self.states = states
         self._names = {normalised(name): name for name in reversed(database.channels)}
+        self._names |= {normalised(quantity): name for quantity, name in database.quantities.items()}
         self.used: list[str] = []
 
     def first(self, *names: str) -> Samples | None:

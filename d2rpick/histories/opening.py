@@ -87,9 +87,14 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
     databases = tuple(
-        Legs(reader(kind).open_legs(kinds[kind], selection), cut=[one.name for one in kinds[kind] if one.cut])
+        Legs(
+            reader(kind).open_legs(kinds[kind], selection),
+            cut=[one.name for one in kinds[kind] if one.cut],
+            named=selection.channels,
+        )
         for kind in ordered
     )
+    _refuse_unknown_channels(databases, selection)
     check_companions(databases)
     return Run(files, databases)
 
@@ -97,6 +102,13 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
 def read_history(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> History:
     """Read one energy history; arguments and errors as of ``open_run``."""
     return open_run(names, selection, input_format).history(selection)
+
+
+def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
+    """FormatError, with what there is, where a channel that is named for a quantity is in none of the databases."""
+    for quantity, name in selection.channels:
+        if not any(quantity in database.quantities for database in databases):
+            databases[0].find(name)
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:

@@ -25,7 +25,10 @@ if TYPE_CHECKING:
 
 SMALL = ("--mesh", "4", "--dt", "2e-4")
 SHORT = (*SMALL, "--t-end", "0.12")
-COLUMNS = "time,x,z,roll,vx,vz,omega,internal_energy,kinetic_energy,momentum_x,momentum_z"
+COLUMNS = (
+    "time,x,z,roll,vx,vz,omega,internal_energy,kinetic_energy,momentum_x,momentum_z,"
+    "momentum_y,contact_energy,external_work,damping_energy,total_energy"
+)
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.h5", "run.glstat", "run.matsum"])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from d2rpick.histories.formats import csv_table, glstat, hdf5_file, matsum
 from d2rpick.models.rollover.record import PARTS
 
@@ -11,27 +13,30 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from d2rpick.histories.writing import Table
+    from d2rpick.models.rollover.model import Values
     from d2rpick.models.rollover.record import Record
 
 _TITLE: Final = "rollover box"
 
 
 def table(record: Record) -> Table:
-    """Columns of the box, time to kinetic_energy, and the momentum of box and step together."""
+    """Columns of the box, time to kinetic_energy; of box and step together: momentum, and what energy was spent."""
     energies = record.internal_energy.T, record.kinetic_energy.T
     flying = record.momentum.sum(axis=1)
     return {
         "time": record.time, "x": record.centre.real, "z": record.centre.imag, "roll": record.roll,
         "vx": record.velocity.real, "vz": record.velocity.imag, "omega": record.omega,
         "internal_energy": energies[0][0], "kinetic_energy": energies[1][0],
-        "momentum_x": flying.real, "momentum_z": flying.imag,
+        "momentum_x": flying.real, "momentum_z": flying.imag, "momentum_y": 0 * record.time,
+        "contact_energy": record.contact_energy, "external_work": record.external_work,
+        "damping_energy": record.damping_energy, "total_energy": _total(record),
     }  # fmt: skip
 
 
 def as_glstat(record: Record) -> bytes:
     """Energies of box and step together, what was exchanged with sled, curb and ground, and the mean velocity."""
     internal, kinetic = record.internal_energy.sum(axis=1), record.kinetic_energy.sum(axis=1)
-    total = kinetic + internal + record.contact_energy + record.damping_energy
+    total = _total(record)
     momentum, zero = record.momentum.sum(axis=1), 0 * record.time
     speed = momentum / (momentum[0].real / record.velocity[0].real)
     return glstat.write(
@@ -44,6 +49,12 @@ def as_glstat(record: Record) -> bytes:
             "global x velocity": speed.real, "global y velocity": zero, "global z velocity": speed.imag,
         },
     )  # fmt: skip
+
+
+def _total(record: Record) -> Values:
+    """Energy of box and step together, that in contact and damping included [J]."""
+    there = record.internal_energy.sum(axis=1) + record.kinetic_energy.sum(axis=1)
+    return np.asarray(there + record.contact_energy + record.damping_energy)
 
 
 def as_matsum(record: Record) -> bytes:
