@@ -106,7 +106,7 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("box")
     files = {suffix: str(folder / f"box.{suffix}") for suffix in BOX}
     for file in files.values():
-        assert run("rollover", "--mesh", "4", "-o", file).exit_code == 0
+        assert run("rollover", "--mesh", "4", "--dt", "5e-4", "-o", file).exit_code == 0
     return files
 
 
@@ -120,16 +120,16 @@ def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
     found = answer("suggest", "--td", "0.37", file)
     expected = answer("suggest", "--td", "0.37", *BOX[source], box[source])
     for name in ("start", "end"):
-        assert found["flight"][name] == pytest.approx(expected["flight"][name], abs=1.01e-4)  # one state
+        assert found["flight"][name] == pytest.approx(expected["flight"][name], abs=5.1e-4)  # one state
     assert found["flight"]["source"] == expected["flight"]["source"]
-    assert found["recommended"]["tr"] == pytest.approx(expected["recommended"]["tr"], abs=1e-6)
+    assert found["recommended"]["tr"] == pytest.approx(expected["recommended"]["tr"], rel=1e-5)
 
 
 def test_the_box_has_one_flight_in_every_format_that_tells_its_momentum(box: dict[str, str]) -> None:
     answers = [answer("suggest", "--td", "0.37", *BOX[form], box[form]) for form in ("csv", "h5", "matsum")]
     assert {one["flight"]["source"] for one in answers} == {"momentum"}
     for name in ("start", "end"):
-        assert np.ptp([one["flight"][name] for one in answers]) < 1.01e-4
+        assert np.ptp([one["flight"][name] for one in answers]) < 5.1e-4
     assert np.ptp([one["recommended"]["tr"] for one in answers]) < 1e-6
 
 
