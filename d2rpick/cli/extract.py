@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
 from d2rpick.cli.progress import reading
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import History, Samples
 
 EXAMPLES = """\b
 Examples:
@@ -28,7 +31,9 @@ Examples:
 def command(write_as: str | None, **options: Any) -> None:
     """Write the chosen energy of HISTORY as columns time and internal_energy.
 
-    With more than one part a column part_<id> for each follows.
+    With more than one part a column part_<id> for each follows, then what else is known at these times of the whole
+    model: kinetic energy, total energy, external work, contact energy, momentum, ... Where the files have the momenta
+    of parts, those that fly together with the chosen ones count.
     """
     from d2rpick.histories.writing import TABLE_WRITERS, format_of
 
@@ -41,5 +46,26 @@ def command(write_as: str | None, **options: Any) -> None:
         if history.parts and len(history.parts) > 1:
             energies = run.part_energies(history.parts)
             table |= {f"part_{part.id}": column for part, column in zip(history.parts, energies.T, strict=True)}
+        table |= run.quantities(history.time) | _momentum(history)
     output.notes(history.notes, ())
     output.content(TABLE_WRITERS[form](table))
+
+
+def _momentum(history: History) -> dict[str, Samples]:
+    """Columns of the momentum by which the flight is seen: of the parts that fly together longest, or the chosen ones.
+
+    Nothing where it is not written, or at other times than the energy.
+    """
+    import numpy as np
+
+    from d2rpick.flight.momentum import all_flights, to_be_asked
+
+    asked = [one for one in to_be_asked(history.momenta) if np.array_equal(one.time, history.time)]
+    if not asked:
+        return {}
+    momenta = next((one for one in asked if all_flights(one)), asked[0])
+    flights, members = all_flights(momenta), momenta.chosen
+    if flights and momenta.parts:
+        longest = max(flights, key=lambda flight: flight.end - flight.start)
+        members = tuple(momenta.parts.index(part) for part in longest.parts or momenta.parts)
+    return dict(zip(("x_momentum", "y_momentum", "z_momentum"), momenta.of(members).T.copy(), strict=True))

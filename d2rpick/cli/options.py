@@ -110,11 +110,15 @@ _ENERGY = click.option(
     "--energy", metavar="NAME|NUMBER", multiple=True, type=NAMES,
     help="Energy column, label or HDF5 path; given several times, their sum.",
 )  # fmt: skip
+_CHANNEL = click.option(
+    "--channel", metavar="QUANTITY=NAME", multiple=True, type=NAMES,
+    help="Channel of another quantity, where its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
+)  # fmt: skip
 _FLYING = click.option("--flying", metavar="IDS", multiple=True, type=NAMES, help="Parts that fly together with them.")
 
 
 # What of them says how to read a history and how to judge by it.
-_JUDGING = ("input_format", "time", "energy", "flying", "after", "margin", "tolerance")
+_JUDGING = ("input_format", "time", "energy", "flying", "channel", "after", "margin", "tolerance")
 
 
 def history_options(function: Decorated) -> Decorated:
@@ -131,7 +135,7 @@ def reading_options(function: Decorated) -> Decorated:
             "--part", metavar="IDS", multiple=True, type=NAMES,
             help="Parts to be switched, by number (3,7), range (10-19) or title; their energies are added.",
         ),
-        _FLYING,
+        _FLYING, _CHANNEL,
     )(function)  # fmt: skip
 
 
@@ -142,7 +146,7 @@ def reference_options(function: Decorated) -> Decorated:
             "--history", metavar="HISTORY", multiple=True, type=FILE,
             help="Energy history of the run without switching, to judge by: file, folder or glob; repeatable.",
         ),
-        _FORMAT, _TIME, _ENERGY, _FLYING, _AFTER, _MARGIN, _TOLERANCE,
+        _FORMAT, _TIME, _ENERGY, _FLYING, _CHANNEL, _AFTER, _MARGIN, _TOLERANCE,
     )(function)  # fmt: skip
 
 
@@ -233,7 +237,24 @@ def selection(options: dict[str, Any]) -> Selection:
     parts = options.get("part", ())
     if options["energy"] and parts:
         raise click.UsageError("--energy and --part exclude each other: columns or parts")
-    return Selection(options["time"], options["energy"], parts, options["flying"])
+    return Selection(options["time"], options["energy"], parts, options["flying"], _channels(options["channel"]))
+
+
+def _channels(given: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """Read ``QUANTITY=NAME``; UsageError for a quantity that is none, or one that is given twice."""
+    from d2rpick.histories.names import QUANTITIES
+
+    pairs = [
+        (quantity.strip().replace("-", "_"), name) for quantity, _, name in (text.partition("=") for text in given)
+    ]
+    for quantity, name in pairs:
+        if quantity not in QUANTITIES or not name:
+            raise click.UsageError(
+                f"--channel {quantity}={name}: QUANTITY=NAME was expected, with one of {', '.join(QUANTITIES)}"
+            )
+    if len({quantity for quantity, _ in pairs}) < len(pairs):
+        raise click.UsageError("--channel names a quantity twice; name each once")
+    return tuple(pairs)
 
 
 def open_run(options: dict[str, Any]) -> Run:

@@ -58,7 +58,7 @@ def balance_of(run: Files, parts: Sequence[Part] | None, until: float = np.inf) 
     """
     whole = _whole(run)
     of_parts = _hourglass_of(run, parts, until) if parts else ()
-    judged = whole is not None and not _JUDGED.isdisjoint(map(normalised, whole.channels))
+    judged = whole is not None and not _JUDGED.isdisjoint(map(normalised, (*whole.channels, *whole.quantities)))
     if not (judged or of_parts):
         return None
     from d2rpick.histories.energy_balance import Balance  # not above: plain tables do without it
@@ -88,7 +88,8 @@ class Velocity(NamedTuple):
 
 def velocity_of(database: Legs) -> Velocity | None:
     """Read the velocity or momentum of the whole model; None where it is not written."""
-    if not any({normalised(name) for name in database.channels} & {*axes} for axes in _VELOCITIES):
+    known = {normalised(name) for name in (*database.channels, *database.quantities)}
+    if not any(known & {*axes} for axes in _VELOCITIES):
         return None
     try:
         columns = _Columns(database, database.time.size)
@@ -133,6 +134,7 @@ class _Columns:
         self._database = database
         self.states = states
         self._names = {normalised(name): name for name in reversed(database.channels)}
+        self._names |= {normalised(quantity): name for quantity, name in database.quantities.items()}
         self.used: list[str] = []
 
     def first(self, *names: str) -> Samples | None:

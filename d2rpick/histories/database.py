@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import suppress
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Protocol
 
@@ -10,10 +11,10 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.history import Precision, newest_states
-from d2rpick.histories.names import listing, resolve
+from d2rpick.histories.names import listing, quantity_of, resolve
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -102,8 +103,11 @@ class Legs:
     state count only where all are so.
     """
 
-    def __init__(self, legs: Sequence[Database], cut: Sequence[str] = ()) -> None:
+    def __init__(
+        self, legs: Sequence[Database], cut: Sequence[str] = (), named: Sequence[tuple[str, str]] = ()
+    ) -> None:
         self._cut = tuple(cut)  # files whose packed data ends early
+        self._named = tuple(named)  # quantities whose channels have unusual names
         several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
         self._files = sorted(legs, key=_start) if several else [*legs]
         self._legs = [leg for leg in self._files if not several or _start(leg) > -np.inf] or self._files
@@ -148,6 +152,24 @@ class Legs:
         """Columns that all legs have."""
         others = [{*leg.channels} for leg in self._legs[1:]]
         return tuple(name for name in self._legs[0].channels if all(name in names for names in others))
+
+    @cached_property
+    def quantities(self) -> Mapping[str, str]:
+        """Channels that hold the quantities of `d2rpick.histories.names.QUANTITIES`, as far as their names tell.
+
+        Where several have names of one quantity none of them is taken, unless one is named like the quantity itself.
+        """
+        found: dict[str, list[str]] = {}
+        for name in self.channels:
+            if quantity := quantity_of(name):
+                found.setdefault(quantity, []).append(name)
+        sure = {quantity: names[0] for quantity, names in found.items() if len(names) == 1}
+        own = {quantity: quantity for quantity, names in found.items() if quantity in names}
+        told = {}
+        for quantity, name in self._named:
+            with suppress(FormatError):  # another database of the run has it, or `open_run` objects
+                told[quantity] = self.find(name)
+        return sure | own | told
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:

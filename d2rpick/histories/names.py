@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import FormatError, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
 TIME_UNITS = frozenset({"s", "sec", "second", "seconds", "ms", "msec", "us", "µs", "μs", "ns", "min", "h"})
 _ENERGY_UNITS = frozenset(
@@ -40,6 +40,28 @@ _INTERNAL_NAMES = frozenset(
      "innereenergie", "innereenergy", "energieinterne", "énergieinterne", "energiainterna", "energíainterna",
      "内部エネルギー", "内能", "내부에너지"}
 )  # fmt: skip
+
+# What else a history of the whole model may tell, and what it is called: LS-DYNA's glstat and binout, Radioss and its
+# th_to_csv, Abaqus, frames of lasso-python, d2rpick.  Energies [energy], momentum and velocity of the centre of mass
+# along an axis [momentum], [velocity], and the mass of what moves [mass].  Names are normalised and taken whole.
+QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
+    "kinetic_energy": frozenset({"kineticenergy", "kinetic", "ke", "allke", "kinen", "ekin", "ketotal"}),
+    "total_energy": frozenset({"totalenergy", "etotal", "etot"}),
+    "external_work": frozenset({"externalwork", "extwork", "allwk", "wext", "externalforcework"}),
+    "contact_energy": frozenset(
+        {"contactenergy", "slidinginterfaceenergy", "slidingenergy", "slidinginterface", "sliding", "contacte"}
+    ),
+    "hourglass_energy": frozenset({"hourglassenergy", "hourglasse", "hourglass", "hgeng", "allae"}),
+    "damping_energy": frozenset({"dampingenergy", "systemdampingenergy", "systemdamping"}),
+    "eroded_internal_energy": frozenset({"erodedinternalenergy", "erodedinternal"}),
+    "x_momentum": frozenset({"xmomentum", "momentumx", "xmom", "px"}),
+    "y_momentum": frozenset({"ymomentum", "momentumy", "ymom", "py"}),
+    "z_momentum": frozenset({"zmomentum", "momentumz", "zmom", "pz"}),
+    "x_velocity": frozenset({"globalxvelocity", "xvelocity", "xrigidbodyvelocity"}),
+    "y_velocity": frozenset({"globalyvelocity", "yvelocity", "yrigidbodyvelocity"}),
+    "z_velocity": frozenset({"globalzvelocity", "zvelocity", "zrigidbodyvelocity"}),
+    "mass": frozenset({"mass", "totalmass"}),
+}
 
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]\s*$")
 _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
@@ -104,6 +126,18 @@ def internal_energies(names: Sequence[str]) -> list[int]:
     """Places of the names that say internal energy without addition or, where there are none, that speak of one."""
     plain = [place for place, name in enumerate(names) if is_internal_energy(name)]
     return plain or [place for place, name in enumerate(names) if is_some_internal_energy(name)]
+
+
+def quantity_of(name: str) -> str | None:
+    """Which of `QUANTITIES` a channel of this name is; of a path its last step counts.
+
+    Examples
+    --------
+    >>> [quantity_of(name) for name in ("KINETIC ENERGY", "glstat/global_x_velocity", "momentum_z [N s]", "boxKE_J")]
+    ['kinetic_energy', 'x_velocity', 'z_momentum', None]
+    """
+    spellings = {normalised(name), normalised(name.rpartition("/")[2])}
+    return next((quantity for quantity, names in QUANTITIES.items() if not names.isdisjoint(spellings)), None)
 
 
 def is_unit(cell: str) -> bool:

@@ -95,9 +95,20 @@ def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, inp
     opened = {kind: reader(kind).open_legs(kinds[kind], selection) for kind in ordered}
     for legs in opened.values():
         check_legs(legs)
-    databases = tuple(Legs(opened[kind], cut=[one.name for one in kinds[kind] if one.cut]) for kind in ordered)
+    databases = tuple(
+        Legs(opened[kind], cut=[one.name for one in kinds[kind] if one.cut], named=selection.channels)
+        for kind in ordered
+    )
+    _refuse_unknown_channels(databases, selection)
     check_companions(databases)
     return Run(tuple(source.name for source in sources), databases, tuple(sources))
+
+
+def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
+    """FormatError, with what there is, where a channel that is named for a quantity is in none of the databases."""
+    for quantity, name in selection.channels:
+        if not any(quantity in database.quantities for database in databases):
+            databases[0].find(name)
 
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ import numpy as np
 from d2rpick.errors import FormatError
 from d2rpick.histories.companions import doubts
 from d2rpick.histories.history import History, Momenta, Track
-from d2rpick.histories.names import listing, quantity_note
+from d2rpick.histories.names import QUANTITIES, listing, quantity_note
 from d2rpick.histories.selection import menu, select_parts
 
 if TYPE_CHECKING:
@@ -109,6 +110,18 @@ class Run:
     def part_energies(self, parts: Sequence[Part]) -> Samples:
         """Internal energies of some parts, shape (n, parts), at the times of their history [energy]."""
         return self._of_holder("internal_energy", parts)
+
+    def quantities(self, time: Samples) -> dict[str, Samples]:
+        """Give the quantities of the whole model, by their names in `QUANTITIES`, that are written at ``time`` (n,)."""
+        found: dict[str, Samples] = {}
+        for database in self.databases:
+            if not database.channels or not np.array_equal(database.time, time):
+                continue
+            for quantity in QUANTITIES:
+                if quantity in database.quantities and quantity not in found:
+                    with suppress(FormatError):  # not in every state
+                        found[quantity] = database.channel(database.quantities[quantity])
+        return found
 
     def centre(self, parts: Sequence[Part]) -> Track | None:
         """Give the mean of the centres of some parts [length]; None where they are not written."""

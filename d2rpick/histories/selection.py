@@ -21,13 +21,16 @@ class Selection(NamedTuple):
     """Columns or labels by name, columns also by 1-based number; parts by number, range or title.
 
     Nothing asked: the time and the internal energy of the whole model.  Several energies, and the energies of
-    several parts, are added.  ``flying`` are the parts that are known to fly together with these.
+    several parts, are added.  ``flying`` are the parts that are known to fly together with these.  ``channels`` are
+    pairs of a quantity (a key of `d2rpick.histories.names.QUANTITIES`) and the name of the channel that holds it, where
+    this is not one of the usual names.
     """
 
     time: str | None = None
     energy: tuple[str, ...] = ()
     parts: tuple[str, ...] = ()
     flying: tuple[str, ...] = ()
+    channels: tuple[tuple[str, str], ...] = ()
 
 
 def select_parts(wanted: Sequence[str], known: Sequence[Part], where: str) -> tuple[Part, ...]:

@@ -79,8 +79,8 @@ def test_several_parts_have_a_column_each_beside_their_sum(tmp_path: Path) -> No
     source, file = str(shared("openradioss/rollover_referenceT01.gz")), tmp_path / "parts.h5"
     text = run("extract", "--part", "box,step", source).stdout
     head, *rows = csv.reader(io.StringIO(text))
-    assert head == ["time", "internal_energy", "part_1", "part_2"]
-    table = np.array(rows, dtype=float)
+    assert head[:4] == ["time", "internal_energy", "part_1", "part_2"]
+    table = np.array(rows, dtype=float)[:, :4]
     np.testing.assert_array_equal(table[:, 1], table[:, 2] + table[:, 3])
     expected = open_run([source])
     np.testing.assert_array_equal(table[:, 2:], expected.part_energies(expected.parts[:2]))
@@ -92,14 +92,95 @@ def test_several_parts_have_a_column_each_beside_their_sum(tmp_path: Path) -> No
 
 def test_one_part_needs_no_column_beside_the_energy() -> None:
     source = str(shared("openradioss/rollover_referenceT01.gz"))
-    assert run("extract", "--part", "box", source).stdout.startswith("time,internal_energy\n0.0,")
+    assert run("extract", "--part", "box", source).stdout.startswith("time,internal_energy,kinetic_energy,")
+
+
+# What a flight is seen by goes with the energy.
+
+BOX = {"csv": (), "h5": (), "glstat": (), "matsum": ("--part", "box")}
+QUANTITIES = ("kinetic_energy", "total_energy", "external_work", "contact_energy")
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The rollover box in every format."""
+    folder = tmp_path_factory.mktemp("box")
+    files = {suffix: str(folder / f"box.{suffix}") for suffix in BOX}
+    for file in files.values():
+        assert run("rollover", "--mesh", "4", "--dt", "5e-4", "-o", file).exit_code == 0
+    return files
+
+
+@pytest.mark.parametrize("suffix", ["csv", "h5"])
+@pytest.mark.parametrize("source", BOX)
+def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
+    source: str, suffix: str, box: dict[str, str], tmp_path: Path
+) -> None:
+    file = str(tmp_path / f"extracted.{suffix}")
+    assert run("extract", *BOX[source], box[source], "-o", file).exit_code == 0
+    found = answer("suggest", "--td", "0.37", file)
+    expected = answer("suggest", "--td", "0.37", *BOX[source], box[source])
+    for name in ("start", "end"):
+        assert found["flight"][name] == pytest.approx(expected["flight"][name], abs=5.1e-4)  # one state
+    assert found["flight"]["source"] == expected["flight"]["source"]
+    assert found["recommended"]["tr"] == pytest.approx(expected["recommended"]["tr"], rel=1e-5)
+
+
+def test_the_box_has_one_flight_in_every_format_that_tells_its_momentum(box: dict[str, str]) -> None:
+    answers = [answer("suggest", "--td", "0.37", *BOX[form], box[form]) for form in ("csv", "h5", "matsum")]
+    assert {one["flight"]["source"] for one in answers} == {"momentum"}
+    for name in ("start", "end"):
+        assert np.ptp([one["flight"][name] for one in answers]) < 5.1e-4
+    assert np.ptp([one["recommended"]["tr"] for one in answers]) < 1e-6
+
+
+@pytest.mark.parametrize("suffix", ["csv", "h5"])
+def test_quantities_of_the_whole_model_are_extracted_under_one_name(
+    suffix: str, box: dict[str, str], tmp_path: Path
+) -> None:
+    file = str(tmp_path / f"extracted.{suffix}")
+    assert run("extract", box["glstat"], "-o", file).exit_code == 0
+    found, expected = (open_run([name]).databases[0] for name in (file, box["glstat"]))
+    assert {*QUANTITIES, "x_velocity"} <= {*found.quantities}
+    for quantity in QUANTITIES:
+        assert found.quantities[quantity] == quantity
+        numbers = found.channel(quantity), expected.channel(expected.quantities[quantity])
+        np.testing.assert_array_equal(*numbers)
+
+
+UNUSUAL = "time,IE,E2,M1,M2,M3\n" + "".join(f"{i},{i % 3},{i},1,2,{-i}\n" for i in range(30))
+
+
+def test_a_channel_of_an_unusual_name_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "unusual.csv"
+    file.write_text(UNUSUAL)
+    named = [f"--channel={axis}_momentum=M{number}" for number, axis in enumerate("xyz", 1)]
+    text = run("extract", *named, "--channel", "kinetic-energy=3", str(file)).stdout
+    assert text.startswith("time,internal_energy,kinetic_energy,x_momentum,y_momentum,z_momentum\n0.0,0.0,0.0,1.0,2.0,")
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        (("kinetic_energy=E9",), "no column 'E9'; there are: 1 'time', 2 'IE'"),
+        (("E2",), "--channel E2=: QUANTITY=NAME was expected, with one of kinetic_energy,"),
+        (("spin=E2",), "QUANTITY=NAME was expected"),
+        (("mass=E2", "mass=M1"), "--channel names a quantity twice"),
+    ],
+)
+def test_a_channel_that_is_none_is_refused(given: tuple[str, ...], reason: str, tmp_path: Path) -> None:
+    file = tmp_path / "unusual.csv"
+    file.write_text(UNUSUAL)
+    result = run("info", *(f"--channel={one}" for one in given), str(file))
+    assert result.exit_code == 2
+    assert reason in result.stderr
 
 
 def test_without_a_file_csv_goes_to_standard_output_and_notes_do_not(tmp_path: Path) -> None:
     file = tmp_path / "matsum"
     run(*REPLAY, "-o", str(file))
     result = run("extract", str(file))
-    assert result.stdout.startswith("time,internal_energy\n0.0,0.0\n")
+    assert result.stdout.startswith("time,internal_energy,x_momentum,y_momentum,z_momentum\n0.0,0.0,")
     assert "the energies of all parts were added" in result.stderr
     assert run("extract", "-q", str(file)).stderr == ""
     hdf5 = run("extract", "--write-as", "hdf5", "-q", str(file))

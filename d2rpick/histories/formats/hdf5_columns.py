@@ -6,6 +6,7 @@ pickled attributes: these are searched as text, never unpickled.  Links into oth
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
+from d2rpick.histories.formats.hdf5_damage import check_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,7 +27,6 @@ _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
 _PICKLED_INDEX_NAME: Final = re.compile(rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE)
 _BOOKKEEPING: Final = ("_i_", "#")  # PyTables' index trees, MATLAB's references
 _WIDEST: Final = 64  # a matrix with more columns and no names for them is no table of histories
-_DENSEST: Final = 1100  # HDF5's best compression; a larger array than that is a damaged shape
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,6 @@ class Column:
     path: str
     size: int
     dtype: str
-    unit: str
     dataset: str
     field: str | None = None
     place: tuple[int, int] | None = None
@@ -84,13 +84,6 @@ def finite(values: Any, path: str, source: str) -> Samples:
     return numbers
 
 
-def check_size(dataset: h5py.Dataset, source: str) -> None:
-    """FormatError if the file is far too small for the dataset, whose shape must then be damaged."""
-    stored = dataset.id.get_storage_size()
-    if dataset.nbytes > _DENSEST * max(stored, 4096):
-        raise FormatError(f"{source}: {dataset.name} has shape {dataset.shape} but {stored} bytes; the file is damaged")
-
-
 def columns_of(file: h5py.File) -> tuple[Column, ...]:
     """All columns of numbers in ``file``, sorted by path."""
     import h5py
@@ -114,18 +107,20 @@ def columns_of(file: h5py.File) -> tuple[Column, ...]:
 
 
 def _dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
-    if dataset.shape is None or dataset.external or dataset.is_virtual:
+    import h5py
+
+    plan, shape, dtype = dataset.id.get_create_plist(), dataset.shape, dataset.dtype
+    if shape is None or plan.get_layout() == h5py.h5d.VIRTUAL or plan.get_external_count():
         return
-    if dataset.dtype.names is not None:
+    if dtype.names is not None:
         yield from _compound_columns(name, dataset, index_name="index")
         return
-    if dataset.dtype.kind not in "iuf" or not dataset.shape:
+    if dtype.kind not in "iuf" or not shape:
         return
-    unit = _text(dataset.attrs.get("units", dataset.attrs.get("unit")))
-    size = int(np.prod(dataset.shape))
-    if max(dataset.shape) == size:
-        yield Column(name, size, str(dataset.dtype), unit, name)
-    elif len(dataset.shape) == 2:
+    size = math.prod(shape)
+    if max(shape) == size:
+        yield Column(name, size, str(dtype), name)
+    elif len(shape) == 2:
         titles = _titles(dataset.attrs.get("columns", dataset.attrs.get("names")))
         yield from _matrix_columns(name, dataset, titles)
 
@@ -144,7 +139,7 @@ def _matrix_columns(name: str, dataset: h5py.Dataset, titles: list[str]) -> Iter
         if len(paths) > _WIDEST:
             return
     for index, path in enumerate(paths):
-        yield Column(path, dataset.shape[1 - axis], str(dataset.dtype), "", name, place=(axis, index))
+        yield Column(path, dataset.shape[1 - axis], str(dataset.dtype), name, place=(axis, index))
 
 
 def _compound_columns(name: str, dataset: h5py.Dataset, index_name: str) -> Iterator[Column]:
@@ -158,13 +153,13 @@ def _compound_columns(name: str, dataset: h5py.Dataset, index_name: str) -> Iter
             continue
         if not kind.shape:
             path = f"{base}/{index_name if field == 'index' else field}"
-            yield Column(path, dataset.shape[0], str(kind), "", name, field)
+            yield Column(path, dataset.shape[0], str(kind), name, field)
             continue
         titles = _pickled_names(dataset.attrs.get(f"{field}_kind"))
         named = len(titles) == kind.shape[0]
         for index in range(kind.shape[0]):
             path = f"{base}/{titles[index]}" if named else f"{base}/{field}[{index}]"
-            yield Column(path, dataset.shape[0], str(kind.base), "", name, field, (1, index))
+            yield Column(path, dataset.shape[0], str(kind.base), name, field, (1, index))
 
 
 def _pandas_table(name: str, group: h5py.Group) -> Iterator[Column]:
@@ -187,21 +182,21 @@ def _pandas_frame(name: str, group: h5py.Group) -> Iterator[Column]:
         across = values.shape[0] == index.size and (index.size != len(titles) or bool(values.attrs.get("transposed")))
         for place, title in enumerate(titles):
             where = (1 if across else 0, place)
-            yield Column(f"{name}/{title}", index.size, str(values.dtype), "", values.name[1:], place=where)
+            yield Column(f"{name}/{title}", index.size, str(values.dtype), values.name[1:], place=where)
 
 
 def _pandas_series(name: str, group: h5py.Group) -> Iterator[Column]:
     values = group["values"]
     yield from _pandas_index(name, group["index"])
     if values.dtype.kind in "iuf" and values.ndim == 1:
-        yield Column(f"{name}/values", values.size, str(values.dtype), "", values.name[1:])
+        yield Column(f"{name}/values", values.size, str(values.dtype), values.name[1:])
 
 
 def _pandas_index(name: str, index: h5py.Dataset) -> Iterator[Column]:
     title = _text(index.attrs.get("name"))
     title = "index" if title in ("", "N.") else title  # "N." is a pickled None
     if index.dtype.kind in "iuf" and index.ndim == 1:
-        yield Column(f"{name}/{title}", index.size, str(index.dtype), "", index.name[1:])
+        yield Column(f"{name}/{title}", index.size, str(index.dtype), index.name[1:])
 
 
 _PANDAS: Final = {"frame": _pandas_frame, "series": _pandas_series, "frame_table": _pandas_table}

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, printable
 from d2rpick.histories.database import DIGITS, SolverFile
-from d2rpick.histories.formats.hdf5_columns import Column, check_size, columns_of, finite
+from d2rpick.histories.formats.hdf5_columns import Column, columns_of, finite
+from d2rpick.histories.formats.hdf5_damage import check_file, check_size
 from d2rpick.histories.history import Part, Precision
-from d2rpick.histories.names import near_miss
+from d2rpick.histories.names import near_miss, refuse_other_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -49,6 +50,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]
 
 def _opened_leg(source: Source, selection: Selection) -> Database:
     file = io.BytesIO(source.data) if isinstance(source.data, bytes) else Path(source.data.path)
+    check_file(file, source.name)
     branches = {} if selection.time or selection.energy else _branches(file, source.name)
     return SavedBinout(source.name, branches) if branches else Columns(file, source.name, selection)
 
@@ -273,6 +275,8 @@ def _only_energy(columns: Sequence[Column], time: Column | None, source: str) ->
             for column in columns
             if column not in times and any((column.group, column.size) == (one.group, one.size) for one in times)
         ]
+        if len(fitting) == 1:
+            refuse_other_quantity(fitting[0].path, source)
     return _only(fitting, columns, "internal energy", source)
 
 
@@ -294,7 +298,7 @@ def _only(fitting: Sequence[Column], columns: Sequence[Column], what: str, sourc
 
 
 def _listed(columns: Sequence[Column]) -> str:
-    shown = ", ".join(f"{column.path} ({column.size})" for column in columns[:_MANY])
+    shown = printable(", ".join(f"{column.path} ({column.size})" for column in columns[:_MANY]))
     return (shown or "there is none") + (f" and {len(columns) - _MANY} more" if len(columns) > _MANY else "")
 
 
@@ -318,7 +322,7 @@ def _opened(file: Path | BinaryIO, source: str) -> Iterator[h5py.File]:
         OverflowError,
         MemoryError,
     ) as error:
-        reason = " ".join(str(error).split())
+        reason = printable(" ".join(str(error).split()))
         raise FormatError(f"{source}: HDF5 cannot be read ({reason}); the file is damaged or needs a filter") from error
 
 

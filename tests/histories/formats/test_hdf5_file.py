@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import os
+import signal
 from typing import TYPE_CHECKING
 
 import h5py
@@ -11,13 +13,14 @@ import pytest
 from hypothesis import given
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.formats import hdf5_file
+from d2rpick.histories.formats import hdf5_damage, hdf5_file
 from d2rpick.histories.formats.hdf5_file import SavedBinout
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
 from tests.faults import FAULTS, Fault, cases, damage
 from tests.hdf5_files import ENERGY, KINETIC, LAYOUTS, PARTS, TIME, lasso, plain, written
 from tests.reading import history_of
+from tests.shared import shared_bytes
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History
@@ -160,3 +163,68 @@ def check(layout: str, faults: list[Fault]) -> None:
 def test_damaged_files(faults: list[Fault]) -> None:
     for layout in SMALL:
         check(layout, faults)
+
+
+# Damage that the library does not report.
+
+
+def chunked(file: h5py.File) -> None:
+    file.create_dataset("time", data=np.arange(40.0), chunks=(8,))
+    file.create_dataset("internal_energy", data=np.arange(40.0) % 7, chunks=(8,), compression="gzip", fletcher32=True)
+
+
+def test_bytes_behind_the_end_are_refused() -> None:
+    content = written(plain).getvalue()
+    with pytest.raises(FormatError, match=f"{len(content) + 4} bytes, by its own head {len(content)}; it is damaged"):
+        history_of(hdf5_file, content + b"0000", name="run.h5")
+
+
+def test_chunks_that_were_never_written_are_no_zeros() -> None:
+    def unfinished(file: h5py.File) -> None:
+        chunked(file)
+        grown = file.create_dataset("later", (40,), chunks=(8,), dtype="f8")
+        grown[:20] = np.arange(20.0)
+        file.create_dataset("never", (40,), dtype="f8")
+
+    assert read(written(unfinished)).energy.tolist() == (np.arange(40.0) % 7).tolist()
+    with pytest.raises(FormatError, match="/later has 3 of 5 chunks of its data"):
+        read(written(unfinished), "later")
+    with pytest.raises(FormatError, match="/never was never written"):
+        read(written(unfinished), "never")
+
+
+def test_a_flipped_bit_in_data_with_a_checksum_is_refused() -> None:
+    content = bytearray(written(chunked).getvalue())
+    with h5py.File(io.BytesIO(content)) as file:
+        content[file["internal_energy"].id.get_chunk_info(2).byte_offset + 5] ^= 1
+    with pytest.raises(FormatError, match="HDF5 cannot be read"):
+        read(io.BytesIO(bytes(content)))
+
+
+def test_a_crash_of_the_library_is_survived(monkeypatch: pytest.MonkeyPatch) -> None:
+    def crash(_: object) -> None:
+        os.kill(os.getpid(), signal.SIGSEGV)
+
+    monkeypatch.setattr(hdf5_damage, "_read", crash)
+    with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library crashes on it \(signal 11\)"):
+        read(written(plain))
+
+
+@pytest.mark.parametrize("name", ["segfault", "bitflip_silent", "lost_chunk_zeros"])
+def test_damaged_files_that_were_found_are_refused(name: str) -> None:
+    with pytest.raises(FormatError, match="damaged"):
+        read(io.BytesIO(shared_bytes(f"faults/hdf5_{name}.h5")))
+
+
+def test_a_line_end_in_a_name_does_not_break_the_message() -> None:
+    with pytest.raises(FormatError, match=r"internal_energ\\n \(21\)"):
+        read(io.BytesIO(shared_bytes("faults/hdf5_newline_in_error.h5")))
+
+
+def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:
+    def other(file: h5py.File) -> None:
+        file["time"], file["kinetic_energy"] = TIME, KINETIC
+
+    with pytest.raises(FormatError, match="by this name no internal energy"):
+        read(written(other))
+    assert read(written(other), "kinetic_energy").energy.tolist() == KINETIC.tolist()

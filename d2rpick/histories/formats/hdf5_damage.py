@@ -1,0 +1,115 @@
+"""Damage of an HDF5 file that its library does not report: a crash, bytes too many, chunks that are not there.
+
+What cannot be seen: a changed byte in data that is stored without a checksum (`fletcher32`) and without compression.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from typing import TYPE_CHECKING, BinaryIO, Final
+
+from d2rpick.errors import FormatError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import h5py
+
+_DENSEST: Final = 1100  # HDF5's best compression; a larger array than that is a damaged shape
+# Place of the end-of-file address in superblocks of version 0 to 3, of addresses of eight bytes, as all writers use.
+_END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
+_VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
+_USER_BLOCK: Final = 512  # MATLAB puts it before the file
+
+
+def check_file(file: Path | BinaryIO, source: str) -> None:
+    """FormatError where a file has not the size it says, or the library would crash on it.
+
+    It is read once in a child process: what ends that one would end this one.
+    """
+    _check_size_of_file(file, source)
+    if not hasattr(os, "fork"):
+        return
+    child = os.fork()
+    if child == 0:
+        _read_and_exit(file)
+    _, status = os.waitpid(child, 0)
+    if os.WIFSIGNALED(status):
+        raise FormatError(
+            f"{source}: the HDF5 library crashes on it (signal {os.WTERMSIG(status)}); the file is damaged, "
+            "copy it again"
+        )
+
+
+def check_size(dataset: h5py.Dataset, source: str) -> None:
+    """FormatError if the data of a dataset is not all there; unwritten chunks would read as zeros."""
+    stored = dataset.id.get_storage_size()
+    if dataset.nbytes > _DENSEST * max(stored, 4096):
+        raise FormatError(f"{source}: {dataset.name} has shape {dataset.shape} but {stored} bytes; the file is damaged")
+    if dataset.size and not stored:
+        raise FormatError(f"{source}: {dataset.name} was never written; choose another dataset or copy the file again")
+    if dataset.chunks and dataset.size:
+        chunks: set[tuple[int, ...]] = set()
+        dataset.id.chunk_iter(lambda chunk: chunks.add(tuple(chunk.chunk_offset)))
+        expected = 1
+        for extent, length in zip(dataset.shape, dataset.chunks, strict=True):
+            expected *= -(-extent // length)
+        inside = sum(all(at < extent for at, extent in zip(chunk, dataset.shape, strict=True)) for chunk in chunks)
+        if inside < expected:
+            raise FormatError(
+                f"{source}: {dataset.name} has {inside} of {expected} chunks of its data; the file is damaged or was "
+                "not written to its end"
+            )
+
+
+def _check_size_of_file(file: Path | BinaryIO, source: str) -> None:
+    head, size = _head_and_size(file)
+    base = 0 if head.startswith(b"\x89HDF") else _USER_BLOCK
+    head = head[base:]
+    version = head[_VERSION] if len(head) > _VERSION else -1
+    place = _END_OF_FILE.get(version)
+    if place is None or head[_SIZE[version]] != _ADDRESS_SIZE or len(head) < place + _ADDRESS_SIZE:
+        return  # the library says what is wrong with it
+    (end,) = struct.unpack_from("<Q", head, place)
+    if size not in (end, end + base):
+        raise FormatError(
+            f"{source}: the file has {size} bytes, by its own head {end}; it is damaged or cut, copy it again"
+        )
+
+
+def _head_and_size(file: Path | BinaryIO) -> tuple[bytes, int]:
+    if isinstance(file, os.PathLike):
+        with file.open("rb") as content:
+            return content.read(2 * _USER_BLOCK), os.fstat(content.fileno()).st_size
+    file.seek(0)
+    head = file.read(2 * _USER_BLOCK)
+    return head, file.seek(0, os.SEEK_END)
+
+
+def _read_and_exit(file: Path | BinaryIO) -> None:
+    """Read all that could crash the library: what describes the data, and data in chunks; errors are not for here."""
+    try:
+        import faulthandler
+        import resource
+
+        faulthandler.disable()
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+        _read(file)
+    finally:
+        os._exit(0)
+
+
+def _read(file: Path | BinaryIO) -> None:
+    import h5py
+
+    def visit(name: bytes, info: h5py.h5o.ObjInfo) -> None:
+        if info.type == h5py.h5o.TYPE_DATASET:
+            dataset = h5py.h5d.open(opened.id, name)
+            if dataset.get_create_plist().get_layout() == h5py.h5d.CHUNKED:
+                check_size(h5py.Dataset(dataset), "")
+                h5py.Dataset(dataset)[()]
+
+    with h5py.File(file, "r") as opened:
+        h5py.h5o.visit(opened.id, visit, info=True)
