@@ -137,7 +137,7 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     if answer.recommended:
         times = sorted({*times, answer.recommended.tr})
     found = scan(parameters, reference, times, td, options["jobs"])
-    hidden = options["quiet"] or not sys.stderr.isatty()
+    hidden = options["quiet"] or sys.stderr is None or not sys.stderr.isatty()
     with click.progressbar(found, len(times), "switched runs", file=sys.stderr, hidden=hidden) as runs:
         outcomes = list(runs)
     if plot:
