@@ -102,7 +102,8 @@ class Ledger:
             if record := _record(text):
                 self._remember(record)
             else:
-                self.damaged += bool(text) and not text.startswith(_LAST)
+                cut = text.startswith(_FIRST) and not text.endswith(b"}")  # by the end of a killed study
+                self.damaged += bool(text) and not cut and not text.startswith(_LAST)
         self._end = b"" if content.endswith(b"\n") or not content else b"\n"
 
     def _remember(self, record: dict[str, Any]) -> None:

@@ -13,11 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import ENERGY, GLSTAT, ROOT, run
+from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, run, started
 from tests.shared import shared
 from tests.text_files import glstat_text, matsum_text
 
-TIME_LIMIT = 60  # [s] after which a child that hangs is ended
 HOSTILE = "energy\n\x1b[31mred.csv"
 
 
@@ -72,16 +71,10 @@ def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> No
 
 
 def test_an_interrupted_scan_shows_no_tracebacks() -> None:
-    command = [sys.executable, "-m", "d2rpick", "rollover", "--scan", "--jobs", "2"]
-    with subprocess.Popen(
-        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    ) as process:
-        try:
-            time.sleep(3)
-            os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
-            _, told = process.communicate(timeout=TIME_LIMIT)
-        finally:
-            process.kill()
+    with started("rollover", "--scan", "--jobs", "2", text=True) as process:
+        time.sleep(3)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
+        _, told = process.communicate()
     assert process.returncode == 2
     assert "Traceback" not in told
     assert told.splitlines()[-1] == "d2rpick: interrupted"
