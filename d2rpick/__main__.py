@@ -13,6 +13,11 @@ def main() -> None:
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(100_000)
+    for stream in range(3):  # a file opened in the place of a closed one would get what is meant for it
+        try:
+            os.fstat(stream)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
     from d2rpick.cli import d2rpick
 
     d2rpick()

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager, suppress
 from inspect import signature
 from pathlib import Path
+from threading import Timer
 from typing import TYPE_CHECKING, Any
 
 from click.testing import CliRunner
@@ -13,10 +19,11 @@ from click.testing import CliRunner
 from d2rpick.cli import d2rpick
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from click.testing import Result
 
+TIME_LIMIT = 60  # [s] after which a child that hangs is ended
 ROOT = Path(__file__).resolve().parents[1]
 ENERGY = str(ROOT / "sample_data" / "energy.csv")
 GLSTAT = str(ROOT / "sample_data" / "energy.glstat")
@@ -24,6 +31,9 @@ ROLLOVER = str(ROOT / "sample_data" / "rollover.csv")
 DECK = str(ROOT / "sample_data" / "switching.k")
 BOX = str(ROOT / "sample_data" / "rolloverT01.gz")
 OSCILLATOR = tuple(shlex.split("--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6"))
+_INTERRUPTIBLE = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\nfrom d2rpick.__main__ import main; main()"
+)
 # No colour variables and no options that the tester's own environment may set.
 _ENVIRONMENT = {"NO_COLOR": None, "FORCE_COLOR": None, "D2RPICK_SUGGEST_TD": None}
 # Before 8.2, click's runner mixes the streams unless it is told not to.
@@ -36,6 +46,29 @@ def run(*args: str, stdin: bytes | None = None, color: bool = False, env: Mappin
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result
+
+
+@contextmanager
+def started(*args: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
+    """Start the program in a session of its own; what is left of it after the block, or the time limit, is ended.
+
+    It can be interrupted also where this process cannot, as in the background of a shell.
+    """
+    command = [sys.executable, "-c", _INTERRUPTIBLE, *args]
+    given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "cwd": ROOT, **options}
+    with subprocess.Popen(command, start_new_session=True, **given) as process:
+        watch = Timer(TIME_LIMIT, _end, [process.pid])
+        watch.start()
+        try:
+            yield process
+        finally:
+            watch.cancel()
+            _end(process.pid)
+
+
+def _end(group: int) -> None:
+    with suppress(ProcessLookupError):
+        os.killpg(group, signal.SIGKILL)
 
 
 def answer(*args: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import pytest
 from d2rpick.cli import options, replay
 from d2rpick.histories.opening import READERS
 from d2rpick.models import oscillator_files
-from tests.command import DECK, ENERGY, GLSTAT, ROOT
+from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -112,7 +112,9 @@ def loaded(*args: str) -> set[str]:
         "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr));"
         "from d2rpick.__main__ import main; main()"
     )
-    result = subprocess.run([sys.executable, "-c", code, *args], capture_output=True, text=True, check=True, cwd=ROOT)
+    result = subprocess.run(
+        [sys.executable, "-c", code, *args], capture_output=True, text=True, check=True, cwd=ROOT, timeout=TIME_LIMIT
+    )
     assert result.stdout
     return set(result.stderr.split())
 
@@ -156,7 +158,8 @@ UNNEEDED = {
 
 def test_a_plain_table_loads_only_what_its_answer_needs() -> None:
     libraries = [sys.executable, "-c", "import sys, numpy, click; print(*sys.modules)"]
-    theirs = set(subprocess.run(libraries, capture_output=True, text=True, check=True).stdout.split())
+    there = subprocess.run(libraries, capture_output=True, text=True, check=True, timeout=TIME_LIMIT)
+    theirs = set(there.stdout.split())
     assert "d2rpick" not in theirs
     assert not (loaded("suggest", "-q", "--td", "0.064", ENERGY) - theirs) & UNNEEDED
 

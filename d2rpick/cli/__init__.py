@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import click
 
 from d2rpick import __version__
-from d2rpick.errors import D2RPickError
+from d2rpick.errors import D2RPickError, printable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -75,11 +75,12 @@ class _Group(click.Group):
 
                 click.echo(traceback.format_exc(), err=True, nl=False)
             raise click.ClickException(_one_line(error)) from error
+        except MemoryError as error:
+            raise click.ClickException("there is not enough memory; give it more, or name fewer files") from error
         except (
             ArithmeticError,
             AttributeError,
             LookupError,
-            MemoryError,
             RuntimeError,
             TypeError,
             ValueError,
@@ -108,7 +109,7 @@ class _Group(click.Group):
 
 
 def _fail(message: str) -> NoReturn:
-    click.echo(f"d2rpick: {message}", err=True)
+    click.echo(f"d2rpick: {printable(message)}", err=True)
     sys.exit(COULD_NOT_RUN)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from d2rpick.errors import D2RPickError
+from d2rpick.errors import D2RPickError, printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -92,9 +92,9 @@ class Output(NamedTuple):
         if self.quiet:
             return
         for note in notes:
-            click.echo(f"note: {note}", err=True)
+            click.echo(f"note: {printable(note)}", err=True)
         for caution in cautions:
-            click.echo(f"warning: {caution.code}: {caution.message}", err=True)
+            click.echo(f"warning: {caution.code}: {printable(caution.message)}", err=True)
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file whole or not at all: into a temporary file beside it, which then takes its name.

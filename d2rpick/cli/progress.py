@@ -65,7 +65,7 @@ def _clock(seconds: float) -> str:
 @contextmanager
 def _telling(say: Callable[[float], str], *, quiet: bool) -> Iterator[None]:
     """Show what ``say`` gives for the seconds that have gone by, unless ``quiet`` or where no terminal is."""
-    if quiet or not sys.stderr.isatty():
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
         yield
         return
     from threading import Event, Thread  # --help does without

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output, finish
+from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import counting
 from d2rpick.errors import D2RPickError, FormatError
 
@@ -120,6 +120,8 @@ def _listed(name: str) -> Iterator[str]:
     """Names in a list, one a line; blank lines and comments are skipped."""
     from pathlib import Path
 
+    if name == "-" and sys.stdin is None:
+        raise FormatError("-: standard input is closed; name a file with one run a line")
     try:
         content = sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
     except OSError as error:
@@ -161,7 +163,7 @@ def _write_files(answer: Study, options: dict[str, Any], output: Output) -> None
         from d2rpick.report.study_page import as_page
 
         drawing = figures.both_widths(figures.draw_study, answer, "runs")
-        output.write(options["report"], as_page(answer, shared.repeat(), drawing).encode())
+        output.write(options["report"], text_bytes(as_page(answer, shared.repeat(), drawing)))
 
 
 def _rows(question: Question, sources: Sequence[str], options: dict[str, Any], *, quiet: bool) -> Iterator[Row]:
@@ -173,7 +175,7 @@ def _rows(question: Question, sources: Sequence[str], options: dict[str, Any], *
     ledger = Ledger(options["resume"], question) if options["resume"] is not None else None
     known = {number: row for number, source in enumerate(sources) if ledger and (row := ledger.find(source))}
     new = [number for number in range(len(sources)) if number not in known]
-    if ledger and (ledger.taken or ledger.outdated) and not options["quiet"]:
+    if ledger and (ledger.taken or ledger.outdated or ledger.damaged) and not options["quiet"]:
         click.echo(f"note: {ledger.told(len(sources))}", err=True)
     # the processes of a cluster work in other folders
     names = [os.path.abspath(sources[n]) if options["scheduler"] else sources[n] for n in new]  # noqa: PTH100
@@ -202,5 +204,4 @@ def _farm(options: dict[str, Any], calls: int) -> Farm:
         if not cluster.threads and not options["quiet"]:
             click.echo(f"note: {options['scheduler']}: no workers yet, waiting for some", err=True)
         return cluster
-    processes = min(options["jobs"] or workers.cores(), calls)
-    return workers.local(processes)
+    return workers.on_cores(min(options["jobs"] or workers.cores(), calls), "d2rpick.studies.study")

@@ -126,7 +126,7 @@ def study(
     from d2rpick.library.repeat import options_of
     from d2rpick.library.runs import known_format, selection_of
     from d2rpick.studies.study import Question, ask, failed, find_runs, summarise
-    from d2rpick.studies.workers import answers, local
+    from d2rpick.studies.workers import answers, on_cores
 
     names = find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
     selection = selection_of(time, energy)._replace(
@@ -138,7 +138,7 @@ def study(
     if not (isinstance(jobs, int) and jobs > 0):
         raise ValueError(f"jobs is {jobs!r}, a whole number of at least 1 was expected")
     rows: dict[int, Row] = {}
-    with local(min(jobs, len(names))) as farm:
+    with on_cores(min(jobs, len(names)), "d2rpick.studies.study") as farm:
         for answer in answers(farm, partial(ask, question), names):
             row = failed(names[answer.number], answer.error) if answer.error else answer.result
             rows[answer.number] = replace(row, source=names[answer.number])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
 from d2rpick.choice.health import cautions_of_health
+from d2rpick.errors import printable
 from d2rpick.report import tables
 from d2rpick.report.health import HEAD as HEALTH_HEAD
 from d2rpick.report.health import measures_of
@@ -38,7 +39,7 @@ def as_table(overview: Overview) -> str:
         lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview))]
     if health := _health(overview):
         lines += ["", tables.as_text(HEALTH_HEAD, health)]
-    return "\n".join([*lines, *(f"note: {note}" for note in overview.notes)])
+    return "\n".join([*lines, *(f"note: {printable(note)}" for note in overview.notes)])
 
 
 def as_markdown(overview: Overview) -> str:
@@ -46,7 +47,7 @@ def as_markdown(overview: Overview) -> str:
     facts = tables.as_markdown(("what", "value"), _rows(overview))
     parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
     health = [tables.as_markdown(HEALTH_HEAD, _health(overview))] if _health(overview) else []
-    return "\n\n".join([facts, *parts, *health, *(f"* {note}" for note in overview.notes)])
+    return "\n\n".join([facts, *parts, *health, *(f"* {printable(note)}" for note in overview.notes)])
 
 
 def as_csv(overview: Overview) -> str:

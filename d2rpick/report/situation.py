@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
+from d2rpick.errors import printable
 from d2rpick.report.tables import measure
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def heading(situation: Situation) -> list[str]:
         end = "no next contact seen" if flight.end is None else f"to {flight.end:.6g}"
         who = f" of {', '.join(part.title or str(part.id) for part in flight.parts)}" if flight.parts else ""
         lines.append(f"flight   from {flight.start:.6g} ({_source(flight)}{who}), {end}")
-    return lines
+    return [printable(line) for line in lines]
 
 
 def _source(flight: Flight) -> str:

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
+from d2rpick.errors import printable
 from d2rpick.report import tables
 from d2rpick.studies.resume_file import PLAIN, plain
 from d2rpick.studies.study import runs_of
@@ -22,13 +23,13 @@ HEAD = ("run", "tr", "+-", "E(td)", "R", "basis", "status", "message")
 def as_table(answer: Study) -> str:
     """One line per run, and below what they have in common."""
     width = max(len(name) for name, _ in outcome(answer))
-    below = [f"{name.ljust(width)}  {text}" for name, text in outcome(answer)]
+    below = [f"{name.ljust(width)}  {printable(text)}" for name, text in outcome(answer)]
     return "\n".join([tables.as_text(HEAD, rows(answer)), "", *below])
 
 
 def as_markdown(answer: Study) -> str:
     """The runs as a Markdown table, and below what they have in common."""
-    below = "\n".join(f"* {name}: {text}" for name, text in outcome(answer))
+    below = "\n".join(f"* {name}: {printable(text)}" for name, text in outcome(answer))
     return f"{tables.as_markdown(HEAD, rows(answer))}\n\n{below}"
 
 

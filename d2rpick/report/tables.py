@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from d2rpick.errors import printable
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -23,7 +25,7 @@ def short(value: Cell) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"{value:.6g}" if isinstance(value, float) else printable(str(value))
 
 
 def measure(value: float | None) -> str:
@@ -48,7 +50,7 @@ def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     10.25  extremum
     """
     body = list(rows)
-    texts = [list(head), *([short(cell) for cell in row] for row in body)]
+    texts = [[short(name) for name in head], *([short(cell) for cell in row] for row in body)]
     widths = [max(len(row[i]) for row in texts) for i in range(len(head))]
     right = [all(row[i] is None or isinstance(row[i], (int, float)) for row in body) for i in range(len(head))]
     lines = (
@@ -67,7 +69,11 @@ def as_markdown(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     | --- | --- |
     | 0.5 | crossing |
     """
-    lines = [list(head), ["---"] * len(head), *([short(c).replace("|", r"\|") for c in row] for row in rows)]
+    lines = [
+        [short(name) for name in head],
+        ["---"] * len(head),
+        *([short(c).replace("|", r"\|") for c in row] for row in rows),
+    ]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
@@ -84,9 +90,15 @@ def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
 
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows([str(c).lower() if isinstance(c, bool) else c for c in row] for row in rows)
+    writer.writerow(map(_exact, head))
+    writer.writerows(map(_exact, row) for row in rows)
     return text.getvalue()
+
+
+def _exact(value: Cell) -> Cell:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return printable(value) if isinstance(value, str) else value
 
 
 def as_json(result: dict[str, Any]) -> str:

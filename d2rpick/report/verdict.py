@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from d2rpick.errors import printable
 from d2rpick.report import tables
 from d2rpick.report.situation import frame, heading, mechanics
 
@@ -84,10 +85,10 @@ def deviations(switched: Comparison) -> list[tuple[str, str]]:
 def _comparison(switched: Comparison) -> list[str]:
     """Lines that hold the switched run against the reference."""
     return [
-        f"switched run  {', '.join(switched.source)}; after td means to {switched.end:.6g}",
+        f"switched run  {printable(', '.join(switched.source))}; after td means to {switched.end:.6g}",
         tables.as_text(COMPARED, comparison(switched)),
         *(f"{name.ljust(38)}  {text}" for name, text in deviations(switched)),
-        *(f"note: {note}" for note in switched.notes),
+        *(f"note: {printable(note)}" for note in switched.notes),
     ]
 
 

@@ -23,6 +23,11 @@ PLAIN: Final = (
 )
 
 
+_FIRST: Final = b'{"source": '
+_LAST: Final = b'{"schema": '  # of the summary behind the rows
+_CHECKSUM: Final = ', "checksum": "'
+
+
 def fingerprint(question: Question) -> str:
     """Stand for all that a row depends on beside its files: options and version, not whether its curve is drawn."""
     asked = {**asdict(question), "curve": None}
@@ -46,13 +51,31 @@ def line(row: Row, asked: str) -> str:
     }
     if row.curve is not None:
         record["curve"] = row.curve.tolist()
-    return json.dumps(record, allow_nan=False)
+    return _signed(json.dumps(record, allow_nan=False))
+
+
+def _signed(text: str) -> str:
+    """Add a checksum to a JSON object, its last key, so that a damaged line is never taken for another answer."""
+    return f'{text[:-1]}{_CHECKSUM}{_checksum(text[:-1].encode())}"}}'
+
+
+def _checksum(text: bytes) -> str:
+    return hashlib.sha256(text).hexdigest()[:16]
+
+
+def _record(text: bytes) -> dict[str, Any] | None:
+    """Record of a line as it was written; None for a damaged one."""
+    body, _, checksum = text.rpartition(_CHECKSUM.encode())
+    if checksum != f'{_checksum(body)}"}}'.encode():
+        return None
+    record: dict[str, Any] = json.loads(text)
+    return record
 
 
 class Ledger:
     """Rows that a file of such lines holds; it need not exist yet.
 
-    What a killed study left of its last line is passed over.
+    Damaged lines are passed over, among them what a killed study left of its last one.
 
     Raises
     ------
@@ -62,24 +85,25 @@ class Ledger:
 
     def __init__(self, name: str, question: Question) -> None:
         self.name, self.asked, self.curve = name, fingerprint(question), question.curve
-        self.taken = self.outdated = 0
+        self.taken = self.outdated = self.damaged = 0
         self._rows: dict[tuple[Stamp, ...], Row] = {}
         self._known: set[tuple[str, ...]] = set()
+        if Path(name).exists() and not Path(name).is_file():
+            raise FormatError(f"{name}: cannot be written (not a regular file); name another file")
         try:
             with Path(name).open("a+b") as file:  # created, and sure to be writable before the work begins
                 file.seek(0)
                 content = file.read()
         except OSError as error:
-            raise FormatError(f"{name}: cannot be written ({error.strerror}); name another file") from None
-        if content and not content.startswith(b'{"source": '):
-            raise FormatError(f'{name}:1: no run of a study, which begins with {{"source": ; name another file')
-        for text in content.splitlines():
-            try:
-                record = json.loads(text)
-            except ValueError:  # cut where the study was killed
-                continue
-            if "files" in record:  # else the summary at the end
+            raise FormatError(f"{name}: cannot be written ({error.strerror or error}); name another file") from None
+        if content[: len(_FIRST)] != _FIRST[: len(content)]:
+            raise FormatError(f'{name}:1: not a run of a study, which begins with {{"source": ; name another file')
+        for text in content.split(b"\n"):
+            if record := _record(text):
                 self._remember(record)
+            else:
+                cut = text.startswith(_FIRST) and not text.endswith(b"}")  # by the end of a killed study
+                self.damaged += bool(text) and not cut and not text.startswith(_LAST)
         self._end = b"" if content.endswith(b"\n") or not content else b"\n"
 
     def _remember(self, record: dict[str, Any]) -> None:
@@ -107,12 +131,16 @@ class Ledger:
     def told(self, runs: int) -> str:
         """Say how many of so many runs were taken, and why others that the file holds were not."""
         outdated = f"; {self.outdated} have changed or were asked for with other options" if self.outdated else ""
-        return f"{self.taken} of {runs} runs taken from {self.name}{outdated}"
+        damaged = f"; lines passed over, damaged or without a checksum: {self.damaged}" if self.damaged else ""
+        return f"{self.taken} of {runs} runs taken from {self.name}{outdated}{damaged}"
 
     def add(self, row: Row) -> None:
         """Append the row of a run that was judged; it is in the file when this returns."""
         if row.status in (FAILED, UNREADABLE):  # asked again next time
             return
-        with Path(self.name).open("ab") as file:
-            file.write(self._end + line(row, self.asked).encode() + b"\n")
+        try:
+            with Path(self.name).open("ab") as file:
+                file.write(self._end + line(row, self.asked).encode() + b"\n")
+        except OSError as error:
+            raise FormatError(f"{self.name}: cannot be written ({error.strerror}); make room and begin again") from None
         self._end = b""

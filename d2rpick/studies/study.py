@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -136,8 +137,14 @@ def find_runs(names: Iterable[str]) -> tuple[str, ...]:
     found: list[str] = []
     for name in names:
         pattern = any(sign in name for sign in "*?[") and not Path(name).exists()
-        found += (pattern and sorted(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
+        found += (pattern and _once(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
     return tuple(found)
+
+
+def _once(names: Iterable[str]) -> list[str]:
+    """Give each file or folder by its shortest name only: links that lead in a circle give it many."""
+    shortest_first = sorted(names, key=lambda name: (len(name), name), reverse=True)
+    return sorted({os.path.realpath(name): name for name in shortest_first}.values())
 
 
 def ask(question: Question, source: str) -> Row:
@@ -188,10 +195,10 @@ def failed(source: str, error: BaseException) -> Row:
 def stamps(source: str) -> tuple[Stamp, ...]:
     """Size and time of the files of a run as they are now, under their absolute names; none where there is no run."""
     try:
-        found = [(Path(name).resolve(), Path(name).stat()) for name in expand([source])]
+        found = [(os.path.realpath(name), Path(name).stat()) for name in expand([source])]
     except (D2RPickError, OSError):  # told by whoever reads it
         return ()
-    return tuple(Stamp(str(path), state.st_size, state.st_mtime_ns) for path, state in found)
+    return tuple(Stamp(path, state.st_size, state.st_mtime_ns) for path, state in found)
 
 
 def outline(history: History) -> Samples:

@@ -125,12 +125,13 @@ class Here:
 
 
 class Cores:
-    """A pool of processes on this machine."""
+    """A pool of processes on this machine, which have imported ``module`` before they begin."""
 
-    def __init__(self, processes: int) -> None:
+    def __init__(self, processes: int, module: str) -> None:
         # read when a process imports numpy: with several of them, threads would only fight over the cores
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         self.processes, self.room = processes, (1 + _WAITING) * processes
+        self._module = module
         self._held, self._leash = Pipe(duplex=False)  # the processes see when this end of it is closed
         self._pool = self._new(processes)
 
@@ -158,13 +159,8 @@ class Cores:
     def _new(self, processes: int) -> ProcessPoolExecutor:
         # plain forks copy locks that threads hold; one process that forks from a clean state is nearly as quick
         method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-        set_forkserver_preload(["d2rpick.studies.study"])
+        set_forkserver_preload([self._module])
         return ProcessPoolExecutor(processes, get_context(method), _begin_work, (self._held,))
-
-
-def local(processes: int) -> Here | Cores:
-    """Choose where to compute on this machine; a single call needs no other process."""
-    return Cores(processes) if processes > 1 else Here()
 
 
 def _begin_work(held: Connection) -> None:
@@ -176,6 +172,11 @@ def _begin_work(held: Connection) -> None:
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()
+
+
+def on_cores(processes: int, module: str) -> Farm:
+    """Choose where to compute on this machine; for a single process, in this one."""
+    return Cores(processes, module) if processes > 1 else Here()
 
 
 class Cluster:

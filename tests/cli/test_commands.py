@@ -17,7 +17,7 @@ from d2rpick import __version__
 from d2rpick.cli import COMMANDS
 from d2rpick.histories.opening import Selection
 from tests import paper
-from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, codes, run
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, TIME_LIMIT, answer, codes, run
 from tests.reading import read_history
 
 if TYPE_CHECKING:
@@ -29,9 +29,9 @@ ROLLING = ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
 
 def program(*args: str, **options: Any) -> CompletedProcess[str]:
     """Run ``python -m d2rpick`` as a process of its own."""
-    return subprocess.run(
-        [sys.executable, "-m", "d2rpick", *args], capture_output=True, text=True, check=False, cwd=ROOT, **options
-    )
+    command = [sys.executable, "-m", "d2rpick", *args]
+    given = {"capture_output": True, "text": True, "cwd": ROOT, "timeout": TIME_LIMIT, **options}
+    return subprocess.run(command, check=False, **given)
 
 
 # What the tool is for.
@@ -231,7 +231,7 @@ def test_a_reader_that_has_seen_enough_ends_the_program_silently() -> None:
     read_end, write_end = os.pipe()
     os.close(read_end)
     args = [sys.executable, "-m", "d2rpick", *SUGGEST, "-q", ENERGY]
-    result = subprocess.run(args, stdout=write_end, stderr=subprocess.PIPE, check=False, cwd=ROOT)
+    result = subprocess.run(args, stdout=write_end, stderr=subprocess.PIPE, check=False, cwd=ROOT, timeout=TIME_LIMIT)
     os.close(write_end)
     assert (result.returncode, result.stderr) == (141, b"")
 

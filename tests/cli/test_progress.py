@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.cli import progress
-from tests.command import ENERGY, ROOT
+from tests.command import ENERGY, started
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -77,10 +77,7 @@ def test_an_error_is_shown_on_a_clean_line(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
     master, slave = pty.openpty()
-    args = [sys.executable, "-m", "d2rpick", "info", "-f", "csv", "-"]
-    with subprocess.Popen(
-        args, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=slave, cwd=ROOT
-    ) as process:  # fmt: skip
+    with started("info", "-f", "csv", "-", stdin=subprocess.PIPE, stderr=slave) as process:
         os.close(slave)
         first = os.read(master, 1000)  # blocks until there is something
         result, _ = process.communicate(Path(ENERGY).read_bytes(), timeout=30)

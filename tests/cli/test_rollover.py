@@ -6,8 +6,6 @@ import csv
 import io
 import json
 import os
-import subprocess
-import sys
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
@@ -18,7 +16,7 @@ import pytest
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import Window, simulate
 from d2rpick.report import figures_models
-from tests.command import ROOT, answer, codes, run
+from tests.command import answer, codes, run, started
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -138,9 +136,7 @@ def test_the_progress_of_a_scan_is_told_on_a_terminal_only() -> None:
     scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.1", "--t-end", "0.11", "--mesh", "4", "--dt", "1e-3")
     assert "switched runs" not in run(*scan).stderr
     master, slave = pty.openpty()
-    with subprocess.Popen(
-        [sys.executable, "-m", "d2rpick", *scan], stdout=subprocess.PIPE, stderr=slave, cwd=ROOT
-    ) as process:
+    with started(*scan, stderr=slave) as process:
         os.close(slave)
         told = b""
         try:

@@ -7,8 +7,6 @@ import io
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from importlib.resources import files
 from pathlib import Path
@@ -20,7 +18,7 @@ import pytest
 from d2rpick import __version__
 from tests import variants
 from tests.cli.test_output import check_by_schema
-from tests.command import BOX, ENERGY, GLSTAT, ROOT, answer, run
+from tests.command import BOX, ENERGY, GLSTAT, answer, run, started
 from tests.variants import STUDY
 
 if TYPE_CHECKING:
@@ -170,13 +168,6 @@ def test_a_pattern_stands_for_runs_and_a_folder_for_one(tmp_path: Path, monkeypa
 # Processes.
 
 
-def program(*args: str, cwd: Path, **options: Any) -> subprocess.Popen[str]:
-    """Start the program in a session of its own."""
-    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    command = [sys.executable, "-m", "d2rpick", *args]
-    return subprocess.Popen(command, cwd=cwd, text=True, start_new_session=True, **{**streams, **options})
-
-
 def wait_for(ledger: Path, lines: int) -> None:
     """Wait until a ledger has so many lines."""
     for _ in range(1000):
@@ -195,7 +186,7 @@ def test_all_processes_give_the_answer_of_one(runs: list[str]) -> None:
 def test_rows_come_in_order_as_soon_as_they_can(runs: list[str], tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "slow.csv")  # whoever reads it waits
     args = (*STUDY[:-1], "2", "-f", "ndjson", "run1.csv", "slow.csv", "run2.csv")
-    with program(*args, cwd=tmp_path) as process:
+    with started(*args, cwd=tmp_path, text=True) as process:
         assert process.stdout is not None
         assert json.loads(process.stdout.readline())["source"] == "run1.csv"
         (tmp_path / "slow.csv").write_bytes(Path(runs[2]).read_bytes())
@@ -209,7 +200,7 @@ def test_a_killed_study_loses_nothing_that_was_finished(runs: list[str], tmp_pat
     args = (*STUDY[:-1], jobs, "-f", "json", *runs[:2], str(slow), runs[2], "--resume", str(ledger))
     os.mkfifo(slow)  # whoever reads it waits
     finished = 2 if jobs == "1" else 3
-    with program(*args, cwd=tmp_path) as process:
+    with started(*args, cwd=tmp_path, text=True) as process:
         wait_for(ledger, finished)
         process.send_signal(signal.SIGKILL)
         text, _ = process.communicate(timeout=30)  # no process of the pool keeps the streams open
@@ -233,7 +224,7 @@ def test_an_interrupted_study_ends_at_once_with_a_line(
     os.mkfifo(tmp_path / "slow.csv")
     ledger = tmp_path / "ledger.ndjson"
     args = (*STUDY[:-1], jobs, runs[0], "slow.csv", "--resume", str(ledger))
-    with program(*args, cwd=tmp_path) as process:
+    with started(*args, cwd=tmp_path, text=True) as process:
         wait_for(ledger, 1)
         time.sleep(0.1)
         (os.killpg if everyone else os.kill)(process.pid, signal.SIGINT)
@@ -255,7 +246,7 @@ def test_a_run_that_kills_its_process_is_a_row(
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     args = (*STUDY[:-1], "2", "-f", "json", runs[0], "deadly.csv", *runs[1:])
-    with program(*args, cwd=tmp_path) as process:
+    with started(*args, cwd=tmp_path, text=True) as process:
         text, _ = process.communicate(timeout=30)
     found = json.loads(text)
     assert [row["status"] for row in found["runs"]] == ["ok", "failed", "ok", "ok"]
@@ -313,7 +304,7 @@ def test_a_ledger_is_never_replaced_by_a_result(runs: list[str], tmp_path: Path,
 
 def test_a_ledger_is_not_the_standard_output(runs: list[str], tmp_path: Path) -> None:
     ledger = tmp_path / "ledger.ndjson"
-    with ledger.open("w") as file, program(*STUDY, *runs, "--resume", str(ledger), cwd=ROOT, stdout=file) as process:
+    with ledger.open("w") as file, started(*STUDY, *runs, "--resume", str(ledger), stdout=file, text=True) as process:
         _, said = process.communicate(timeout=30)
     assert process.returncode == 2
     assert "standard output are the same file" in said

@@ -128,7 +128,7 @@ def test_a_line_that_was_cut_anywhere_is_passed_over_and_the_next_one_is_whole(t
 def test_another_file_is_refused_and_stays_as_it_is(tmp_path: Path, content: str) -> None:
     file = tmp_path / "file"
     file.write_text(content)
-    with pytest.raises(FormatError, match="no run of a study"):
+    with pytest.raises(FormatError, match="not a run of a study"):
         Ledger(str(file), QUESTION)
     assert file.read_text() == content
 

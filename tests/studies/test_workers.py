@@ -15,7 +15,7 @@ from d2rpick.studies.workers import Cores, Farm, Here, answers, cores
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-FARMS = [Here, lambda: Cores(2)]
+FARMS = [Here, lambda: Cores(2, __name__)]
 
 
 def square(number: int) -> int:
@@ -46,7 +46,7 @@ def test_an_error_is_the_answer_of_its_item_alone(farm: Callable[[], Farm]) -> N
 
 def test_a_process_that_dies_is_told_for_its_item_alone() -> None:
     items = [*range(8), 99, *range(8, 12), 99, 12]
-    with Cores(2) as place:
+    with Cores(2, __name__) as place:
         found = {answer.number: answer for answer in answers(place, square, items)}
     dead = [number for number, answer in found.items() if answer.error]
     assert sorted(dead) == [8, 13]

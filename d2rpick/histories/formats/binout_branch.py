@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.formats.lsda import Layout, Lsda, Variable
+    from d2rpick.histories.formats.lsda import DirectoryLayout, Lsda, Variable
     from d2rpick.histories.history import Samples
 
     Indices = NDArray[np.int64]
@@ -193,7 +193,7 @@ class Branch:
         return FormatError(f"{self.source} state {self._states.numbers[group.rows[row]]}: {why}")
 
     @cached_property
-    def _metadata(self) -> list[tuple[Lsda, int, Layout]]:
+    def _metadata(self) -> list[tuple[Lsda, int, DirectoryLayout]]:
         return [
             (file, start, file.layouts[layout]) for file in self._files for start, layout in file.metadata[self.name]
         ]
@@ -237,7 +237,7 @@ class Branch:
         return np.asarray(found.argmax(axis=1))
 
 
-def _integers(file: Lsda, start: int, layout: Layout, name: str) -> Indices:
+def _integers(file: Lsda, start: int, layout: DirectoryLayout, name: str) -> Indices:
     """List of integers from a directory; empty if there is none of this name."""
     variable = layout.variables.get(name)
     if variable is None or variable.dtype.kind not in "iu":

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.formats.lsda import Layout, Lsda, Variable
+    from d2rpick.histories.formats.lsda import DirectoryLayout, Lsda, Variable
 
     Indices = NDArray[np.int64]
 
@@ -26,7 +26,7 @@ class Group:
     """States of one file and one layout: their rows in the columns, and the bytes where they start."""
 
     file: Lsda
-    layout: Layout
+    layout: DirectoryLayout
     rows: Indices
     starts: Indices
 
@@ -79,7 +79,7 @@ class States:
         numbers: Indices = np.empty(0, dtype=np.int64)
         starts: Indices = np.empty(0, dtype=np.int64)
         kinds: NDArray[np.int32] = np.empty(0, dtype=np.int32)
-        layouts: list[tuple[Lsda, Layout]] = []
+        layouts: list[tuple[Lsda, DirectoryLayout]] = []
         for file in family:
             if file.odd[branch]:
                 self.damage = f"{file.source}: {branch} has {file.odd[branch][0]!r}, which is no state"
@@ -121,7 +121,9 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
     return file.unfinished == branch and len(layouts) > 1 and layouts[-1] != layouts[-2]
 
 
-def _groups(layouts: Sequence[tuple[Lsda, Layout]], kinds: NDArray[np.int32], starts: Indices) -> Iterator[Group]:
+def _groups(
+    layouts: Sequence[tuple[Lsda, DirectoryLayout]], kinds: NDArray[np.int32], starts: Indices
+) -> Iterator[Group]:
     """States by layout; ``kinds`` says which of ``layouts`` each one has."""
     order = np.argsort(kinds, kind="stable")
     cuts = np.flatnonzero(np.diff(kinds[order])) + 1

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -39,7 +39,7 @@ _NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class BlockLayout:
     """Where in a block what stands.
 
     ``fields`` maps the name of a number to its offset in the block, or to UNSURE.  ``literal`` is 255 for the
@@ -66,14 +66,14 @@ class Grammar:
     """
 
     start: bytes
-    describe: Callable[[bytes], Layout]
-    whole: Callable[[Layout], bool]
+    describe: Callable[[bytes], BlockLayout]
+    whole: Callable[[BlockLayout], bool]
     width: int
     decimals: int
     compare_all: bool
 
 
-class Run(NamedTuple):
+class Stretch(NamedTuple):
     """``repeats`` blocks of ``stride`` bytes from ``start`` on, laid out like the one at ``example``."""
 
     start: int
@@ -106,7 +106,7 @@ class Blocks:
         What was left out.
     tail : int
         Address at which the last block of the file starts, whole or not; ``begin`` when there is none.
-    rest : Run or None
+    rest : Stretch or None
         The last block, when the file stops inside it: it is no state unless ``admit_rest`` makes it one.
     """
 
@@ -116,20 +116,20 @@ class Blocks:
         self._grammar = grammar
         self._end = self._end_of_last_line()
         self._begin = begin
-        # Addresses as packed integers: a file whose blocks all differ must not fill the memory.
-        self._runs = array("q")
-        self.layout = lru_cache(maxsize=16)(partial(_described, self._data, self._end, grammar))
+        self._runs = array("q")  # packed: a file whose blocks all differ must not fill the memory
+        data, end = self._data, self._end  # not self: a circle would keep the file open
+        self.layout = lru_cache(maxsize=16)(lambda at, size: grammar.describe(data[at : min(at + size, end)]))
         self._compared = grammar.compare_all
         self.states, self.complete = 0, True
         self.notes: tuple[str, ...] = ()
-        self.rest: Run | None = None
+        self.rest: Stretch | None = None
         self._walk()
         if not self._compared and not self._is_even():
             self._compared = True
             self._walk()
 
-    def __iter__(self) -> Iterator[Run]:
-        return (Run(*self._runs[at : at + 4]) for at in range(0, len(self._runs), 4))
+    def __iter__(self) -> Iterator[Stretch]:
+        return (Stretch(*self._runs[at : at + 4]) for at in range(0, len(self._runs), 4))
 
     def numbers(self, names: Sequence[Hashable], anchors: Sequence[Hashable] = ()) -> Samples:
         """Numbers of all states, shape (states, len(names)).
@@ -197,7 +197,7 @@ class Blocks:
                     "columns was expected; cut the file before this state"
                 )
 
-    def _offsets(self, run: Run, layout: Layout, names: Sequence[Hashable]) -> Addresses:
+    def _offsets(self, run: Stretch, layout: BlockLayout, names: Sequence[Hashable]) -> Addresses:
         for name in names:
             if layout.fields.get(name, UNSURE) == UNSURE:
                 raise FormatError(
@@ -215,16 +215,15 @@ class Blocks:
         self.complete = not self._data[self._end : self._end + 4096].strip()
         self.states, self.tail, self.rest = 0, self._begin, None
         recent: list[tuple[int, int]] = []
-        previous: Layout | None = None
+        previous: BlockLayout | None = None
         position = self._find(self._begin)
         while position is not None:
             example, stride, count = self._known(position, recent) or self._new(position, recent)
             layout = self.layout(example, stride)
             self.tail = position + (count - 1) * stride
-            following = position + count * stride
-            is_last = following >= self._end
+            is_last = (following := position + count * stride) >= self._end
             if (layout.broken_off or is_last) and not self._is_whole(layout, previous):
-                self._leave_out(Run(position, stride, 1, example), is_last)
+                self._leave_out(Stretch(position, stride, 1, example), is_last)
             else:
                 self._runs.extend((position, stride, count, example))
                 self.states += count
@@ -233,10 +232,10 @@ class Blocks:
         if not self.complete and not self.notes:
             self.notes = ("the file stops inside a line, which was left out",)
 
-    def _is_whole(self, layout: Layout, previous: Layout | None) -> bool:
+    def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
         return self._grammar.whole(layout) if previous is None else previous.last in layout.fields
 
-    def _leave_out(self, block: Run, is_last: bool) -> None:
+    def _leave_out(self, block: Stretch, is_last: bool) -> None:
         if is_last:
             self.complete, self.rest = False, block
         where = "the file" if is_last else "a leg of the run"
@@ -265,7 +264,7 @@ class Blocks:
     def _count(self, position: int, example: int, stride: int) -> int:
         """Count the blocks from ``position`` on that look like the example and have another behind them."""
         literal, start = self.layout(example, stride).literal, self._grammar.start
-        run = Run(position, stride, (self._end - position) // stride, example)
+        run = Stretch(position, stride, (self._end - position) // stride, example)
         if self._compared:
             count = self._like_example(run, 0, literal)
         else:
@@ -274,11 +273,11 @@ class Blocks:
             count = self._like_example(run._replace(repeats=count), stride - 1, literal[-1:])
         return count if self.text(position + count * stride, len(start)) == start else max(0, count - 1)
 
-    def _like_example(self, run: Run, offset: int, literal: Bytes) -> int:
+    def _like_example(self, run: Stretch, offset: int, literal: Bytes) -> int:
         """Count the blocks of ``run`` that have, from ``offset`` on, the literal bytes of its example."""
         size = literal.size
         template = self._data.view(run.example + offset, run.example + offset + size) & literal
-        done, step = 0, 1
+        done, step = (0, 1) if size else (run.repeats, 1)
         while done < run.repeats:
             step = min(step, run.repeats - done)
             first = run.start + done * run.stride + offset
@@ -299,7 +298,7 @@ class Blocks:
         span = self._data.view(first, first + (count - 1) * stride + size)
         return np.ndarray((count, size), np.uint8, span, strides=(stride, 1))
 
-    def _alike(self, run: Run, layout: Layout, offsets: Addresses, anchors: Sequence[Hashable]) -> bool:
+    def _alike(self, run: Stretch, layout: BlockLayout, offsets: Addresses, anchors: Sequence[Hashable]) -> bool:
         """Tell whether in all blocks of ``run`` the text from anchors to numbers is that of its example."""
         if not anchors or (run.repeats == 1 and run.start == run.example):
             return True
@@ -352,10 +351,6 @@ class Blocks:
             if found >= 0:
                 return first + found + 1
         return 0
-
-
-def _described(data: Content, end: int, grammar: Grammar, start: int, size: int) -> Layout:
-    return grammar.describe(data[start : min(start + size, end)])
 
 
 def _all_like(template: Bytes, literal: Bytes, rows: Bytes) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
-from d2rpick.histories.formats.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
+from d2rpick.histories.formats.fixed_text import UNSURE, BlockLayout, Blocks, Grammar, head, release
 from d2rpick.histories.formats.written_head import written_head
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ class Glstat(SolverFile):
         return tuple(name for name in names if name != _TIME)
 
 
-def _describe(block: bytes) -> Layout:
+def _describe(block: bytes) -> BlockLayout:
     literal = np.full(len(block), 255, np.uint8)
     behind = 0
     fields: dict[Hashable, int] = {}
@@ -144,10 +144,10 @@ def _describe(block: bytes) -> Layout:
     release(literal, block, _CHANGING, behind, len(block))
     if mixed:  # with lines of another state: any of them may be
         fields = {name: place if name == _TIME else UNSURE for name, place in fields.items()}
-    return Layout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
+    return BlockLayout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
 
 
-def _is_whole(layout: Layout) -> bool:
+def _is_whole(layout: BlockLayout) -> bool:
     return _LAST in layout.fields
 
 

@@ -59,7 +59,7 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Layout:
+class DirectoryLayout:
     """The variables of a directory; ``doubled`` are the names that stand in it more than once."""
 
     variables: dict[str, Variable]
@@ -133,7 +133,7 @@ class Lsda:
         Start and layout of each visit to the directory ``metadata`` of a wanted branch.
     odd : dict of str to list of str
         Other directories of each wanted branch that hold variables.
-    layouts : list of Layout
+    layouts : list of DirectoryLayout
     names : set of str
         All top-level directories.
     stop : str
@@ -153,7 +153,7 @@ class Lsda:
         self.visits = {branch: Visits() for branch in branches}
         self.metadata: dict[str, list[tuple[int, int]]] = {branch: [] for branch in branches}
         self.odd: dict[str, list[str]] = {branch: [] for branch in branches}
-        self.layouts: list[Layout] = []
+        self.layouts: list[DirectoryLayout] = []
         self.names: set[str] = set()
         self.stop = self.unfinished = ""
         self._known: dict[tuple[bytes, ...], int] = {}
@@ -239,7 +239,7 @@ class Lsda:
         else:
             self.odd[path[0]].append(path[1])
 
-    def _layout(self, records: list[bytes]) -> Layout:
+    def _layout(self, records: list[bytes]) -> DirectoryLayout:
         """Sort out the heads of a directory's records; one that makes no sense holds no variable."""
         variables: dict[str, Variable] = {}
         doubled = set()
@@ -256,7 +256,7 @@ class Lsda:
                     doubled.update({name} & variables.keys())
                     variables[name] = Variable(offset + len(record), dtype, values // dtype.itemsize)
             offset += length
-        return Layout(variables, frozenset(doubled))
+        return DirectoryLayout(variables, frozenset(doubled))
 
     def _form(self, heads: tuple[bytes, ...]) -> _Form:
         mask, fixed = bytearray(), bytearray()

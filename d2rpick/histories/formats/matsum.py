@@ -17,7 +17,7 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
-from d2rpick.histories.formats.fixed_text import UNSURE, Blocks, Grammar, Layout, head, release
+from d2rpick.histories.formats.fixed_text import UNSURE, BlockLayout, Blocks, Grammar, head, release
 from d2rpick.histories.formats.written_head import written_head
 from d2rpick.histories.history import Part
 
@@ -198,12 +198,12 @@ def _written(number: int, internal: float, kinetic: float, x_momentum: float, z_
     )
 
 
-def _is_whole(legend: Mapping[int, str], layout: Layout) -> bool:
+def _is_whole(legend: Mapping[int, str], layout: BlockLayout) -> bool:
     """Judge a state that stands alone: only the legend can tell."""
     return bool(legend) and all((id_, _MAT) in layout.fields for id_ in legend)
 
 
-def _describe(legend: Mapping[int, str], block: bytes) -> Layout:
+def _describe(legend: Mapping[int, str], block: bytes) -> BlockLayout:
     literal = np.full(len(block), 255, np.uint8)
     behind = 0
     fields: dict[tuple[int | None, str], int] = {}
@@ -227,7 +227,7 @@ def _describe(legend: Mapping[int, str], block: bytes) -> Layout:
                 literal[field.start(2) : field.end(2)] = 0
                 fields[name] = field.start(2)
     release(literal, block, _CHANGING, behind, len(block))
-    return Layout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
+    return BlockLayout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
 
 
 def _part_number(legend: Mapping[int, str], text: bytes, block: bytes) -> int:

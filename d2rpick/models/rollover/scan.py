@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +11,10 @@ from d2rpick.errors import RangeError
 from d2rpick.models.rollover.motion import Motion
 from d2rpick.models.rollover.record import BOX
 from d2rpick.models.rollover.run import Window, proceed, run_to
+from d2rpick.studies.workers import answers, cores, on_cores
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.models.rollover.model import Parameters
     from d2rpick.models.rollover.record import Record
@@ -72,20 +71,28 @@ def scan(
     for each core; 1: this one).
     """
     end = comparison_end(reference, td)
-    motion = Motion(parameters, _interval(reference))
-    if jobs == 1:
-        for tr in sorted(times):
-            run_to(motion, tr)
-            yield compare(reference, proceed(motion.copy(), end, Window(tr, td)), tr, td)
-        return
-    # a fresh process is safe whatever threads this one runs
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        tasks = []
-        for tr in sorted(times):
-            run_to(motion, tr)
-            tasks.append((tr, pool.submit(proceed, motion.copy(), end, Window(tr, td))))
-        for tr, task in tasks:
-            yield compare(reference, task.result(), tr, td)
+    ready: dict[int, Record] = {}
+    ordered = sorted(times)
+    following = 0
+    with on_cores(jobs or cores(), "d2rpick.models.rollover.run") as farm:
+        for answer in answers(farm, _switched, _branches(Motion(parameters, _interval(reference)), ordered, td, end)):
+            if answer.error:
+                raise answer.error
+            ready[answer.number] = answer.result
+            while following in ready:
+                yield compare(reference, ready.pop(following), ordered[following], td)
+                following += 1
+
+
+def _branches(motion: Motion, times: Iterable[float], td: float, end: float) -> Iterator[tuple[Motion, float, Window]]:
+    """Advance the reference from one tr to the next, and leave a copy of it at each."""
+    for tr in times:
+        run_to(motion, tr)
+        yield motion.copy(), end, Window(tr, td)
+
+
+def _switched(branch: tuple[Motion, float, Window]) -> Record:
+    return proceed(*branch)
 
 
 def compare(reference: Record, switched: Record, tr: float, td: float) -> Outcome:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
+import pytest
 from hypothesis import given
 
 from d2rpick.errors import FormatError
@@ -91,3 +92,26 @@ def test_many_blocks_that_all_differ_are_read() -> None:
     assert list(zip(run.time.tolist(), run.channel("internal energy").tolist(), strict=True)) == [
         (time, energies[0]) for time, energies in glstat_states(text)
     ]
+
+
+def test_a_first_line_longer_than_any_is_no_fault() -> None:
+    """As a disk leaves it that lost a block of its bytes."""
+    text = MATSUM[3]
+    second = borders(text, b" time =")[1]
+    blank = text[: second + 10] + bytes(1400) + text[second + 1410 :]
+    with pytest.raises(FormatError):
+        matsum.Matsum(blank, "matsum")
+
+
+def test_a_fragment_of_another_state_is_refused() -> None:
+    """Lines of one state that end up in another leave a name twice, or a line that has lost some of its columns."""
+    states = GLSTAT.split(b" dt of cycle")
+    energy = states[4].index(b" internal energy")
+    torn = states[4][: energy + 27] + states[2][states[2].index(b" hourglass") :]
+    doubled = states[4][:energy] + states[2][states[2].index(b" kinetic") :]
+    for mixed in (torn, doubled):
+        run = glstat.Glstat(b" dt of cycle".join([*states[:4], mixed, *states[5:]]), "glstat")
+        with pytest.raises(FormatError, match="missing, cut or doubled"):
+            run.channel("internal energy")
+        with pytest.raises(FormatError, match="missing, cut or doubled"):
+            run.channel("kinetic energy")

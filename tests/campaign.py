@@ -1,0 +1,223 @@
+"""A campaign of damaged inputs over all formats: ``python -m tests.campaign --inputs 1000000 --seed 1``.
+
+Each input is made from the seed and its number alone.  Whatever the damage, a reader gives the numbers that stand in
+the file or an error of d2rpick in one line; anything else, a warning and the death of the process among them, is a
+fault.  Counts are printed for each format; exit code 1 when there is a fault.  ``--only FORMAT NUMBER`` repeats one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import warnings
+from collections import Counter
+from functools import cache, partial
+from itertools import pairwise
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.deck.reader import read_deck
+from d2rpick.errors import D2RPickError
+from d2rpick.histories.formats import csv_table, hdf5_file
+from d2rpick.histories.history import History
+from d2rpick.histories.opening import Selection, open_run
+from d2rpick.studies.workers import answers, cores, on_cores
+from tests.command import DECK
+from tests.faults import Fault, damage
+from tests.hdf5_files import plain, written
+from tests.histories.formats import test_curves, test_faults_binary, test_faults_text
+from tests.reading import run_of, states_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_CHUNK: Final = 200  # inputs of one task
+_SHOWN: Final = 5  # faults of a format that are printed
+_KINDS: Final = ("flip", "cut", "drop", "double", "swap", "insert", "blank")
+_LIKELY: Final = b"\n 0123456789.,;E+-*eND\"'\x00\x1b\xff"
+_NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
+_CSV: Final = b"time,internal_energy,kinetic_energy\n" + b"".join(
+    b"%.3f,%.5e,%.4f\n" % (state / 8, state**3 - 10, state) for state in range(40)
+)
+
+
+def faults(random: Random) -> list[Fault]:
+    """One to three faults anywhere."""
+    return [
+        (random.choice(_KINDS), random.random(), random.random(), random.choice([random.randrange(256), *_LIKELY]))
+        for _ in range(random.randint(1, 3))
+    ]
+
+
+def glstat(random: Random) -> bool:
+    """Damage a glstat; whether it could be read."""
+    return test_faults_text.check_glstat(faults(random))
+
+
+def matsum(random: Random) -> bool:
+    """Damage a matsum of three or four lines for each part."""
+    return test_faults_text.check_matsum(faults(random), random.choice((3, 4)))
+
+
+def binout(random: Random) -> bool:
+    """Damage the structure of a binout, or lose, double and move its records."""
+    made = random.choice((test_faults_binary.BINOUT, test_faults_binary.LONG))
+    places = test_faults_binary.BINOUT_STRUCTURE if made is test_faults_binary.BINOUT else made.marks
+    return bool(test_faults_binary.true_binout(_restructured(random, bytes(made.data), made.marks, places, 1)))
+
+
+def time_history(random: Random) -> bool:
+    """Damage the structure of a T01; runs of records as long as a state are left alone, since nothing tells them."""
+    made, places = test_faults_binary.T01, test_faults_binary.T01_STRUCTURE
+    return bool(test_faults_binary.true_t01(_restructured(random, bytes(made.data), made.marks, places, 5)))
+
+
+def csv(random: Random) -> bool:
+    """Damage a table; what is read stands in one line."""
+    return _table(damage(_CSV, faults(random), []))
+
+
+def curves(random: Random) -> bool:
+    """Damage a file of curves."""
+    text = random.choice((test_curves.CURVEPLOT, test_curves.T_HIS)).encode()
+    return _table(damage(text, faults(random), []))
+
+
+def hdf5(random: Random) -> bool:
+    """Damage an HDF5 file; its numbers bear no mark of their own."""
+    data = damage(_hdf5(), faults(random), [])
+    return bool(_read(lambda: run_of(hdf5_file, data).history(Selection())))
+
+
+def deck(random: Random) -> bool:
+    """Damage a deck."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder, "deck.k")
+        file.write_bytes(damage(Path(DECK).read_bytes(), faults(random), []))
+        return bool(_read(lambda: list(read_deck(str(file)).cards)))
+
+
+def companions(random: Random) -> bool:
+    """Damage one or both of a glstat and the matsum of the same run."""
+    with TemporaryDirectory() as folder:
+        contents = {"glstat": test_faults_text.GLSTAT, "matsum": test_faults_text.MATSUM[4]}
+        for name in random.choice((("glstat",), ("matsum",), ("glstat", "matsum"))):
+            contents[name] = damage(contents[name], faults(random), [])
+        for name, content in contents.items():
+            Path(folder, name).write_bytes(content)
+        parts = random.choice(((), ("12",), ("1", "12", "13")))
+        selection = Selection(parts=parts)
+        return bool(_read(lambda: open_run([folder], selection).history(selection, with_momenta=True)))
+
+
+FORMATS: Final[dict[str, Callable[[Random], bool]]] = {
+    "glstat": glstat, "matsum": matsum, "binout": binout, "radioss-th": time_history, "hdf5": hdf5, "csv": csv,
+    "curves": curves, "deck": deck, "companions": companions,
+}  # fmt: skip
+
+
+def case(form: str, seed: int, number: int) -> str:
+    """What became of one input: ``read``, ``refused``, or the fault."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return "read" if FORMATS[form](Random(f"{form} {seed} {number}")) else "refused"
+        except Exception as error:  # noqa: BLE001  whatever it is, it is a fault
+            return f"number {number}: {type(error).__name__}: {' '.join(str(error).split())[:150]}"
+
+
+def chunk(seed: int, task: tuple[str, range]) -> tuple[str, Counter[str]]:
+    """Outcomes of some inputs of one format."""
+    form, numbers = task
+    return form, Counter(case(form, seed, number) for number in numbers)
+
+
+def main() -> int:
+    """Run the campaign."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--inputs", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", nargs=2, metavar=("FORMAT", "NUMBER"))
+    options = parser.parse_args()
+    if options.only:
+        print(case(options.only[0], options.seed, int(options.only[1])))
+        return 0
+    each = -(-options.inputs // len(FORMATS))
+    tasks = [(form, range(at, min(at + _CHUNK, each))) for at in range(0, each, _CHUNK) for form in FORMATS]
+    found: dict[str, Counter[str]] = {form: Counter() for form in FORMATS}
+    with on_cores(cores(), "tests.faults") as farm:
+        for answer in answers(farm, partial(chunk, options.seed), tasks):
+            form, numbers = tasks[answer.number]
+            found[form] += Counter({f"{numbers}: {answer.error}": 1}) if answer.error else answer.result[1]
+    print(f"{'format':<12} {'inputs':>9} {'read':>9} {'refused':>9} {'faults':>9}")
+    for form, counts in found.items():
+        wrong = [what for what in counts if what not in ("read", "refused")]
+        print(f"{form:<12} {each:>9} {counts['read']:>9} {counts['refused']:>9} {len(wrong):>9}")
+        print(*(f"  {what}" for what in wrong[:_SHOWN]), sep="\n", end="\n" if wrong else "")
+    return int(any(counts.keys() - {"read", "refused"} for counts in found.values()))
+
+
+def _restructured(random: Random, data: bytes, marks: list[int], places: list[int], state: int) -> bytes:
+    """Flip bytes of structure, cut, insert, or move records; never ``state`` of them, or a multiple."""
+    changed = bytearray(data)
+    what = random.choice(("flip", "cut", "insert", "lost", "twice", "moved"))
+    if what == "flip":
+        for _ in range(random.randint(1, 4)):
+            changed[random.choice(places)] = random.randrange(256)
+        return bytes(changed)
+    at = random.choice(marks)
+    if what == "cut":
+        return data[: random.randrange(len(data))]
+    if what == "insert":
+        changed[at:at] = random.randbytes(random.randint(1, 40))
+        return bytes(changed)
+    edges = [*marks, len(data)]
+    records = [data[begin:end] for begin, end in pairwise(edges)]
+    first, length = random.randrange(len(records)), random.randint(1, 30)
+    length += state > 1 and length % state == 0
+    moved = records[first : first + length]
+    if what != "twice":
+        del records[first : first + length]
+    if what != "lost" and (state == 1 or len(moved) % state):
+        at = random.randint(0, len(records))
+        records[at:at] = moved
+    return data[: marks[0]] + b"".join(records)
+
+
+def _read(read: Callable[[], object]) -> object:
+    """What is read; None for an error of ours in one line."""
+    try:
+        return read() or True
+    except D2RPickError as error:
+        message = str(error)
+    assert "\n" not in message, "an error of several lines"
+    return None
+
+
+def _table(data: bytes) -> bool:
+    """Read a table; whether it could be.  A state must stand in one line, whatever the decimal sign."""
+    history = _read(lambda: run_of(csv_table, data).history(Selection()))
+    if not isinstance(history, History):
+        return False
+    text = data.decode("latin-1")
+    lines = [set(_numbers(line)) for line in re.split(r"[\r\n]+", text)]
+    for time, energy in states_of(history):
+        assert any({time, energy} <= line for line in lines), f"({time}, {energy}) stands in no line"
+    return True
+
+
+def _numbers(line: str) -> list[float]:
+    texts = [*_NUMBER.findall(line), *_NUMBER.findall(line.replace(",", "."))]
+    return [float(text.upper().replace("D", "E")) for text in texts]
+
+
+@cache
+def _hdf5() -> bytes:
+    return written(plain).getvalue()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

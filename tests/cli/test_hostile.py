@@ -1,0 +1,207 @@
+"""Closed streams, full disks, interrupts, hostile names and damaged files: one line, or the result."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, run, started
+from tests.shared import shared
+from tests.text_files import glstat_text, matsum_text
+
+HOSTILE = "energy\n\x1b[31mred.csv"
+
+
+def child(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:
+    """Call the program by a shell, which can close its streams and limit its memory; ``$@`` are the arguments."""
+    program = f'd2rpick() {{ "{sys.executable}" -m d2rpick "$@"; }}; {command}'
+    return subprocess.run(
+        ["bash", "-c", program, "bash", *args], cwd=ROOT, capture_output=True, text=True, check=False,
+        timeout=TIME_LIMIT,
+    )  # fmt: skip
+
+
+def one_line(found: subprocess.CompletedProcess[str]) -> str:
+    """Message of a call that could not run."""
+    assert (found.returncode, found.stdout, found.stderr.count("\n")) == (2, "", 1), found
+    assert "a fault of this program" not in found.stderr
+    return found.stderr
+
+
+def test_standard_input_that_is_closed_is_told() -> None:
+    assert "-: standard input is closed" in one_line(child("d2rpick info - <&-"))
+    assert "-: standard input is closed" in one_line(child("d2rpick study --td 1 --from - <&-"))
+
+
+def test_a_closed_stderr_loses_no_result() -> None:
+    found = child('d2rpick suggest --td 0.064 -f value "$@" 2>&-', ENERGY)
+    assert found.returncode == 0
+    assert float(found.stdout) == pytest.approx(0.0128852793630525)
+
+
+def test_a_pipe_in_place_of_a_file_is_read_once_and_signed() -> None:
+    found = child('d2rpick suggest --td 0.064 -f json <(cat "$1"); d2rpick suggest --td 0.064 -f json "$1"', ENERGY)
+    piped, plain = found.stdout.split("\n}\n{")
+    digests = [json.loads(text)["history"]["sha256"] for text in (f"{piped}}}", f"{{{plain}")]
+    assert digests[0] == digests[1]
+
+
+def test_a_full_disk_is_told_of_the_file_that_it_holds(tmp_path: Path) -> None:
+    ledger = tmp_path / "ledger"
+    message = one_line(child('ulimit -f 0; d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY))
+    assert f"{ledger}: cannot be written (File too large); make room" in message
+    ledger.unlink()
+    ledger.symlink_to(os.devnull)
+    assert "not a regular file" in one_line(child('d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY))
+
+
+def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> None:
+    packed = tmp_path / "zeros.gz"
+    packed.write_bytes(50 * gzip.compress(bytes(1 << 24)))
+    message = one_line(child('ulimit -v 700000; d2rpick info "$1"', packed))
+    assert "zeros.gz: what is packed in it does not fit into memory" in message
+
+
+def test_an_interrupted_scan_shows_no_tracebacks() -> None:
+    with started("rollover", "--scan", "--jobs", "2", text=True) as process:
+        time.sleep(3)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
+        _, told = process.communicate()
+    assert process.returncode == 2
+    assert "Traceback" not in told
+    assert told.splitlines()[-1] == "d2rpick: interrupted"
+
+
+@pytest.fixture
+def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    Path(HOSTILE).write_bytes(Path(ENERGY).read_bytes())
+    return HOSTILE
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ("suggest", "--td", "0.064"), ("info",), ("info", "-f", "csv"),
+        ("verify", "--tr", "0.0128853", "--td", "0.064"), ("info", "-f", "markdown"), ("study", "--td", "0.064"),
+        ("study", "--td", "0.064", "-f", "csv"), ("study", "--td", "0.064", "-f", "markdown"),
+        ("suggest", "--td", "9"), ("suggest", "--td", "0.064", "--energy", "no\nsuch\x1b"),
+    ],
+)  # fmt: skip
+def test_a_hostile_name_is_shown_escaped(hostile: str, args: tuple[str, ...]) -> None:
+    result = run(*args, hostile)
+    shown = result.stdout + result.stderr
+    assert "\x1b" not in shown
+    assert "energy\\n\\x1b[31mred.csv" in shown
+    assert not any(line.startswith(("red", "[31m", "\\x1b[31m")) for line in shown.splitlines())
+
+
+def test_json_keeps_a_hostile_name(hostile: str) -> None:
+    assert json.loads(run("info", "-f", "json", hostile).stdout)["source"] == [hostile]
+
+
+def test_a_study_of_a_name_that_is_no_text_can_be_reported(tmp_path: Path) -> None:
+    name = os.fsdecode(os.fsencode(tmp_path / "run") + b"\xff.csv")
+    Path(name).write_bytes(Path(ENERGY).read_bytes())
+    result = run("study", "--td", "0.064", "--report", str(tmp_path / "page.html"), name, ENERGY)
+    assert result.exit_code == 0
+    assert "run\ufffd.csv" in (tmp_path / "page.html").read_text("utf-8")
+
+
+def test_links_in_a_circle_give_each_run_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("run.csv").write_bytes(Path(ENERGY).read_bytes())
+    Path("again").symlink_to(".")
+    Path("self.csv").symlink_to("self.csv")
+    found = json.loads(run("study", "--td", "0.064", "-f", "json", "**/*.csv").stdout)
+    assert [one["source"] for one in found["runs"]] == ["run.csv", "self.csv"]
+    assert [one["status"] for one in found["runs"]] == ["ok", "unreadable"]
+    assert run("info", "-f", "json", "**/run.csv").exit_code == 0
+
+
+def test_a_deck_is_called_a_deck() -> None:
+    result = run("info", "sample_data/switching.k")
+    assert "sample_data/switching.k: this is a deck, an energy history was expected" in result.stderr
+
+
+@pytest.mark.parametrize("damage", ["123", "null", "[]", '{"files": 1}', '{"files": [{"name": "x"}]}', "{", "\ufffd"])
+def test_a_damaged_line_of_a_resume_file_is_passed_over(damage: str, tmp_path: Path) -> None:
+    ledger = tmp_path / "ledger.ndjson"
+    args = ("study", "--td", "0.064", "-f", "json", "--resume", str(ledger), ENERGY)
+    whole = run(*args)
+    ledger.write_text(f"{ledger.read_text()}{damage}\n")
+    again = run(*args)
+    assert (again.exit_code, json.loads(again.stdout)["runs"]) == (whole.exit_code, json.loads(whole.stdout)["runs"])
+    assert "1 of 1 runs taken" in again.stderr
+    assert "damaged or without a checksum: 1" in again.stderr
+
+
+def test_no_changed_byte_of_a_resume_file_gives_another_row(tmp_path: Path) -> None:
+    from d2rpick.choice.situation import Settings
+    from d2rpick.studies.resume_file import Ledger
+    from d2rpick.studies.study import Question, ask
+
+    file, question = tmp_path / "ledger", Question(0.064, Settings())
+    row = ask(question, ENERGY)
+    Ledger(str(file), question).add(row)
+    content = bytearray(file.read_bytes())
+    for place in range(11, len(content) - 1, 7):
+        content[place] ^= 1
+        file.write_bytes(content)
+        assert Ledger(str(file), question).find(ENERGY) is None
+        content[place] ^= 1
+
+
+def test_two_runs_are_not_legs_of_one(tmp_path: Path) -> None:
+    times = [0.0, 0.125, 0.25, 0.375, 0.5]
+    contents = {
+        "one": glstat_text(times, [0, 10, 20, 30, 40]),
+        "copy": glstat_text(times, [0, 10, 20, 30, 40]),
+        "other": glstat_text(times, [0, 10, 21, 30, 40]),
+        "restart": glstat_text(times[2:], [20, 35, 45]),  # another way from the state it begins with
+        "restart of another": glstat_text(times[2:], [25, 35, 45]),
+        "parts": matsum_text(times, [7, 3], [[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]),
+        "other parts": matsum_text(times, [7, 3], [[0, 0], [1, 1], [2, 5], [3, 3], [4, 4]]),
+    }
+    names = {name: tmp_path / name for name in contents}
+    for name, content in contents.items():
+        names[name].write_bytes(content)
+    for one, other, legs in (
+        ("one", "copy", True), ("one", "other", False), ("one", "restart", True),
+        ("one", "restart of another", False), ("parts", "other parts", False), ("parts", "parts", True),
+    ):  # fmt: skip
+        for pair in ((one, other), (other, one)):
+            result = run("info", *(str(names[name]) for name in pair))
+            assert ("different energies at the same times" in result.stderr) is not legs
+            assert result.exit_code == (0 if legs else 2)
+
+
+@pytest.mark.parametrize("name", ["binout_signalling_nan_warning", "t01_signalling_nan_warning", "int_limit_matsum"])
+def test_odd_numbers_reach_no_warning_of_the_machine(name: str) -> None:
+    result = run("info", str(shared(f"faults/{name}")))
+    assert "RuntimeWarning" not in result.stderr
+    assert result.exit_code in (0, 2)
+
+
+def test_a_number_of_too_many_digits_is_no_part() -> None:
+    result = run("suggest", "--td", "0.1", "--part", "9" * 5000, "sample_data/rolloverT01.gz")
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert "no part" in result.stderr
+
+
+def test_lines_of_another_state_are_refused() -> None:
+    content = Path(GLSTAT).read_bytes()
+    begin = content.index(b" internal energy", len(content) // 2)
+    other = content.index(b" kinetic energy")
+    broken = content[: begin + 28] + content[other : other + 120] + content[begin + 40 :]
+    refused = run("suggest", "--td", "0.064", "-", stdin=broken)
+    assert refused.exit_code == 2
+    assert "'internal energy' is missing, cut or doubled" in refused.stderr
