@@ -154,7 +154,7 @@ def _run(options: dict[str, Any]) -> None:
         from d2rpick.report import figures, figures_models
 
         reference, switched = (simulated(), record) if windows else (record, None)
-        output.write(plot, figures.render(figures_models.draw_rollover(reference, switched, windows), plot))
+        output.write(plot, figures.render(figures_models.draw_rollover(parameters, reference, switched, windows), plot))
     if options["output_file"] or not plot:
         output.content(files.WRITERS[form](record))
 

@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from d2rpick.models.rollover.contact import Sled
 from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, finish, show_level
-from d2rpick.report.schemes import SCHEMES
+from d2rpick.report.schemes import SCHEMES, draw_sled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.history import Samples
     from d2rpick.models.exhibit import Exhibit, Panel
+    from d2rpick.models.rollover.model import Parameters
     from d2rpick.models.rollover.record import Record
     from d2rpick.models.rollover.run import Window
     from d2rpick.models.rollover.scan import Outcome
@@ -118,29 +120,74 @@ def _show(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
         show_level(axes, panel.levels[0][1], float(values.max()))
 
 
-def draw_rollover(reference: Record, switched: Record | None, windows: Sequence[Window] = ()) -> Figure:
-    """Outlines of the box at even times, with and without switching; beside them roll and height over time."""
-    figure = Figure(figsize=(11, 5.5), layout="constrained")
-    outlines, roll, height = figure.subplot_mosaic([["o", "r"], ["o", "h"]], width_ratios=(1.4, 1)).values()
-    runs = [(reference, REFERENCE, "without switching"), (switched, SWITCHED, "switched")]
-    for record, colour, name in [(record, colour, name) for record, colour, name in runs if record]:
-        shown = np.linspace(0, record.time.size - 1, _OUTLINES).round().astype(int)
-        closed = np.column_stack([record.outline[shown], record.outline[shown, 0]]).T
-        style = "-" if record is reference else "--"
-        outlines.plot(closed.real, closed.imag, color=colour, linewidth=0.9, linestyle=style)
-        roll.plot(record.time, np.degrees(record.roll), color=colour, linewidth=1, linestyle=style, label=name)
-        height.plot(record.time, record.centre.imag, color=colour, linewidth=1, linestyle=style, label=name)
-    outlines.set(aspect="equal", xlabel="x [m]", ylabel="z [m]")
-    outlines.set_title(f"box every {reference.time[-1] / (_OUTLINES - 1) * 1e3:.3g} ms", fontsize="medium")
-    outlines.grid(visible=True, linewidth=0.3)
-    roll.set(ylabel="roll [degrees]")
-    height.set(ylabel="height of the centre [m]", xlabel="time [s]")
-    for axes in (roll, height):
-        for number, window in enumerate(windows):
-            label = "_" if number else "rigid"
-            axes.axvspan(window.tr, window.td, color=FLIGHT, alpha=0.2, linewidth=0, label=label)
-        finish(axes)
+def draw_rollover(
+    parameters: Parameters, reference: Record, switched: Record | None = None, windows: Sequence[Window] = ()
+) -> Figure:
+    """Outlines of the box at even times with sled, curb and ground; roll and height over time, and what differs.
+
+    ``switched`` is the same box, rigid in ``windows``; without it there is nothing to compare.
+    """
+    rows = ["roll", "roll difference", "height", "height difference"] if switched else ["roll", "height"]
+    figure = Figure(figsize=(12, 8 if switched else 5.5), layout="constrained")
+    grid = figure.subplot_mosaic([["outlines", row] for row in rows], width_ratios=(1.4, 1))
+    _draw_outlines(grid["outlines"], parameters, reference, switched)
+    time = reference.time
+    runs = [(reference, REFERENCE, "-", "without switching")]
+    runs += [(switched, SWITCHED, "--", "switched")] if switched else []
+    for record, colour, style, name in runs:
+        drawn: dict[str, Any] = {"color": colour, "linewidth": 1, "linestyle": style, "label": name}
+        grid["roll"].plot(time, np.degrees(record.roll), **drawn)
+        grid["height"].plot(time, record.centre.imag, **drawn)
+    if switched:
+        name = "switched less without"
+        off = np.degrees(switched.roll - reference.roll)
+        grid["roll difference"].plot(time, off, color=REFERENCE, linewidth=1, label=name)
+        off = 1e3 * (switched.centre - reference.centre).imag
+        grid["height difference"].plot(time, off, color=REFERENCE, linewidth=1, label=name)
+    units = {
+        "roll": "roll [degrees]",
+        "roll difference": "[degrees]",
+        "height": "centre [m]",
+        "height difference": "[mm]",
+    }
+    for row in rows:
+        grid[row].set_ylabel(units[row])
+        _draw_times(grid[row], reference, windows)
+        finish(grid[row], legend=row in {"roll", "height"})
+    grid[rows[-1]].set_xlabel("time [s]")
     return figure
+
+
+def _draw_outlines(axes: Axes, parameters: Parameters, reference: Record, switched: Record | None) -> None:
+    """Outlines at even times, each with its time; the sled where it starts and where it comes to rest, the ground."""
+    shown = np.linspace(0, reference.time.size - 1, _OUTLINES).round().astype(int)
+    sled = Sled(parameters.speed, parameters.braking)
+    for time in (0.0, float(reference.time[-1])):
+        draw_sled(axes, parameters, sled.place(time))
+    for record, colour, style in ((reference, REFERENCE, "-"), (switched, SWITCHED, "--")):
+        if record:
+            closed = np.column_stack([record.outline[shown], record.outline[shown, 0]]).T
+            axes.plot(closed.real, closed.imag, color=colour, linewidth=0.9, linestyle=style)
+    for state in shown:
+        centre = reference.centre[state]
+        text = f"{1e3 * reference.time[state]:.0f}"
+        axes.text(centre.real, centre.imag, text, fontsize="small", ha="center", va="center", color=GOOD)
+    axes.set(aspect="equal", xlabel="x [m]", ylabel="z [m]")
+    around = "; sled at start and end, curb, ground" if parameters.drop is None else "; ground"
+    axes.set_title(f"box at the times named [ms]{around}", fontsize="medium")
+    axes.grid(visible=True, linewidth=0.3)
+
+
+def _draw_times(axes: Axes, reference: Record, windows: Sequence[Window]) -> None:
+    """Shade the rigid windows; mark when the sled pushed last and when the ground pushes."""
+    for number, window in enumerate(windows):
+        label = "_" if number else "rigid"
+        axes.axvspan(window.tr, window.td, color=FLIGHT, alpha=0.2, linewidth=0, label=label)
+    if reference.released is not None:
+        axes.axvline(reference.released, color=GOOD, linestyle=":", linewidth=1, label="sled pushed last")
+    for number, (start, _) in enumerate(reference.landings):
+        label = "_" if number else "landing"
+        axes.axvline(start, color=SWITCHED, linestyle=":", linewidth=1, label=label)
 
 
 def draw_scan(reference: Record, outcomes: Sequence[Outcome], answer: Suggestion) -> Figure:

@@ -21,6 +21,8 @@ from tests.command import answer, codes, run, started
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from matplotlib.lines import Line2D
+
 SMALL = ("--mesh", "4", "--dt", "2e-4")
 SHORT = (*SMALL, "--t-end", "0.12")
 COLUMNS = (
@@ -82,14 +84,29 @@ def test_a_box_that_falls_is_switched_in_several_windows(tmp_path: Path) -> None
 def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
     window = Window(0.05, 0.2)
     reference, switched = (simulate(Parameters(mesh=4), 0.25, *rigid, interval=5e-4) for rigid in ((), (window,)))
-    outlines, roll, height = figures_models.draw_rollover(reference, switched, (window,)).axes
-    assert len(outlines.lines) == 16
-    corners = np.asarray(outlines.lines[8].get_xydata())
-    np.testing.assert_array_equal(corners[0], corners[-1])
+    figure = figures_models.draw_rollover(Parameters(mesh=4), reference, switched, (window,))
+    outlines, roll, roll_off, height, height_off = figure.axes
+    drawn = [points(line) for line in outlines.lines]
+    assert set(drawn[0][:, 1]) == {-Parameters().ground}
+    boxes = [outline for outline in drawn if len(outline) > 2]
+    assert len(boxes) == 16
+    np.testing.assert_array_equal(boxes[8][0], boxes[8][-1])
+    assert len(outlines.patches) == 4  # floor and curb, at the start and at the end
+    assert [text.get_text() for text in outlines.texts][0::7] == ["0", "250"]
     for axes in (roll, height):
-        assert axes.get_legend_handles_labels()[1] == ["without switching", "switched", "rigid"]
-    np.testing.assert_array_equal(roll.lines[1].get_ydata(), np.degrees(switched.roll))
-    np.testing.assert_array_equal(height.lines[0].get_ydata(), reference.centre.imag)
+        named = axes.get_legend_handles_labels()[1]
+        assert named == ["without switching", "switched", "rigid", "sled pushed last"]
+    off = (np.degrees(switched.roll - reference.roll), 1e3 * (switched.centre - reference.centre).imag)
+    wanted = (np.degrees(switched.roll), reference.centre.imag, *off)
+    for line, values in zip(
+        (roll.lines[1], height.lines[0], roll_off.lines[0], height_off.lines[0]), wanted, strict=True
+    ):
+        np.testing.assert_allclose(points(line)[:, 1], values)
+
+
+def points(line: Line2D) -> np.ndarray:
+    """Points of a line that was drawn."""
+    return np.asarray(line.get_xydata(), dtype=np.float64)
 
 
 def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:

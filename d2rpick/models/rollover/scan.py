@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from d2rpick.models.rollover.model import Parameters
     from d2rpick.models.rollover.record import Record
 
-# Between the times of a scan [s], while the load may last and then; and how long before td the last one is.
-_FINE, _COARSE, _LAST = 0.003, 0.02, 0.03
+# Between the times of a scan [s], while the load may last and then; and how long before td the last one is.  In the
+# flight the energy swings at 40 Hz, twice the lowest mode: six times in each swing show it as it is.
+_FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Outcome:
 
 
 def scan_times(released: float, td: float) -> list[float]:
-    """Times for tr: close together until half as long again after the load, sparse in the flight up to td [s].
+    """Times for tr: closest until half as long again after the load, then close enough for the vibration, up to td [s].
 
     RangeError when td leaves no time for any.
     """

@@ -1,0 +1,73 @@
+"""The runs of the solver that the documentation quotes: decks, legs, comparison, figures."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.command import ROOT
+from validation.compare import Run, compare, read
+from validation.figures import FIGURES
+from validation.models import MODELS
+from validation.run import run
+
+TD = 0.068753
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_deck_is_a_starter_deck_with_the_main_node_of_its_rigid_body(name: str) -> None:
+    deck = MODELS[name].deck().decode()
+    assert deck.startswith("#RADIOSS STARTER")
+    assert re.search(rf"/RBODY/1\n.*\n *{MODELS[name].main} ", deck)
+    assert "/TH/PART" in deck
+
+
+@pytest.mark.parametrize(
+    ("windows", "ends", "rigid"),
+    [
+        ([], ["0.15"], [False]),
+        ([(0.01, 0.05)], ["0.01", "0.05", "0.15"], [False, True, False]),
+        ([(0.0, 0.05)], ["0.05", "0.15"], [True, False]),
+        ([(0.01, 0.05), (0.07, 0.08)], ["0.01", "0.05", "0.07", "0.08", "0.15"], [False, True, False, True, False]),
+    ],
+)
+def test_the_legs_follow_the_windows(windows: list[tuple[float, float]], ends: list[str], rigid: list[bool]) -> None:
+    legs = list(MODELS["OSC"].legs(windows))
+    assert [leg.splitlines()[1] for leg in legs] == ends
+    assert ["/DTIX" in leg for leg in legs] == rigid
+    assert ["/RBODY/OFF" in leg for leg in legs] == [not one for one in rigid]
+    assert ["/INIV" in leg for leg in legs] == [True] + [False] * (len(legs) - 1)
+
+
+def test_a_run_that_is_its_own_reference_has_no_deviation_and_a_late_landing_is_seen() -> None:
+    time = np.linspace(0, 1, 1001)
+    reference = Run(time, 1 + np.sin(30 * time) ** 2, np.maximum(time - 0.8, 0.0))
+    found = compare(reference, reference, 0.5)
+    assert found.deviation == 0.0
+    assert found.mean_ratio == pytest.approx(1.0)
+    assert found.landing == pytest.approx(0.801, abs=1e-3)
+    late = compare(reference, reference._replace(contact=np.maximum(time - 0.81, 0.0)), 0.5)
+    assert late.shifts == pytest.approx([0.01], abs=1e-3)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_figure_is_drawn_from_the_results_and_shown_in_the_docs(name: str) -> None:
+    assert all(axes.lines or axes.patches for axes in FIGURES[name]().axes)
+    assert f"validation/{name}.png" in (ROOT / "docs" / "validation.md").read_text("utf-8")
+    assert (ROOT / "docs" / "validation" / f"{name}.png").is_file()
+
+
+@pytest.mark.skipif("OPENRADIOSS_PATH" not in os.environ, reason="OPENRADIOSS_PATH names no solver")
+def test_the_solver_confirms_the_better_pair_of_the_oscillator(tmp_path: Path) -> None:
+    solver = Path(os.environ["OPENRADIOSS_PATH"])
+    reference, switched = (
+        read([str(leg) for leg in run(MODELS["OSC"], tmp_path / name, windows, solver)])
+        for name, windows in (("reference", []), ("switched", [(0.013587, TD)]))
+    )
+    found = compare(reference, switched, TD)
+    assert found.deviation < 0.01
+    assert found.mean_ratio == pytest.approx(1.0, abs=0.02)

@@ -1,0 +1,5 @@
+"""Runs of a real solver that the documentation quotes: decks, results, and how to repeat them.
+
+``python -m validation.run MODEL FOLDER`` runs a deck where OpenRadioss is installed, switched or not;
+``python -m validation.figures`` draws the figures of docs/validation.md from ``results``.
+"""

@@ -1,0 +1,88 @@
+"""Hold a switched run against the reference, by their time histories: ``python -m validation.compare --help``.
+
+The internal energy from td to the next landing, and when the contacts begin.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from d2rpick.histories.opening import Selection, open_run
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.histories.history import Samples
+
+# A contact has begun when its energy has changed by this share of its range since the state before.
+_CONTACT = 1e-4
+# Changes that follow each other within this time belong to one contact [s]: the corners of a shell rattle.
+_SAME_CONTACT = 5e-3
+
+
+class Run(NamedTuple):
+    """Internal energy of the model and energy of its contacts over time (n,)."""
+
+    time: Samples
+    internal: Samples
+    contact: Samples
+
+    def contacts(self) -> list[float]:
+        """Times at which contacts begin [s]."""
+        size = float(np.ptp(self.contact))
+        changes = self.time[1:][np.abs(np.diff(self.contact)) > _CONTACT * size] if size else self.time[:0]
+        apart = np.diff(changes, prepend=-np.inf) > _SAME_CONTACT
+        return [float(time) for time in changes[apart]]
+
+
+class Comparison(NamedTuple):
+    """A switched run against its reference from td on.
+
+    ``deviation``: largest difference of the internal energy over its peak in the reference; ``mean_ratio``: of the mean
+    energies; both up to ``landing``, the next contact, or the end.  ``shifts`` of the contacts after td
+    [s], in order.
+    """
+
+    deviation: float
+    mean_ratio: float
+    landing: float
+    shifts: tuple[float, ...]
+
+
+def read(names: Sequence[str]) -> Run:
+    """Read the legs of a run."""
+    (database,) = open_run(names, Selection()).databases
+    return Run(database.time, *(database.channel(name) for name in ("internal_energy", "contact_energy")))
+
+
+def compare(reference: Run, switched: Run, td: float) -> Comparison:
+    """Hold a switched run against its reference."""
+    theirs, ours = ([time for time in run.contacts() if time > td] for run in (reference, switched))
+    landing = min([*theirs[:1], *ours[:1], float(reference.time[-1]), float(switched.time[-1])])
+    time = reference.time[(reference.time > td) & (reference.time < landing)]
+    wanted = np.interp(time, reference.time, reference.internal)
+    found = np.interp(time, switched.time, switched.internal)
+    shifts = tuple(one - other for one, other in zip(ours, theirs, strict=False))
+    return Comparison(
+        float(np.abs(found - wanted).max() / wanted.max()), float(found.mean() / wanted.mean()), landing, shifts
+    )
+
+
+def main() -> None:
+    """Print the comparison."""
+    parser = argparse.ArgumentParser(prog="python -m validation.compare", description=__doc__)
+    parser.add_argument("--td", type=float, required=True)
+    parser.add_argument("--reference", nargs="+", required=True)
+    parser.add_argument("--switched", nargs="+", required=True)
+    given = parser.parse_args()
+    found = compare(read(given.reference), read(given.switched), given.td)
+    print(f"internal energy after td  off by {found.deviation:.3g} of its peak, mean ratio {found.mean_ratio:.3f}")
+    print(f"compared up to            {found.landing:.6g}")
+    print(f"contacts shifted by       {', '.join(f'{1e3 * shift:+.2f}' for shift in found.shifts[:4]) or '-'} ms")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,133 @@
+"""The figures of docs/validation.md, from the results: ``python -m validation.figures``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, render
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+RESULTS: Final = Path(__file__).parent / "results"
+PLACE: Final = Path(__file__).resolve().parents[1] / "docs" / "validation"
+# Deviations after td of the oscillator's four runs: (tr, td) [ms], computed.
+_PAIRS: Final = (("6, 80", 5.64), ("13, 64", 0.888), ("12.89, 64", 0.901), ("13.587, 68.753", 0.005))
+# Windows of the falling box whose contacts are compared, and what they are called.
+_DROPS: Final = {
+    "drop2_pert": "not switched, start changed by 1e-6", "drop2_null1": "rigid for 0.1 ms",
+    "drop2_w1": "first fall", "drop2_w2": "second flight", "drop2_w123": "three flights planned at once",
+}  # fmt: skip
+
+
+def table(name: str) -> NDArray[Any]:
+    """Read a table of results; empty cells are nan."""
+    return np.genfromtxt(RESULTS / f"{name}.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+
+
+def oscillators() -> Figure:
+    """Residuals that were predicted beside those of the solver, for one and for two modes."""
+    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    left.bar([name for name, _ in _PAIRS], [error for _, error in _PAIRS], color=REFERENCE, width=0.5)
+    left.set(yscale="log", ylim=(1e-3, 10), ylabel="largest deviation after td [-]", xlabel="tr, td [ms]")
+    left.set_title("oscillator: vibration after td, OpenRadioss", fontsize="small")
+    rows = table("chain_scan")
+    right.plot([0, 2.2], [0, 2.2], color=FLIGHT, linewidth=1)
+    single = table("oscillators_scan")
+    right.plot(rows["R_theory"], rows["R_sim"], ".", color=REFERENCE, label=f"two modes, {rows.size} switched runs")
+    right.plot(single["R_theory"], single["R_sim"], "o", color=SWITCHED, label=f"one mode, {single.size} switched runs")
+    right.legend(fontsize="x-small")
+    right.set(xlabel="residual predicted [-]", ylabel="residual computed [-]")
+    right.set_title("chain of two springs, and three oscillators", fontsize="small")
+    return _done(figure)
+
+
+def rollover() -> Figure:
+    """Roll at td and mean energy after td of the shell box, against tr."""
+    rows = np.sort(table("rollover_scan"), order="tr_s")
+    tr = 1e3 * rows["tr_s"]
+    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    left.plot(tr, np.abs(rows["droll_td_deg"]), ".-", color=REFERENCE, linewidth=0.8)
+    left.set(yscale="log", ylabel="|roll error| at td [degrees]")
+    right.plot(tr, rows["IEmean_td_to_380ms_J"] / rows["IEmean_ref_J"], ".-", color=REFERENCE, linewidth=0.8)
+    right.axhline(1.0, color=SWITCHED, linewidth=0.8)
+    right.set(ylabel="mean energy after td, over the reference")
+    for axes in (left, right):
+        axes.axvspan(0, 88.5, color=SWITCHED, alpha=0.1, linewidth=0, label="trip")
+        axes.axvline(88.58, color=GOOD, linestyle="--", linewidth=1, label="recommended tr")
+        axes.set_xlabel("tr [ms]")
+        axes.legend(fontsize="x-small")
+    return _done(figure)
+
+
+def car() -> Figure:
+    """Angle at td and mean energy of the car, against tr and against the level."""
+    rows = table("car_runs")
+    rows = np.sort(rows[np.char.startswith(rows["run"], "car_a")], order="tr_s")
+    tr = 1e3 * rows["tr_s"]
+    flying = tr > 38.5
+    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    left.plot(tr, rows["dangle_td_deg"], ".-", color=REFERENCE, linewidth=0.8)
+    for place, (start, end) in enumerate(((2.3, 11.8), (28.1, 38.5))):
+        left.axvspan(start, end, color=SWITCHED, alpha=0.1, linewidth=0, label="_" if place else "contact")
+    left.axvline(38.05, color=GOOD, linestyle="--", linewidth=1, label="recommended tr")
+    left.set(yscale="log", xlabel="tr [ms]", ylabel="angle between the two bodies at td [degrees]")
+    left.legend(fontsize="x-small")
+    level = rows["E_tr_J"] / rows["E_td_ref_J"]
+    for some, colour, name in ((flying, REFERENCE, "in flight"), (~flying, SWITCHED, "during the load")):
+        right.plot(level[some], rows["meanIE_td_landing_ratio"][some], ".", color=colour, label=name)
+    right.set(xlabel="E(tr)/E(td)", ylabel="mean energy until the landing, over the reference")
+    right.legend(fontsize="x-small")
+    return _done(figure)
+
+
+def drop() -> Figure:
+    """How far the contacts of the falling box move, run by run."""
+    rows = table("drop2_runs")
+    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    axes = figure.subplots()
+    numbers = np.arange(1, 8)
+    colours = (REFERENCE, FLIGHT, GOOD, SWITCHED, "#cc79a7")
+    for (run, name), colour in zip(_DROPS.items(), colours, strict=True):
+        (row,) = rows[rows["run"] == run]
+        axes.plot(numbers, [row[f"dland{n}_ms"] for n in numbers], ".-", color=colour, linewidth=0.8, label=name)
+    axes.set(xlabel="contact", ylabel="contact comes later by [ms]")
+    axes.legend(fontsize="x-small")
+    return _done(figure)
+
+
+FIGURES: Final[Mapping[str, Callable[[], Figure]]] = {
+    "oscillators": oscillators, "rollover": rollover, "car": car, "drop": drop,
+}  # fmt: skip
+
+
+def _done(figure: Figure) -> Figure:
+    for axes in figure.axes:
+        _grid(axes)
+    return figure
+
+
+def _grid(axes: Axes) -> None:
+    axes.grid(visible=True, linewidth=0.3)
+    axes.set_axisbelow(True)
+
+
+def main() -> None:
+    """Draw all figures."""
+    PLACE.mkdir(parents=True, exist_ok=True)
+    for name, draw in FIGURES.items():
+        (PLACE / f"{name}.png").write_bytes(render(draw(), f"{name}.png"))
+
+
+if __name__ == "__main__":
+    main()

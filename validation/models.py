@@ -1,0 +1,66 @@
+"""The models: a deck each, the rigid body that switches it, and the reference run."""
+
+from __future__ import annotations
+
+import gzip
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+DECKS: Final = Path(__file__).parent / "decks"
+# Of the stable step of the elements, and cycles between two lines of the listing.
+_SCALE, _PRINT = 0.9, -2000
+
+
+@dataclass(frozen=True)
+class Model:
+    """A deck ``name``_0000.rad.gz whose switched parts are one rigid body with the main node ``main``.
+
+    The run ends at ``t_end`` and writes its time history each ``interval`` [s].  While rigid the step is capped at
+    ``cap`` [s]: with nothing left that is deformable it would grow without limit.  ``begin`` are further lines of the
+    first leg.
+    """
+
+    name: str
+    what: str
+    main: int
+    t_end: float
+    interval: float
+    cap: float
+    begin: str = ""
+
+    def deck(self) -> bytes:
+        """Give the starter deck."""
+        return gzip.decompress((DECKS / f"{self.name}_0000.rad.gz").read_bytes())
+
+    def legs(self, windows: Sequence[tuple[float, float]]) -> Iterator[str]:
+        """Give the engine files of a run that is rigid in ``windows`` (tr, td) [s], in order."""
+        bounds = [(0.0, False), *((time, rigid) for tr, td in windows for time, rigid in ((tr, True), (td, False)))]
+        ends = [*(time for time, _ in bounds[1:]), self.t_end]
+        phases = [(end, rigid) for (start, rigid), end in zip(bounds, ends, strict=True) if end > start]
+        for number, (end, rigid) in enumerate(phases, start=1):
+            yield self._leg(number, end, rigid=rigid)
+
+    def _leg(self, number: int, end: float, *, rigid: bool) -> str:
+        # the rigid body is active as the deck defines it; a first leg that is rigid leaves it so
+        switch = "" if number == 1 and rigid else f"/RBODY/{'ON' if rigid else 'OFF'}\n{self.main}\n"
+        cap = f"/DTIX\n{self.cap!r} {self.cap!r}\n" if rigid else ""
+        return (
+            f"/RUN/{self.name}/{number}\n{end:.10g}\n/VERS/2022\n/DT\n{_SCALE} 0.0\n{cap}{switch}"
+            f"{self.begin if number == 1 else ''}/TFILE/4\n{self.interval}\n/TH/TITLE\n/PRINT/{_PRINT}\n/MON/ON\n"
+            "/PARITH/ON\n"
+        )
+
+
+MODELS: Final = {
+    model.name: model
+    for model in (
+        Model("OSC", "floating oscillator, its spring ten bricks", 9001, 0.15, 2e-5, 1e-6, "/INIV/TRA/X/2\n6.0\n2\n"),
+        Model("ROLL", "shell box on a sled that trips over a curb", 200001, 0.45, 5e-5, 2e-5),
+        Model("CAR", "car-like structure of 16 parts that hits a block, rolls and lands", 1808, 0.26, 1e-4, 2e-5),
+        Model("DROP2", "shell box with a block on springs that falls on a corner and bounces", 535, 0.8, 2e-4, 5e-6),
+    )
+}
