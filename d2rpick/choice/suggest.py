@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.health import Health
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
-    from d2rpick.histories.energy_balance import Balance
-    from d2rpick.histories.history import History
+    from d2rpick.histories.history import Balance, History
 
 
 class Pair(NamedTuple):
