@@ -110,7 +110,7 @@ def companions(random: Random) -> bool:
             Path(folder, name).write_bytes(content)
         parts = random.choice(((), ("12",), ("1", "12", "13")))
         selection = Selection(parts=parts)
-        return bool(_read(lambda: open_run([folder], selection).history(selection, with_momenta=True)))
+        return bool(_read(lambda: open_run([folder], selection).history(selection)))
 
 
 FORMATS: Final[dict[str, Callable[[Random], bool]]] = {

@@ -18,8 +18,7 @@ from d2rpick.flight.work import work_beyond_gravity
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.histories.energy_balance import Balance
-    from d2rpick.histories.history import Part, Samples
+    from d2rpick.histories.history import Balance, Part, Samples
 
 # Hourglass energy is to stay below a tenth of the peak internal energy, of the model and of each part: rule of thumb of
 # DYNAmore (dynasupport.com/howtos/element/hourglass); the same tenth in NCHRP Web-Only Document 179 (2010), table E-1.

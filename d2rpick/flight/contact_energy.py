@@ -9,8 +9,7 @@ import numpy as np
 from d2rpick.flight.window import FEWEST, FreeFlight, lasting_window
 
 if TYPE_CHECKING:
-    from d2rpick.histories.energy_balance import Balance
-    from d2rpick.histories.history import Samples
+    from d2rpick.histories.history import Balance, Samples
 
 # A contact energy that never exceeds its printed digits by this factor shows no contact at all.
 _VISIBLE = 100

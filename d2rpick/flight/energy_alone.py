@@ -1,18 +1,48 @@
-"""The end of the load read off the internal energy alone, for want of better evidence."""
+"""The flight read off the internal energy alone, for want of better evidence: modest, and never certain.
+
+A mild contact may leave no trace in the energy.  So the window begins late, and ends early where a contact is seen.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.histories.crossings import find_crossings
 
 if TYPE_CHECKING:
-    from d2rpick.histories.history import History
+    from numpy.typing import NDArray
+
+    from d2rpick.histories.history import History, Samples
 
 # Widening of the band of energies before td, against wiggles of a vibration that the band has not seen.
-_BAND_RESERVE = 0.25
+_BAND_RESERVE: Final = 0.25
+# The energy falls into its band while the last pushes of the load still come: in 24 computed runs by up to a fifth of
+# the time from there to td too early.  A quarter of that time is waited for; what it costs is known.
+_WAIT: Final = 0.25
+# The level is the mean over this share of the quiet time; it changes where it leaves its band, widened by its width.
+_LEVEL: Final = 1 / 8
+
+
+class QuietTime(NamedTuple):
+    """Window in which the energy shows no load; ``end`` None where no next contact is seen [time].
+
+    ``settled`` is when the energy had settled: the time from there to ``start`` is given up for safety.
+    """
+
+    start: float
+    end: float | None
+    settled: float
+
+
+def quiet_time(history: History, td: float) -> QuietTime | None:
+    """Find the window around ``td`` [time] in which the energy stays in its band on one level, or None."""
+    settled = end_of_load(history, td)
+    if settled is None:
+        return None
+    changes = [time for time in (_burst(history, settled, td), _change_of_level(history, settled, td)) if time]
+    return QuietTime(settled + _WAIT * (td - settled), min(changes, default=None), settled)
 
 
 def end_of_load(history: History, td: float) -> float | None:
@@ -34,3 +64,36 @@ def end_of_load(history: History, td: float) -> float | None:
     level = float(values.max() + _BAND_RESERVE * np.ptp(values))
     falling = [c.time for c in find_crossings(history.time[before], history.energy[before], level) if not c.rising]
     return falling[-1] if falling else None
+
+
+def _burst(history: History, start: float, td: float) -> float | None:
+    """Give the first time after ``td`` at which the energy leaves its band from ``start`` to td upwards, or None."""
+    top = _widened(history.energy[_between(history.time, start, td)], _BAND_RESERVE)[1]
+    above = np.flatnonzero((history.time > td) & (history.energy > top))
+    return float(history.time[above[0]]) if above.size else None
+
+
+def _change_of_level(history: History, start: float, td: float) -> float | None:
+    """Give the first time after ``td`` at which the mean energy leaves its band from ``start`` to td, or None."""
+    width = round(_LEVEL * np.count_nonzero(_between(history.time, start, td)))
+    if width < 1 or history.time.size <= width:
+        return None
+    sums = np.append(0.0, np.cumsum(history.energy))
+    means, time = (sums[width:] - sums[:-width]) / width, history.time
+    first, middle, last = time[: time.size - width + 1], time[width // 2 :][: means.size], time[width - 1 :]
+    inside = (first >= start) & (last <= td)
+    if not inside.any():
+        return None
+    low, high = _widened(means[inside], 1.0)
+    off = np.flatnonzero((first > td) & ((means < low) | (means > high)))
+    return float(middle[off[0]]) if off.size else None
+
+
+def _between(time: Samples, start: float, end: float) -> NDArray[np.bool_]:
+    return (time >= start) & (time <= end)
+
+
+def _widened(values: Samples, share: float) -> tuple[float, float]:
+    """Band of some values, widened on both sides by a share of its width."""
+    room = share * float(np.ptp(values))
+    return float(values.min()) - room, float(values.max()) + room

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.flight.energy_alone import end_of_load
+from d2rpick.flight.energy_alone import quiet_time
 from d2rpick.flight.window import all_windows
 
 if TYPE_CHECKING:
@@ -35,7 +35,8 @@ class Flight(NamedTuple):
     Where nothing flies at td, it is the last flight before td, or else the first after it, and ``refusal`` says what
     shows that.  ``source`` tells how the start was found, one of `SOURCES`.  ``parts`` are those that were seen to
     fly together, None where the momentum did not tell, or told it of the whole model.  ``damping`` is alpha of their
-    momentum [1/time], 0 where it did not tell.  ``doubts`` say which sources contradict each other.
+    momentum [1/time], 0 where it did not tell.  ``doubts`` say which sources contradict each other.  Of the energy
+    alone: ``settled`` is when it had settled, from there to ``start`` is given up for safety.
     """
 
     start: float | None
@@ -45,6 +46,7 @@ class Flight(NamedTuple):
     damping: float = 0.0
     refusal: str | None = None
     doubts: tuple[str, ...] = ()
+    settled: float | None = None
 
     @property
     def certain(self) -> bool:
@@ -100,8 +102,8 @@ def find_flight(history: History, td: float, after: float | None, seen: Seen, sp
         return Flight(None, None, None, refusal=seen.refusal, doubts=seen.doubts)
     if span:
         return Flight(span.start, span.end if span.end < history.time[-1] else None, "oscillator")
-    fallen = end_of_load(history, td)
-    return Flight(fallen, None, None if fallen is None else "energy")
+    quiet = quiet_time(history, td)
+    return Flight(quiet.start, quiet.end, "energy", settled=quiet.settled) if quiet else Flight(None, None, None)
 
 
 def seen_flight(history: History, td: float) -> Seen:
@@ -125,8 +127,8 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     """Find all flights that the best source shows and no other denies, each with its source, ascending in time."""
     asked = tuple(witnesses(history))
     for place, witness in enumerate(asked):
-        kept = []
-        for flight in witness.flights():
+        kept, flights = [], witness.flights()
+        for flight in flights:
             middle = (flight.start + flight.end) / 2
             others = [(one.source, one.around(middle)) for one in asked[place + 1 :] if one.source in _AGREEING]
             if not all(other for _, other in others):
@@ -135,7 +137,7 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
             seen = _confirmed(history, found, middle)
             if seen.flight and not seen.refusal:
                 kept.append((witness.source, seen.flight))
-        if kept or witness.decisive:
+        if flights or witness.decisive:
             return tuple(kept)
     return ()
 

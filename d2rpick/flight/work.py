@@ -15,13 +15,17 @@ from d2rpick.flight.window import FEWEST, FreeFlight, lasting_window
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.histories.energy_balance import Balance
-    from d2rpick.histories.history import Samples
+    from d2rpick.histories.history import Balance, Samples
 
 # States from which a load can be told from gravity and damping: twice the unknowns.
 FEWEST_STATES: Final = 6
 # What sampling and the solver's own sums leave of the work of gravity, as a share of its change: contacts do more.
 _OWN_ERROR: Final = 1e-3
+# Mass follows from kinetic energy and velocity where it moves; states slower than this share (squared) are left out.
+_SLOW: Final = 1e-2
+# Mass so found is a bound already; a table may hold the kinetic energy of the chosen parts only, and a load that works
+# like gravity without moving the model exceeds it by orders of magnitude.
+_MASS_ERROR: Final = 2.0
 
 
 def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | None:
@@ -36,7 +40,7 @@ def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | N
         return None
     time, work = balance.time[inside], balance.external_work[inside]
     elapsed = (time - time[0]) / (time[-1] - time[0])
-    free = [np.ones_like(time)]
+    free, most = [np.ones_like(time)], np.inf
     if balance.velocity is None:
         free.append(elapsed)
         gravity = elapsed**2
@@ -45,24 +49,46 @@ def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | N
 
         velocity = balance.velocity[inside]
         gravity = _integral(time, velocity @ FreeFall(time, velocity).gravity())
+        if balance.kinetic is not None:
+            most = _most_gravity(velocity, balance.kinetic[inside])
     one_sided = [gravity]
     if balance.kinetic is not None:
         one_sided.append(-_integral(time, balance.kinetic[inside]))
-    rest = float(np.abs(_rest(work, free, one_sided)).max())
+    rest = float(np.abs(_rest(work, free, one_sided, most)).max())
     own = balance.precision.quantum(float(np.abs(work).max())) + _OWN_ERROR * float(np.ptp(work))
     return max(0.0, rest - own)
 
 
-def _rest(values: Samples, free: Sequence[Samples], one_sided: Sequence[Samples]) -> Samples:
-    """What least squares leave of ``values``; the columns of ``one_sided`` are only ever added."""
-    used = [column / np.abs(column).max() for column in one_sided if column.any()]
+def _most_gravity(velocity: Samples, kinetic: Samples) -> float:
+    """Largest factor of the integral of F v: the motion as a whole has no more than all of the kinetic energy."""
+    squares = np.sum(velocity**2, axis=1)
+    fast = squares > _SLOW * squares.max(initial=0.0)
+    return _MASS_ERROR * float((2 * kinetic[fast] / squares[fast]).min()) if fast.any() else np.inf
+
+
+def _rest(values: Samples, free: Sequence[Samples], one_sided: Sequence[Samples], most: float) -> Samples:
+    """What least squares leave of ``values``; columns of ``one_sided`` are only added, the first ``most`` times."""
+    first, *others = one_sided
+    for gravity in ([first], []):
+        used = [column / np.abs(column).max() for column in (*gravity, *others) if column.any()]
+        rest, factors = _least_squares(values, free, used)
+        if not (gravity and first.any() and factors[0] > most * np.abs(first).max()):
+            return rest
+        values = values - most * first
+    return rest
+
+
+def _least_squares(values: Samples, free: Sequence[Samples], used: Sequence[Samples]) -> tuple[Samples, Samples]:
+    """What is left of ``values``, and the factors of the columns ``used``, none of them negative."""
+    kept = list(range(len(used)))
     while True:
-        table = np.stack([*free, *used], axis=1)
-        factors, *_ = np.linalg.lstsq(table, values, rcond=None)
-        kept = [column for column, factor in zip(used, factors[len(free) :], strict=True) if factor > 0]
-        if len(kept) == len(used):
-            return np.asarray(values - table @ factors)
-        used = kept
+        table = np.stack([*free, *(used[i] for i in kept)], axis=1)
+        found, *_ = np.linalg.lstsq(table, values, rcond=None)
+        factors = np.zeros(len(used))
+        factors[kept] = found[len(free) :]
+        if factors.min(initial=0.0) >= 0:
+            return values - table @ found, factors
+        kept = [i for i in kept if factors[i] > 0]
 
 
 def _integral(time: Samples, values: Samples) -> Samples:
@@ -78,10 +104,12 @@ def can_tell(balance: Balance) -> bool:
 def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     """Find the window around ``td`` [time] in which energy changes by gravity and damping only, or None.
 
-    Held to it are the external work, and kinetic and internal energy together.
+    Held to it are the external work, and kinetic and internal energy together.  Where the momentum of the model is
+    written, it shows what they can show, and more: a model whose momentum is never that of free flight may be driven
+    so smoothly that its energy looks like it.
     """
     time, terms = balance.time, _terms(balance)
-    if not terms or time.size < FEWEST or not time[0] <= td <= time[-1]:
+    if balance.velocity is not None or not terms or time.size < FEWEST or not time[0] <= td <= time[-1]:
         return None
     largest = max(float(np.abs(term).max()) for term in terms)
     extent = min(float(np.ptp(term)) for term in terms)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 import numpy as np
 
 from d2rpick.errors import FormatError
+from d2rpick.histories.history import Balance
 from d2rpick.histories.names import is_internal_energy, normalised
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.database import Legs
-    from d2rpick.histories.energy_balance import Balance
     from d2rpick.histories.history import Part, Precision, Samples
 
 # Normalised names, see `d2rpick.histories.names`: glstat and binout, Radioss, Abaqus (ALLAE is its hourglass energy),
@@ -61,8 +61,6 @@ def balance_of(run: Files, parts: Sequence[Part] | None, until: float = np.inf) 
     judged = whole is not None and not _JUDGED.isdisjoint(map(normalised, (*whole.channels, *whole.quantities)))
     if not (judged or of_parts):
         return None
-    from d2rpick.histories.energy_balance import Balance  # not above: plain tables do without it
-
     if whole is None:
         return Balance(run.databases[0].part_time, hourglass_of_parts=of_parts)
     terms = _terms(whole, until)
@@ -104,8 +102,6 @@ def _whole(run: Files) -> Legs | None:
 
 
 def _terms(whole: Legs, until: float) -> Balance | None:
-    from d2rpick.histories.energy_balance import Balance
-
     try:
         columns = _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
     except FormatError:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from d2rpick.histories.energy_balance import Balance
     from d2rpick.histories.source import Source
 
 # in quotes: numpy.typing costs start-up
@@ -90,6 +89,33 @@ class Track(NamedTuple):
 
     time: Samples
     values: Samples
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Energies of the whole model at ``time``, arrays of shape (n,); None for what the files do not have.
+
+    ``sliding`` is the energy of all contacts, ``friction`` what of it is friction where that is told apart,
+    ``external_work`` that of gravity and every other load, ``total`` the sum that the solver keeps and ``ratio`` that
+    sum over what it should be: the energy at the start and the external work.  ``eroded`` is the internal energy of
+    elements that were deleted.  ``velocity`` (n, 3) is that of the centre of mass, up to a factor.
+    ``hourglass_of_parts`` gives the highest hourglass and the highest internal energy of parts.  ``precision`` tells
+    how finely the energies were printed.
+    """
+
+    time: Samples
+    internal: Samples | None = None
+    kinetic: Samples | None = None
+    hourglass: Samples | None = None
+    sliding: Samples | None = None
+    friction: Samples | None = None
+    external_work: Samples | None = None
+    total: Samples | None = None
+    ratio: Samples | None = None
+    eroded: Samples | None = None
+    velocity: Samples | None = None
+    hourglass_of_parts: tuple[tuple[Part, float, float], ...] = ()
+    precision: Precision = EXACT
 
 
 class Evidence(Protocol):

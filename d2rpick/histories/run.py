@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.database import Legs
-    from d2rpick.histories.energy_balance import Balance
-    from d2rpick.histories.history import Part, Samples
+    from d2rpick.histories.history import Balance, Part, Samples
     from d2rpick.histories.selection import Selection
     from d2rpick.histories.source import Source
 

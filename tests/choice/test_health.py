@@ -10,8 +10,7 @@ import pytest
 
 from d2rpick.choice.health import Health, assess, cautions_of_health
 from d2rpick.histories.balance_terms import balance_of
-from d2rpick.histories.energy_balance import Balance
-from d2rpick.histories.history import Part, Precision
+from d2rpick.histories.history import Balance, Part, Precision
 from d2rpick.histories.opening import open_run
 from d2rpick.report.health import measures_of
 from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run
@@ -116,12 +115,13 @@ def test_a_ratio_is_not_judged_where_the_run_has_hardly_any_energy_yet() -> None
 
 
 def test_damping_that_counts_as_external_work_is_no_load() -> None:
-    decaying = 50 * np.exp(-3 * TIME) * (1.2 + np.cos(60 * TIME))
-    spent = -3 * np.append(0, np.cumsum((decaying[1:] + decaying[:-1]) / 2 * np.diff(TIME)))
     fall = 4 * np.exp(-3 * TIME) - 2  # of v' = g - 3 v with g = -6
     velocity = np.stack([np.exp(-3 * TIME), 0 * TIME, fall], axis=1)
-    gravity = -30 * np.append(0, np.cumsum((fall[1:] + fall[:-1]) / 2 * np.diff(TIME)))
-    damped = replace(HEALTHY, kinetic=decaying, external_work=gravity + spent, velocity=velocity)
+    kinetic = 5 / 2 * np.sum(velocity**2, axis=1) + 50 * np.exp(-3 * TIME) * (1.2 + np.cos(60 * TIME))
+    gravity, damping = (
+        np.append(0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(TIME))) for rate in (-6 * 5 * fall, -6 * kinetic)
+    )
+    damped = replace(HEALTHY, kinetic=kinetic, external_work=gravity + damping, velocity=velocity)
     assert "work-in-window" not in warned(damped)
     assert "work-in-window" in warned(replace(damped, kinetic=None))
 

@@ -130,7 +130,7 @@ def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
     result = run(*scan, "-f", "markdown")
     assert result.stdout.startswith("| tr |")
     told = {line.split(": ")[1] for line in result.stderr.splitlines()}
-    assert told >= {"energy-only", "flight-from-energy"}
+    assert told >= {"energy-only", "no-free-flight"}
     assert codes(answer(*scan)) == told
 
 
