@@ -117,7 +117,8 @@ class Mode:
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Energy of the vibration about the preload, V = (q - q_0)**2 + T; dV/dt = -2 alpha T [energy]."""
-        return self._swing(t, self.cosine, self.sine) ** 2 + self.kinetic_energy(t)
+        swing, velocity = self._swings(t, (self.cosine, self.sine), self._velocity_parts)
+        return swing**2 + (velocity / self.omega_0) ** 2
 
     def energy_slopes(self, t: Samples | float) -> tuple[Samples, Samples]:
         """E' [energy/time] and E'' [energy/time^2], from q'' = -alpha q' - omega_0**2 (q - q_0)."""
@@ -182,12 +183,14 @@ class Mode:
         return self.omega * self.sine - half * self.cosine, -self.omega * self.cosine - half * self.sine
 
     def _swing(self, t: Samples | float, cosine: float, sine: float) -> Samples:
-        """exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)) with s = t - origin."""
+        return self._swings(t, (cosine, sine))[0]
+
+    def _swings(self, t: Samples | float, *parts: tuple[float, float]) -> list[Samples]:
+        """exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)) with s = t - origin, for each cosine and sine."""
         s = np.asarray(t, dtype=np.float64) - self.origin
         angle = self.omega * s
-        decay = np.exp(-self.alpha / 2 * s)
-        swing: Samples = decay * (cosine * np.cos(angle) + sine * np.sin(angle))
-        return swing
+        decay, cos, sin = np.exp(-self.alpha / 2 * s), np.cos(angle), np.sin(angle)
+        return [decay * (cosine * cos + sine * sin) for cosine, sine in parts]
 
 
 def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Samples, Samples]:

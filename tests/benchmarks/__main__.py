@@ -75,6 +75,13 @@ def identification_ratio() -> float:
     return identification.ratio()
 
 
+def residual_error(kind: str, count: int) -> float:
+    """How far the stated residual is off at most in 95 % of so many random records [-]."""
+    from tests.benchmarks import identification
+
+    return identification.within(identification.small_second_modes(kind, range(count)))[0]
+
+
 def integration_ratio(repeats: int) -> float:
     """DOP853 at a relative tolerance of 1e-10 over the closed form: full states at a million points to 0.15 s."""
     import numpy as np
@@ -160,6 +167,9 @@ ROWS = (
     Row("  both with one thread", lambda: process_ratio("numpy, click", *SUGGEST, env=ONE_THREAD)),
     Row("--help / import click: processes", lambda: process_ratio("click", "--help"), most=1.5),
     Row("identification / least_squares from the right answer", identification_ratio, most=3.0),
+    Row("residual off by, 95 % of 600 records of one mode", lambda: residual_error("one", 600), most=0.05),
+    Row("  of 200 with 0.3 to 3 % in a second mode", lambda: residual_error("small", 200), most=0.05),
+    Row("  of 200 with 3 to 30 % in a second mode", lambda: residual_error("large", 200), most=0.05),
     Row("DOP853 / closed form, 1e6 points", lambda: integration_ratio(repeats=3), least=20.0),
     Row("  alternating call by call, in memory just freed", lambda: integration_ratio(repeats=1)),
     Row("cards of a 50 MB deck / loop over its lines", lambda: deck_ratio(numbered=False), most=1 / 3),
