@@ -137,7 +137,7 @@ def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
     if better_pair(answer):
         drawn["The better pair"] = figures.both_widths(figures.draw_better, answer, "better")
     request = card_request(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, request))
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, request=request))
 
 
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:

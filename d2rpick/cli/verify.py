@@ -101,7 +101,7 @@ def _page(answer: Verdict, run: Run, options: dict[str, Any]) -> str:
     caption = "Internal energy with its level at td, and the pair"
     drawn = {caption: figures.both_widths(figures.draw_verdict, answer, "pair")}
     request = card_request(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, request))
+    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn, request=request))
 
 
 def _switched(options: dict[str, Any]) -> Run | None:
