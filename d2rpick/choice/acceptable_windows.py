@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.choice import measures
-from d2rpick.choice.suggest import EQUALLY_GOOD, approve
+from d2rpick.choice.ranking import EQUALLY_GOOD
+from d2rpick.choice.verify import approve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.suggest import verify
+from d2rpick.choice.verify import verify
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
 from d2rpick.deck.printing.common import Printing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.choice.situation import Settings
-    from d2rpick.choice.suggest import Verdict
+    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.verify import Verdict
     from d2rpick.deck.printing.common import PrintedCard, Times
     from d2rpick.histories.history import History
 

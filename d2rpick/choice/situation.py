@@ -3,56 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.choice import measures
-from d2rpick.errors import RangeError
-from d2rpick.flight.flight import Flight, Span, described_span, energy_flight, identify_within, span_of
 from d2rpick.histories.crossings import find_extrema
-from d2rpick.vibration.identify import Identification, assess, identify, identify_several
 
 if TYPE_CHECKING:
     from d2rpick.choice.lock_in_profile import Profile
-    from d2rpick.flight.momentum import FreeFlight
+    from d2rpick.choice.settings import Settings
+    from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.part_signs import Parts, PartVibration
+    from d2rpick.vibration.span import Span
 
 # Of the fastest mode: what a parabola through three of them misses of a minimum is of the order of 1e-4 of a period.
 _POINTS_PER_PERIOD = 64
 # Where the scatter of the last period exceeds this share of the vibration energy at td, the vibration has sunk
 # into it: its sign is no longer certain.
 _DROWNED = 0.2
-# Beyond, squares of energies are no numbers any more; no unit system comes near.
-_LARGEST = 1e150
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What the analyst asks for; times in the unit of the history.
-
-    ``after``: the load ends here (None: found from the record).  ``margin``: kept clear after the load and before
-    the next contact.  ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
-    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
-    given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
-    the energy level alone.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the
-    step while rigid to that while deformable; without the first nothing is said of the run time.
-    """
-
-    after: float | None = None
-    margin: float = 0.0
-    tolerance: float = 0.2
-    max_kinetic_share: float | None = None
-    max_residual: float | None = None
-    oscillator: Mode | None = None
-    fit_window: tuple[float, float] | None = None
-    replay: bool = True
-    cost_share: float | None = None
-    step_ratio: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -242,97 +216,6 @@ class Situation:
     def at(self, td: float) -> Situation:
         """Give the same record, flight and oscillator seen from another ``td``."""
         return replace(self, td=td)
-
-
-def examine(history: History, td: float, settings: Settings) -> Situation:
-    """Find the flight around ``td`` and the oscillator in it.
-
-    RangeError when td, --after or the fit window lie outside the record, or it has fewer than 3 states.
-    """
-    if history.time.size < 3:
-        found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
-        raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
-    history.energy_at(td)
-    largest = float(np.abs(history.energy).max())
-    if largest > _LARGEST:
-        raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
-    if settings.after is not None:
-        _inside(history, settings.after, "--after")
-    seen = _seen_flight(history, td) if history.momenta else None
-    fit, span = _oscillator(history, td, settings, seen)
-    situation = Situation(history, td, settings, _flight(history, td, settings.after, seen, span), fit, span)
-    if history.part_energies is None or not settings.replay:
-        return situation
-    # without a sign of the next contact nothing is known of what comes after td
-    end = situation.flight.end or (float(history.time[-1]) if seen or span else td)
-    return _with_parts(situation, history.part_energies, end)
-
-
-def _seen_flight(history: History, td: float) -> FreeFlight | None:
-    """Find the free flight around ``td`` in the momenta."""
-    from d2rpick.flight.momentum import flight_around, to_be_asked
-
-    return next(filter(None, (flight_around(momenta, td) for momenta in to_be_asked(history.momenta))), None)
-
-
-def _oscillator(
-    history: History, td: float, settings: Settings, seen: FreeFlight | None
-) -> tuple[Identification | None, Span | None]:
-    """Find the oscillator, given or identified, and the window around td that it describes."""
-    if not settings.replay:
-        return None, None
-    bounds = Span(seen.start, seen.end) if seen else Span(float(history.time[0]), float(history.time[-1]))
-    if settings.after is not None:
-        bounds = bounds._replace(start=min(settings.after, td))
-    if settings.fit_window:
-        for bound in settings.fit_window:
-            _inside(history, bound, "--fit-window")
-        fit = identify_within(history, Span(*settings.fit_window))
-        return fit, span_of(history, td, fit, bounds) if fit.describes_record else None
-    if settings.oscillator:
-        span, fit = described_span(history, td, bounds, partial(assess, settings.oscillator), whole=seen is not None)
-        return fit, span
-    span, fit = described_span(history, td, bounds, identify, whole=seen is not None)
-    if span is None:
-        span, several = described_span(history, td, bounds, identify_several, whole=seen is not None)
-        fit = several if span else fit
-    return fit, span
-
-
-def _with_parts(situation: Situation, energies: Samples, end: float) -> Situation:
-    """Add what the energies of single parts, (n, k), tell of the flight up to ``end``."""
-    from d2rpick.vibration.envelope import upper_envelope
-    from d2rpick.vibration.part_signs import PartVibration, read_parts
-
-    history, td, start = situation.history, situation.td, situation.flight.start
-    first = min(td, float(history.time[0]) if start is None else start)
-    inside = slice(*np.searchsorted(history.time, [first, np.nextafter(end, np.inf)]))
-    if history.time[inside].size < 3:
-        return situation
-    parts = read_parts(history.time[inside], energies[inside], history.part_names)
-    whole = situation.mode or upper_envelope(history.time[inside], history.energy[inside])
-    vibration = PartVibration(parts, whole) if parts.signed and whole else None
-    return replace(situation, parts=parts, signed_parts=vibration)
-
-
-def _flight(history: History, td: float, after: float | None, seen: FreeFlight | None, span: Span | None) -> Flight:
-    """Choose the best answer to when the load is over: given, by the momentum, by the oscillator, by the energy."""
-    if seen:
-        end = seen.end if seen.end_seen else None
-        start, source = (seen.start, "momentum") if after is None else (after, "given")
-        return Flight(start, end, source, seen.parts, seen.damping)
-    end = span.end if span and span.end < history.time[-1] else None
-    if after is not None:
-        return Flight(after, end, "given")
-    return Flight(span.start, end, "oscillator") if span else energy_flight(history, td)
-
-
-def _inside(history: History, time: float, option: str) -> None:
-    if not history.time[0] <= time <= history.time[-1]:
-        raise RangeError(
-            f"{', '.join(history.source)}: {option} {time:g} lies outside the record, "
-            f"{history.time[0]:g} to {history.time[-1]:g}"
-        )
 
 
 def _drowned(history: History, td: float, mode: Mode | Modes, span: Span | None) -> str | None:

@@ -1,26 +1,23 @@
-"""Choosing and judging: candidates for tr at a given td, their order, the better td."""
+"""Choosing tr for a given td: the recommendation, its rivals, the better td."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from d2rpick.choice.candidates import Candidate, Found, find_candidates, judge
+from d2rpick.choice.candidates import Candidate, find_candidates
+from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import Expectation, expectation
-from d2rpick.choice.situation import Settings, Situation, examine
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of
-from d2rpick.errors import RangeError
+from d2rpick.choice.ranking import best_of, over_limits, rank
+from d2rpick.choice.verify import Verdict
+from d2rpick.choice.warnings import Caution, cautions_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.health import Health
+    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Situation
     from d2rpick.histories.energy_balance import Balance
     from d2rpick.histories.history import History
-
-# Candidates whose error is within this of the smallest count as equally good: then the longer rigid window wins.
-EQUALLY_GOOD = 0.02
 
 
 class Pair(NamedTuple):
@@ -47,23 +44,6 @@ class Suggestion(NamedTuple):
     expected: Expectation | None = None
 
 
-class Verdict(NamedTuple):
-    """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
-
-    ``tr_ok`` and ``td_ok`` are None where the record does not tell.
-    """
-
-    situation: Situation
-    candidate: Candidate
-    tr_ok: bool | None
-    td_ok: bool | None
-    verified: bool
-    reasons: tuple[str, ...]
-    cautions: tuple[Caution, ...]
-    switched: Comparison | None = None
-    health: Health | None = None
-
-
 _Answer = TypeVar("_Answer", Suggestion, Verdict)
 
 
@@ -85,37 +65,6 @@ def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     return Suggestion(situation, candidates, recommended, better, tuple(cautions), expected=expected)
 
 
-def verify(history: History, tr: float, td: float, settings: Settings) -> Verdict:
-    """Judge one pair; RangeError when a time lies outside the record or tr is not before td."""
-    if not tr < td:
-        raise RangeError(f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td")
-    situation = examine(history, td, settings)
-    history.energy_at(tr)
-    (candidate,) = judge(situation, [Found(tr, "given", None)])
-    known = situation.flight.start is not None
-    share = situation.kinetic_share
-    limit = POOR_KINETIC_SHARE if settings.max_kinetic_share is None else settings.max_kinetic_share
-    outside = td > situation.latest_td or (situation.earliest_tr is not None and td <= situation.earliest_tr)
-    td_ok = False if outside else None if share is None else share <= limit
-    over = _over_limits(situation, candidate)
-    reasons = (*candidate.notes, *over)
-    return Verdict(
-        situation=situation,
-        candidate=candidate,
-        tr_ok=candidate.acceptable if known else None,
-        td_ok=td_ok,
-        verified=candidate.acceptable and not over,
-        reasons=reasons,
-        cautions=tuple(cautions_of(situation)),
-    )
-
-
-def approve(situation: Situation, times: Iterable[float]) -> list[bool]:
-    """Tell for each of ``times`` before td whether ``verify`` would verify it as tr."""
-    judged = judge(situation, [Found(tr, "given", None) for tr in times])
-    return [candidate.acceptable and not _over_limits(situation, candidate) for candidate in judged]
-
-
 def with_health(answer: _Answer, balance: Balance) -> _Answer:
     """Add how far the reference run can be trusted, above all in the rigid window, else in the flight up to td.
 
@@ -132,52 +81,6 @@ def with_health(answer: _Answer, balance: Balance) -> _Answer:
     locked = history.mean_energy(*window) if window else None
     health = assess(balance, window, locked)
     return answer._replace(health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
-
-
-def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:
-    """Add what a finished switched run shows; a wrong motion of it overrules the verdict."""
-    return verdict._replace(
-        switched=comparison,
-        verified=verdict.verified and not comparison.objections,
-        reasons=verdict.reasons + comparison.objections,
-    )
-
-
-def rank(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
-    """Order candidates, best first, and number them.
-
-    Acceptable ones first, of them those on the same swing as td last: they save nothing.  Of each group first those
-    whose error is within 0.02 of the smallest, by the length of the rigid window; then the others by their error.
-    """
-    ordered: list[Candidate] = []
-    candidates = list(candidates)
-    worth = [(not c.acceptable, c.acceptable and c.same_swing) for c in candidates]
-    for wanted in sorted(set(worth)):
-        group = [c for c, own in zip(candidates, worth, strict=True) if own == wanted]
-        limit = min((c.error for c in group), default=0.0) + EQUALLY_GOOD
-        good = sorted((c for c in group if c.error <= limit), key=lambda c: c.tr)
-        ordered += good + sorted((c for c in group if c.error > limit), key=lambda c: (c.error, c.tr))
-    return tuple(replace(c, rank=i) for i, c in enumerate(ordered, start=1))
-
-
-def _over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
-    """Which of --max-kinetic-share and --max-residual are not kept, or cannot be judged."""
-    settings = situation.settings
-    limits = (
-        ("kinetic share", situation.kinetic_share, settings.max_kinetic_share),
-        ("residual", candidate.residual, settings.max_residual),
-    )
-    return tuple(
-        f"{name} unknown, at most {limit:g} was asked for" if value is None
-        else f"{name} {value:.3g} above the limit {limit:g}"
-        for name, value, limit in limits
-        if limit is not None and (value is None or value > limit)
-    )  # fmt: skip
-
-
-def best_of(situation: Situation, ranked: Iterable[Candidate]) -> Candidate | None:
-    """Give the first acceptable candidate that keeps the limits asked for."""
-    return next((c for c in ranked if c.acceptable and not _over_limits(situation, c)), None)
 
 
 def better_pair(situation: Situation) -> Pair | None:
@@ -202,5 +105,5 @@ def _why_none(situation: Situation, ranked: tuple[Candidate, ...]) -> str:
         level = situation.energy_td
         return f"before td = {situation.td:.6g} the energy neither passes its level {level:.6g} nor turns near it"
     nearest = ranked[0]
-    reasons = "; ".join((*nearest.notes, *_over_limits(situation, nearest)))
+    reasons = "; ".join((*nearest.notes, *over_limits(situation, nearest)))
     return f"none of {len(ranked)} candidates is acceptable; the nearest, tr = {nearest.tr:.6g}: {reasons}"

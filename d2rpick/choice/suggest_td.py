@@ -6,14 +6,16 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.candidates import find_candidates
+from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import expectation, mean_in_flight, shortfall
-from d2rpick.choice.situation import examine
-from d2rpick.choice.suggest import EQUALLY_GOOD, Pair, Suggestion, best_of, rank, suggest
+from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, rank
+from d2rpick.choice.suggest import Pair, Suggestion, suggest
 from d2rpick.flight.momentum import all_flights, to_be_asked
 
 if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.situation import Settings, Situation
+    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
 
 # Peaks of a window that are tried, the highest first: the higher a peak of several modes, the less energy is kinetic.

@@ -23,7 +23,7 @@ from d2rpick.cli.output import Output, finish
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.settings import Settings
     from d2rpick.deck.printing.common import PrintedCard, Printing, Times
     from d2rpick.histories.opening import Run
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
     from d2rpick.choice.judged_card import CardRequest
-    from d2rpick.choice.suggest import Verdict
+    from d2rpick.choice.verify import Verdict
     from d2rpick.choice.warnings import Caution
     from d2rpick.deck.printing.common import Printing
     from d2rpick.deck.printing.common import Solver as Module

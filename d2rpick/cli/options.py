@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from click.shell_completion import CompletionItem
 
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.settings import Settings
     from d2rpick.histories.opening import Run, Selection
     from d2rpick.vibration.oscillator import Oscillator
 
@@ -245,7 +245,7 @@ def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
         if lost:
             raise click.UsageError(f"--{_dashed(lost[0])} is about an energy history; name it with --history")
         return None
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.settings import Settings
 
     judging = Settings(after=options["after"], margin=options["margin"], tolerance=options["tolerance"])
     return open_run({**options, "part": ()}), judging
@@ -292,7 +292,7 @@ def oscillator(options: dict[str, Any]) -> Oscillator | None:
 
 def settings(options: dict[str, Any]) -> Settings:
     """Collect the options of ``choosing_options``; UsageError where they contradict each other."""
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.settings import Settings
     from d2rpick.vibration.replay import to_mode
 
     given, window = oscillator(options), options["fit_window"]

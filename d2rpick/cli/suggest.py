@@ -12,7 +12,7 @@ from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 
 if TYPE_CHECKING:
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.settings import Settings
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.comparison import Comparison
-    from d2rpick.choice.suggest import Verdict
+    from d2rpick.choice.verify import Verdict
     from d2rpick.histories.history import Part, Track
     from d2rpick.histories.opening import Run, Selection
 
@@ -59,7 +59,8 @@ class _Verify(click.Command):
 @click.pass_context
 def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exit_zero: bool, **options: Any) -> None:
     """Judge one pair of switch times against the HISTORY of a run without switching."""
-    from d2rpick.choice.suggest import verify, with_comparison, with_health
+    from d2rpick.choice.suggest import with_health
+    from d2rpick.choice.verify import verify, with_comparison
     from d2rpick.histories.balance_terms import balance_of
     from d2rpick.report import verdict as report
 

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.situation import Situation
-    from d2rpick.choice.suggest import Suggestion, Verdict
+    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.choice.verify import Verdict
     from d2rpick.histories.history import Samples
     from d2rpick.models.published_figures import Exhibit, Panel
     from d2rpick.models.rollover.record import Record

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.comparison import Comparison
-    from d2rpick.choice.suggest import Verdict
+    from d2rpick.choice.verify import Verdict
 
 SCHEMA = "d2rpick/verify/1"
 COMPARED = ("", "switched", "reference")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.choice.comparison import Comparison
-    from d2rpick.choice.suggest import Verdict
+    from d2rpick.choice.verify import Verdict
     from d2rpick.report.html import Markup
 
 

@@ -8,15 +8,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.choice.situation import examine
-from d2rpick.choice.suggest import Verdict, better_pair, suggest, verify
+from d2rpick.choice.examine import examine
+from d2rpick.choice.suggest import better_pair, suggest
+from d2rpick.choice.verify import Verdict, verify
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution
 from d2rpick.rules.base import Fault, name_units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.settings import Settings
     from d2rpick.deck import Window
     from d2rpick.histories.history import History, Momenta
     from d2rpick.histories.opening import Run, Selection

@@ -23,7 +23,7 @@ from d2rpick.histories.source import expand
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.settings import Settings
     from d2rpick.histories.history import History, Samples
 
 # A run has one of these; the first two were judged.

@@ -30,7 +30,7 @@ LOOP = f"""
 import sys
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.opening import read_history
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.settings import Settings
 found = [suggest(read_history([name]), {TD}, Settings()).recommended for name in sys.argv[1:]]
 assert all(found)
 """

@@ -10,8 +10,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.acceptable_windows import acceptable_windows, common_windows, coverage, tolerance_levels
-from d2rpick.choice.situation import Settings
-from d2rpick.choice.suggest import Suggestion, suggest, verify
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import Suggestion, suggest
+from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, read_history
 from d2rpick.vibration.modes import Modes
@@ -38,7 +39,7 @@ def check(answer: Suggestion, seed: int) -> None:
     """Hold the windows against ``verify`` at their ends, inside, and anywhere."""
     with pytest.MonkeyPatch.context() as patch:
         # the same record at the same td: what is found in it need not be found a hundred times
-        patch.setattr("d2rpick.choice.suggest.examine", lambda *_: answer.situation)
+        patch.setattr("d2rpick.choice.verify.examine", lambda *_: answer.situation)
         _check(answer, seed)
 
 

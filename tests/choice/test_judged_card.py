@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from d2rpick.choice.judged_card import CardRequest, judged_card
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.settings import Settings
 from d2rpick.deck.printing.common import Printing
 from d2rpick.histories.opening import read_history
 from tests.command import ENERGY, GLSTAT

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from d2rpick.choice import measures
 from d2rpick.choice.candidates import Candidate
-from d2rpick.choice.situation import Settings
-from d2rpick.choice.suggest import EQUALLY_GOOD, Suggestion, rank, suggest, verify
+from d2rpick.choice.ranking import EQUALLY_GOOD, rank
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import Suggestion, suggest
+from d2rpick.choice.verify import verify
 from d2rpick.errors import RangeError
 from d2rpick.histories.history import History
 from d2rpick.vibration.replay import to_mode

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import expectation, shortfall
-from d2rpick.choice.situation import Settings, examine
-from d2rpick.choice.suggest import EQUALLY_GOOD, suggest
+from d2rpick.choice.ranking import EQUALLY_GOOD
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.errors import RangeError
 from d2rpick.histories.history import EXACT, History, Momenta, Part

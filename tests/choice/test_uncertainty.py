@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.uncertainty import curvature, fitted_reach, reach, sampled_reach
 from d2rpick.histories.crossings import find_crossings

@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.examine import examine
+from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.flight.flight import Flight, Span, described_span, energy_flight
+from d2rpick.flight.energy_alone import end_of_load
+from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import History
 from d2rpick.vibration.replay import to_mode
+from d2rpick.vibration.span import Span, described_span
 from tests import paper
 from tests.shared import shared
 
@@ -101,7 +104,7 @@ def test_many_modes_are_no_oscillator_and_the_energy_tells_the_end_of_the_load()
 def test_an_energy_that_never_was_above_its_band_shows_no_end_of_a_load() -> None:
     time = np.linspace(0, 1, 101)
     rising = History(time, time**2, source=("rising",), format="csv", channel="E")
-    assert energy_flight(rising, 0.8) == Flight(None, None, None)
+    assert end_of_load(rising, 0.8) is None
 
 
 def test_a_start_that_is_given_replaces_the_start_only() -> None:
@@ -202,8 +205,8 @@ def test_a_rising_energy_shows_no_end_of_a_load() -> None:
         np.exp(-((time - 0.1) ** 2) / 0.001) + 0.1 * np.sin(300 * time) ** 2 + np.where(time > 0.9, time - 0.9, 0) * 9
     )
     fed = History(time, energy, source=("fed",), format="csv", channel="E")
-    assert energy_flight(fed, 0.96) == Flight(None, None, None)
-    assert energy_flight(fed, 0.85).start == pytest.approx(0.13, abs=0.05)
+    assert end_of_load(fed, 0.96) is None
+    assert end_of_load(fed, 0.85) == pytest.approx(0.13, abs=0.05)
 
 
 def test_a_small_second_mode_makes_no_short_flights() -> None:

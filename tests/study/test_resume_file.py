@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.settings import Settings
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection
 from d2rpick.study import study

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.situation import Settings
-from d2rpick.choice.suggest import verify
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, read_history
 from d2rpick.study.study import OK, Question, Row, ask, failed, find_runs, outline, shortest, summarise

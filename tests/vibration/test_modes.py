@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
+from d2rpick.choice.examine import examine
 from d2rpick.choice.measures import kinetic_share, lock_in_error, residual
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, identify_several

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.candidates import Found, judge
-from d2rpick.choice.situation import Settings, Situation, examine
+from d2rpick.choice.examine import examine
+from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threads
 from d2rpick.histories.history import History
@@ -20,6 +22,9 @@ from d2rpick.vibration.part_signs import MOST_UNSIGNED, read_parts
 from tests import chain
 from tests.records import printed
 from tests.shared import shared
+
+if TYPE_CHECKING:
+    from d2rpick.choice.situation import Situation
 
 PLAIN = Settings()
 NAMES = ("IE_spring1_J", "IE_spring2_J")

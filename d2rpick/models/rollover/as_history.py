@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import EXACT, History, Momenta, Part
 from d2rpick.models.rollover.record import BOX, PARTS

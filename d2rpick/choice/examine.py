@@ -1,0 +1,95 @@
+"""What a record tells about a td, found once: the flight around it, the oscillator in it, the parts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.choice.situation import Situation
+from d2rpick.errors import RangeError
+from d2rpick.flight.flight import find_flight, seen_flight
+from d2rpick.vibration.identify import Identification, assess, identify, identify_several
+from d2rpick.vibration.span import Span, described_span, identify_within, span_of
+
+if TYPE_CHECKING:
+    from d2rpick.choice.settings import Settings
+    from d2rpick.flight.momentum import FreeFlight
+    from d2rpick.histories.history import History, Samples
+
+# Beyond, squares of energies are no numbers any more; no unit system comes near.
+_LARGEST = 1e150
+
+
+def examine(history: History, td: float, settings: Settings) -> Situation:
+    """Find the flight around ``td`` and the oscillator in it.
+
+    RangeError when td, --after or the fit window lie outside the record, or it has fewer than 3 states.
+    """
+    if history.time.size < 3:
+        found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
+        raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
+    history.energy_at(td)
+    largest = float(np.abs(history.energy).max())
+    if largest > _LARGEST:
+        raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
+    if settings.after is not None:
+        _inside(history, settings.after, "--after")
+    seen = seen_flight(history, td) if history.momenta else None
+    fit, span = _oscillator(history, td, settings, seen)
+    situation = Situation(history, td, settings, find_flight(history, td, settings.after, seen, span), fit, span)
+    if history.part_energies is None or not settings.replay:
+        return situation
+    # without a sign of the next contact nothing is known of what comes after td
+    end = situation.flight.end or (float(history.time[-1]) if seen or span else td)
+    return _with_parts(situation, history.part_energies, end)
+
+
+def _oscillator(
+    history: History, td: float, settings: Settings, seen: FreeFlight | None
+) -> tuple[Identification | None, Span | None]:
+    """Find the oscillator, given or identified, and the window around td that it describes."""
+    if not settings.replay:
+        return None, None
+    bounds = Span(seen.start, seen.end) if seen else Span(float(history.time[0]), float(history.time[-1]))
+    if settings.after is not None:
+        bounds = bounds._replace(start=min(settings.after, td))
+    if settings.fit_window:
+        for bound in settings.fit_window:
+            _inside(history, bound, "--fit-window")
+        fit = identify_within(history, Span(*settings.fit_window))
+        return fit, span_of(history, td, fit, bounds) if fit.describes_record else None
+    if settings.oscillator:
+        span, fit = described_span(history, td, bounds, partial(assess, settings.oscillator), whole=seen is not None)
+        return fit, span
+    span, fit = described_span(history, td, bounds, identify, whole=seen is not None)
+    if span is None:
+        span, several = described_span(history, td, bounds, identify_several, whole=seen is not None)
+        fit = several if span else fit
+    return fit, span
+
+
+def _with_parts(situation: Situation, energies: Samples, end: float) -> Situation:
+    """Add what the energies of single parts, (n, k), tell of the flight up to ``end``."""
+    from d2rpick.vibration.envelope import upper_envelope
+    from d2rpick.vibration.part_signs import PartVibration, read_parts
+
+    history, td, start = situation.history, situation.td, situation.flight.start
+    first = min(td, float(history.time[0]) if start is None else start)
+    inside = slice(*np.searchsorted(history.time, [first, np.nextafter(end, np.inf)]))
+    if history.time[inside].size < 3:
+        return situation
+    parts = read_parts(history.time[inside], energies[inside], history.part_names)
+    whole = situation.mode or upper_envelope(history.time[inside], history.energy[inside])
+    vibration = PartVibration(parts, whole) if parts.signed and whole else None
+    return replace(situation, parts=parts, signed_parts=vibration)
+
+
+def _inside(history: History, time: float, option: str) -> None:
+    if not history.time[0] <= time <= history.time[-1]:
+        raise RangeError(
+            f"{', '.join(history.source)}: {option} {time:g} lies outside the record, "
+            f"{history.time[0]:g} to {history.time[-1]:g}"
+        )

@@ -1,0 +1,33 @@
+"""What the analyst asks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from d2rpick.vibration.one_mode import Mode
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the analyst asks for; times in the unit of the history.
+
+    ``after``: the load ends here (None: found from the record).  ``margin``: kept clear after the load and before
+    the next contact.  ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
+    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
+    given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
+    the energy level alone.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the
+    step while rigid to that while deformable; without the first nothing is said of the run time.
+    """
+
+    after: float | None = None
+    margin: float = 0.0
+    tolerance: float = 0.2
+    max_kinetic_share: float | None = None
+    max_residual: float | None = None
+    oscillator: Mode | None = None
+    fit_window: tuple[float, float] | None = None
+    replay: bool = True
+    cost_share: float | None = None
+    step_ratio: float = 1.0

@@ -1,0 +1,77 @@
+"""Judging one pair of switch times."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from d2rpick.choice.candidates import Candidate, Found, judge
+from d2rpick.choice.examine import examine
+from d2rpick.choice.ranking import over_limits
+from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of
+from d2rpick.errors import RangeError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from d2rpick.choice.comparison import Comparison
+    from d2rpick.choice.health import Health
+    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Situation
+    from d2rpick.histories.history import History
+
+
+class Verdict(NamedTuple):
+    """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
+
+    ``tr_ok`` and ``td_ok`` are None where the record does not tell.
+    """
+
+    situation: Situation
+    candidate: Candidate
+    tr_ok: bool | None
+    td_ok: bool | None
+    verified: bool
+    reasons: tuple[str, ...]
+    cautions: tuple[Caution, ...]
+    switched: Comparison | None = None
+    health: Health | None = None
+
+
+def verify(history: History, tr: float, td: float, settings: Settings) -> Verdict:
+    """Judge one pair; RangeError when a time lies outside the record or tr is not before td."""
+    if not tr < td:
+        raise RangeError(f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td")
+    situation = examine(history, td, settings)
+    history.energy_at(tr)
+    (candidate,) = judge(situation, [Found(tr, "given", None)])
+    known = situation.flight.start is not None
+    share = situation.kinetic_share
+    limit = POOR_KINETIC_SHARE if settings.max_kinetic_share is None else settings.max_kinetic_share
+    outside = td > situation.latest_td or (situation.earliest_tr is not None and td <= situation.earliest_tr)
+    td_ok = False if outside else None if share is None else share <= limit
+    over = over_limits(situation, candidate)
+    reasons = (*candidate.notes, *over)
+    return Verdict(
+        situation=situation,
+        candidate=candidate,
+        tr_ok=candidate.acceptable if known else None,
+        td_ok=td_ok,
+        verified=candidate.acceptable and not over,
+        reasons=reasons,
+        cautions=tuple(cautions_of(situation)),
+    )
+
+
+def approve(situation: Situation, times: Iterable[float]) -> list[bool]:
+    """Tell for each of ``times`` before td whether ``verify`` would verify it as tr."""
+    judged = judge(situation, [Found(tr, "given", None) for tr in times])
+    return [candidate.acceptable and not over_limits(situation, candidate) for candidate in judged]
+
+
+def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:
+    """Add what a finished switched run shows; a wrong motion of it overrules the verdict."""
+    return verdict._replace(
+        switched=comparison,
+        verified=verdict.verified and not comparison.objections,
+        reasons=verdict.reasons + comparison.objections,
+    )

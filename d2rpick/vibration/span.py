@@ -1,0 +1,164 @@
+"""Where one oscillator describes the record: the window around td, found by growing and fitting anew."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from d2rpick.vibration.identify import identify
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.identify import Identification
+
+    Fitter = Callable[[Samples, Samples], Identification]
+
+# Where windows that are tried for an oscillator begin, as shares of what comes before td, and where they end, of what
+# comes after: by such steps one of them lies in any flight of some periods and fills most of it.
+_BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
+# Ends before td, as shares of what comes before it: td itself may lie in the next contact.
+_EARLIER_ENDS = (0.1, 0.2, 0.35)
+# A window that an oscillator describes shows so many periods at least, and holds most of the samples it was fitted to:
+# less may be an accident, or the moment in which a record passes from one thing to another.
+_LEAST_PERIODS, _MOST = 1.25, 0.8
+# An inner fit whose scatter is below this share of that of the whole shows that the ends are not of the flight.
+_MUCH_BETTER = 0.7
+# The record leaves the fitted oscillator where the mean error over a twenty-fifth of a period (three samples at
+# least) exceeds this share of the vibration energy, this many standard errors of such a mean, or this many times the
+# systematic rest that the fit leaves anyway, whichever is most.  Of a million means of white noise one does by chance.
+_SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
+# Fits of the growing window until it stays; two are usual.
+_MOST_REFITS = 8
+
+
+class Span(NamedTuple):
+    """Window of the record that an oscillator describes, from its first to its last sample [time]."""
+
+    start: float
+    end: float
+
+
+def described_span(
+    history: History, td: float, bounds: Span, fitter: Fitter = identify, *, whole: bool = False
+) -> tuple[Span | None, Identification]:
+    """Find the longest window around td that one oscillator describes, or the last one before td.
+
+    First a part of the record that one oscillator describes is looked for, long ones first.  From there the window
+    grows both ways while the samples stay with the fit, is fitted anew, and so on until it stays.
+
+    Parameters
+    ----------
+    history : History
+    td : float
+        [time]
+    bounds : Span
+        Where to look [time].
+    fitter : callable
+        Gives the oscillator for some samples: `identify`, `identify_several` or one that is given.
+    whole : bool
+        Try nothing shorter than the bounds and their part up to td: it is known that no load acts there.
+
+    Returns
+    -------
+    span : Span or None
+        None when no oscillator describes the record around td or before.
+    fit : Identification
+        Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
+    """
+    refused = {}
+    for window in _windows(td, bounds, whole=whole):
+        span, fit = _grow(history, td, window, bounds, fitter)
+        if span:
+            return span, fit
+        refused[window] = fit
+    return None, refused[Span(bounds.start, td)]
+
+
+def span_of(history: History, anchor: float, fit: Identification, bounds: Span) -> Span | None:
+    """Find the window around ``anchor`` [time], within ``bounds``, in which the record stays with ``fit``.
+
+    It ends where the energy drifts off the fit; None when it is off at the anchor itself.
+    """
+    assert fit.mode is not None
+    time, energy = _samples(history, bounds)
+    period = 2 * np.pi / fit.mode.fastest
+    width = max(3, round(period / _MEANS_PER_PERIOD / float(np.sort(np.diff(time))[(time.size - 1) // 2])))
+    with np.errstate(over="ignore", invalid="ignore"):  # far off, a damped fit grows beyond all numbers
+        least = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
+        room = np.maximum(_SHARE_OFF * fit.mode.vibration_energy(time), least)
+        error = np.convolve(energy - fit.mode.energy(time), np.ones(width) / width, mode="same")
+        gone = ~(np.abs(error) <= room)
+    middle = int(np.searchsorted(time, anchor))
+    before, after = np.flatnonzero(gone[:middle]), np.flatnonzero(gone[middle:])
+    # the mean over ``width`` samples reaches half as far beyond its middle
+    left = int(before[-1]) + 1 + width // 2 if before.size else 0
+    right = middle + int(after[0]) - 1 - width // 2 if after.size else time.size - 1
+    return Span(float(time[left]), float(time[right])) if left < right else None
+
+
+def identify_within(history: History, window: Span) -> Identification:
+    """Identify the oscillator from the samples in a window."""
+    return identify(*_samples(history, window))
+
+
+def _windows(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
+    """Windows to try: around td, the longest first, then before td."""
+    beginnings = [bounds.start, *(td - share * (td - bounds.start) for share in (() if whole else _BEGINNINGS))]
+    ends = [bounds.end, td, *(td + share * (bounds.end - td) for share in (() if whole else _ENDS))]
+    around = {Span(beginning, end) for beginning in beginnings for end in ends}
+    yield from sorted(around, key=lambda window: window.start - window.end)
+    if not whole:
+        for share in _EARLIER_ENDS:
+            end = td - share * (td - bounds.start)
+            yield from (Span(beginning, end) for beginning in beginnings if beginning < end)
+
+
+def _samples(history: History, window: Span) -> tuple[Samples, Samples]:
+    """Times and energies of the samples in a window."""
+    inside = slice(*np.searchsorted(history.time, [window.start, np.nextafter(window.end, np.inf)]))
+    return history.time[inside], history.energy[inside]
+
+
+def _grow(
+    history: History, td: float, window: Span, bounds: Span, fitter: Fitter
+) -> tuple[Span | None, Identification]:
+    """Fit a window, extend it while the record stays with the fit, refit, repeat until it stays."""
+    fit, span = fitter(*_samples(history, window)), window
+    for _ in range(_MOST_REFITS):
+        if not fit.describes_record or fit.mode is None:
+            return None, fit
+        grown = span_of(history, min(td, window.end), fit, bounds)
+        least = max(_LEAST_PERIODS * 2 * np.pi / fit.mode.omega, _MOST * (window.end - window.start))
+        if grown is None or grown.end - grown.start < least:
+            reason = "the record soon leaves the oscillator that fits a part of it"
+            return None, fit._replace(describes_record=False, reason=reason)
+        if grown == (fit.start, fit.end):
+            return _cleared(history, grown, fit, bounds, fitter)
+        span = grown
+        fit = fitter(*_samples(history, span))
+    return (span, fit) if fit.describes_record else (None, fit)
+
+
+def _cleared(
+    history: History, span: Span, fit: Identification, bounds: Span, fitter: Fitter
+) -> tuple[Span, Identification]:
+    """Fit the window once more without half a period at the ends where the record leaves it.
+
+    There a fit may have given way to the beginning of a contact or the end of a load.  Where the inner fit follows its
+    samples much better, it tells the window.
+    """
+    assert fit.mode is not None
+    inset = np.pi / fit.mode.omega
+    inner = Span(
+        span.start + inset if span.start > bounds.start else span.start,
+        span.end - inset if span.end < bounds.end else span.end,
+    )
+    if inner == span or inner.end - inner.start < 2 * _LEAST_PERIODS * 2 * inset:
+        return span, fit
+    core = fitter(*_samples(history, inner))
+    if not core.describes_record or core.rms > _MUCH_BETTER * fit.rms:
+        return span, fit
+    return span_of(history, (inner.start + inner.end) / 2, core, bounds) or span, core
