@@ -79,6 +79,8 @@ def survey(run: Run, selection: Selection) -> Overview:
             time = first.time if first.channels else first.part_time
         states = int(time.size)
     except FormatError as error:  # several columns may be the time: there is still a list of them
+        if first.format == "csv" and _has_one_energy(first):
+            raise  # the table cannot be read
         notes.append(str(error))
     steps = np.diff(time)
     flights = _flights(run, selection)
@@ -99,6 +101,14 @@ def survey(run: Run, selection: Selection) -> Overview:
         health=_health(run, [flight for _, flight in flights]),
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _has_one_energy(database: Legs) -> bool:
+    """Whether it is told which column is the energy, and by this which is its time."""
+    try:
+        return database.energy_channel is not None
+    except FormatError:
+        return False
 
 
 def _notes(database: Legs) -> tuple[str, ...]:

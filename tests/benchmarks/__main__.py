@@ -185,6 +185,12 @@ ROWS = (
     Row("memory / (2 answers + 64 MB): glstat", reading("memory_over_limit", "glstat"), most=1.0),
     Row("memory / (2 answers + 64 MB): matsum", reading("memory_over_limit", "matsum"), most=1.0),
     Row("memory / (2 answers + 64 MB): binout", reading("memory_over_limit", "binout"), most=1.0),
+    Row("csv, 1e6 rows, 2 columns / numpy.loadtxt", reading("csv_to_loadtxt"), most=1.5),
+    Row("memory / (3 answers + 64 MB): csv, 1e6 rows", reading("csv_memory_over_limit"), most=1.0),
+    Row("csv, 1e6 rows, 20 columns / pandas.read_csv", reading("csv_to_pandas"), most=2.0),
+    Row("hdf5, 1e6 rows / h5py alone: processes", reading("hdf5_to_h5py"), most=2.0),
+    Row("writing csv, 1e6 rows / pandas to_csv", reading("write_to_pandas"), most=1.0),
+    Row("extract of 1e6 rows / pandas read and to_csv: processes", reading("extract_to_pandas"), most=1.0),
 )
 
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.opening import Selection, open_run
 from tests.made_binout import GLSTAT, LsdaWriter, values
 from tests.text_files import glstat_text, matsum_text
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 LASSO = Path(os.environ.get("D2RPICK_LASSO_PYTHON", sys.executable))
 _STATES = 100_000
 _PARTS, _PART_STATES = 500, 2000
+_ROWS = 1_000_000
 _ROUNDS = 7
 _ROOM = 64  # MB that reading may take beside twice the answer
 _folder = TemporaryDirectory()
@@ -86,7 +88,11 @@ def lasso_to_binout() -> float | None:
 
 def memory_over_limit(kind: str) -> float:
     """Anonymous memory of a process at its peak while it reads, over twice the answer plus 64 MB."""
-    file = {"glstat": _glstat, "matsum": _matsum, "binout": _binout}[kind]()
+    return _memory({"glstat": _glstat, "matsum": _matsum, "binout": _binout}[kind](), times=2)
+
+
+def _memory(file: Path, times: int) -> float:
+    """Peak of the memory that reading takes over so many times the energies plus some room."""
     code = (
         "import sys; from pathlib import Path; from d2rpick.histories.opening import Selection, open_run\n"
         "def anonymous():\n"
@@ -94,6 +100,7 @@ def memory_over_limit(kind: str) -> float:
         "    return int(status.split()[0]) / 1024\n"
         "import threading, time\n"
         "import d2rpick.histories.formats.binout, d2rpick.histories.formats.glstat, d2rpick.histories.formats.matsum\n"
+        "import d2rpick.histories.formats.csv_table\n"
         "before, peak, done = anonymous(), 0.0, False\n"
         "def watch():\n"
         "    global peak\n"
@@ -103,15 +110,95 @@ def memory_over_limit(kind: str) -> float:
         "run = open_run([sys.argv[1]])\n"
         "answer = run.part_energies(run.parts) if run.parts else run.history(Selection()).energy\n"
         "peak = max(peak, anonymous()); done = True; watcher.join()\n"
-        "print(peak - before, 2 * answer.nbytes / 2**20)"
+        "print(peak - before, answer.nbytes / 2**20)"
     )
     found = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=True)
-    taken, twice = map(float, found.stdout.split())
-    return taken / (twice + _ROOM)
+    taken, answer = map(float, found.stdout.split())
+    return taken / (times * answer + _ROOM)
+
+
+def csv_to_loadtxt() -> float:
+    """Reading a csv of 1e6 rows and two columns over numpy.loadtxt, of the same file."""
+    file = _csv(_ROWS, 2)
+    np.testing.assert_array_equal(_read(file).energy, _loadtxt(file)[:, 1])
+    return _ratio(lambda: _read(file), lambda: _loadtxt(file))
+
+
+def csv_to_pandas() -> float:
+    """Reading time and energy of a csv of 1e6 rows and 20 columns over pandas.read_csv of all of it."""
+    import pandas as pd
+
+    file = _csv(_ROWS, 20)
+    return _ratio(lambda: _read(file), lambda: pd.read_csv(file))
+
+
+def hdf5_to_h5py() -> float:
+    """Reading an hdf5 of 1e6 rows over h5py alone: processes."""
+    file = _folder_file("rows.h5")
+    if not file.exists():
+        time, energy = _rows(_ROWS, 2).T
+        file.write_bytes(hdf5_file.write({"time": time, "internal_energy": energy}))
+    ours = "import sys; from d2rpick.histories.opening import read_history; read_history(sys.argv[1:])"
+    alone = "import sys, h5py; file = h5py.File(sys.argv[1]); file['time'][()], file['internal_energy'][()]"
+    return _ratio(lambda: _process("-c", ours, str(file)), lambda: _process("-c", alone, str(file)))
+
+
+def extract_to_pandas() -> float:
+    """Command extract of 1e6 rows of a hdf5 to csv over pandas to_csv of the same frame: processes."""
+    file = _csv(_ROWS, 2)
+    theirs = "import sys, pandas; pandas.read_csv(sys.argv[1]).to_csv(sys.argv[2], index=False)"
+    out = str(_folder_file("out.csv"))
+    return _ratio(
+        lambda: _process("-m", "d2rpick", "extract", str(file), "-o", out, "--overwrite"),
+        lambda: _process("-c", theirs, str(file), out),
+    )
+
+
+def write_to_pandas() -> float:
+    """Writing 1e6 rows of two columns as csv over pandas to_csv of the same frame."""
+    import pandas as pd
+
+    time, energy = _rows(_ROWS, 2).T
+    columns = {"time": time, "internal_energy": energy}
+    frame = pd.DataFrame(columns)
+    assert csv_table.write(columns).decode() == frame.to_csv(index=False)
+    return _ratio(lambda: csv_table.write(columns), lambda: frame.to_csv(index=False))
+
+
+def csv_memory_over_limit() -> float:
+    """Anonymous memory of a process at its peak while it reads 1e6 rows, over three times the answer plus 64 MB."""
+    return _memory(_csv(_ROWS, 2), times=3)
 
 
 def _read(file: Path) -> History:
     return open_run([str(file)]).history(Selection())
+
+
+def _rows(rows: int, columns: int) -> Samples:
+    """Made-up noisy columns, shape (rows, columns), the first of them a time."""
+    values = np.random.default_rng(14).normal(size=(rows, columns))
+    values[:, 0] = np.arange(rows) * 1e-6
+    return values
+
+
+def _csv(rows: int, columns: int) -> Path:
+    file = _folder_file(f"{columns}.csv")
+    if not file.exists():
+        names = ["time", "internal_energy", *(f"column {i}" for i in range(2, columns))]
+        file.write_bytes(csv_table.write(dict(zip(names, _rows(rows, columns).T, strict=True))))
+    return file
+
+
+def _folder_file(name: str) -> Path:
+    return Path(_folder.name) / name
+
+
+def _loadtxt(file: Path) -> Samples:
+    return np.loadtxt(file, delimiter=",", skiprows=1)
+
+
+def _process(*command: str) -> None:
+    subprocess.run([sys.executable, *command], check=True, capture_output=True)
 
 
 def _glstat_loop(file: Path) -> Numbers:

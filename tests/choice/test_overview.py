@@ -196,3 +196,11 @@ def test_the_result_goes_to_a_file_whole_or_not_at_all(tmp_path: Path) -> None:
     assert file.read_text().startswith('{\n  "schema": "d2rpick/info/1"')
     assert run("info", "-f", "json", ENERGY, "-o", str(file)).exit_code == 2
     assert run("info", ENERGY, "-o", ENERGY, "--overwrite").exit_code == 2
+
+
+def test_a_table_that_cannot_be_read_is_an_error(tmp_path: Path) -> None:
+    file = tmp_path / "broken.csv"
+    file.write_text("time,IE\n0,1\n1,2\nx,3\n2,4\n")
+    result = run("info", str(file))
+    assert result.exit_code == 2
+    assert "broken.csv:4: 'time' is 'x', a number was expected" in result.stderr

@@ -171,11 +171,10 @@ class Table:
         if column not in self._read and self._plain:
             # first what was asked for; who wants more mostly wants all
             wanted = range(self._layout.columns) if self._read else sorted({*self._needed, column})
-            table = plain_values(self._text, self._begin, self._layout, wanted)
-            self._plain = table is not None
-            if table is not None:
-                columns = zip(wanted, table.T.copy(), strict=True)
-                self._read |= {one: values for one, values in columns if np.isfinite(values).all()}
+            columns = plain_values(self._text, self._begin, self._layout, wanted)
+            self._plain = columns is not None
+            found = zip(wanted, columns or (), strict=self._plain)
+            self._read |= {one: values for one, values in found if np.isfinite(values).all()}
         if column not in self._read:
             values = checked_values(self._text, self._begin, self._layout, (self._time, column))
             self._read |= {self._time: values[:, 0].copy(), column: values[:, 1].copy()}

@@ -69,7 +69,7 @@ def _check_size_of_file(file: Path | BinaryIO, source: str) -> None:
     head = head[base:]
     version = head[_VERSION] if len(head) > _VERSION else -1
     place = _END_OF_FILE.get(version)
-    if place is None or head[_SIZE[version]] != _ADDRESS_SIZE or len(head) < place + _ADDRESS_SIZE:
+    if place is None or len(head) < place + _ADDRESS_SIZE or head[_SIZE[version]] != _ADDRESS_SIZE:
         return  # the library says what is wrong with it
     (end,) = struct.unpack_from("<Q", head, place)
     if size not in (end, end + base):

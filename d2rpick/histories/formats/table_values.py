@@ -19,18 +19,21 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-def plain_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Samples | None:
-    """Columns ``used`` of the rows from byte ``begin`` on, shape (rows, len(used)).
+def plain_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> list[Samples] | None:
+    """Columns ``used`` of the rows from byte ``begin`` on, each of shape (rows,).
 
     None unless each row has its number of cells and no line stands between them.
     """
-    found = []
+    columns = [np.empty(text.count(begin)) for _ in used]
+    row = 0
     for piece in text.pieces(begin):
         values = _plain_piece(piece, layout, used)
         if values is None:
             return None
-        found.append(values)
-    return np.concatenate(found) if found else None
+        for column, own in zip(columns, values.T, strict=True):
+            column[row : row + len(values)] = own
+        row += len(values)
+    return columns if row else None
 
 
 def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples | None:

@@ -69,6 +69,11 @@ class Text:
                 return self._end
         return at
 
+    def count(self, begin: int) -> int:
+        """How many lines there are from byte ``begin`` on."""
+        ends = self._data.count(b"\n", begin, self._end)
+        return ends + (self._end > begin and not self._data.endswith(b"\n", 0, self._end))
+
     def take_rest(self) -> None:
         """Count the last line, which has no end, as whole."""
         self._end = len(self._data)
