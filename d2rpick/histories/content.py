@@ -97,7 +97,11 @@ class OnDisk(Content):
         return self._size
 
     def __bytes__(self) -> bytes:
-        data = self.view(0, self._size).tobytes()
+        self._file.seek(0)
+        data = self._file.readall()[: self._size]
+        if len(data) < self._size:
+            raise self._shortened()
+        self._views.extend((0, self._size, _sum(np.frombuffer(data, np.uint8))))
         self._check()
         return data
 
@@ -184,11 +188,14 @@ class OnDisk(Content):
         while done < len(room):  # a single call gives 2 GB at most
             more = self._file.readinto(room[done:])
             if not more:
-                raise FormatError(
-                    f"{self._name}: the file was {self._size} bytes long and became shorter while it was read; "
-                    "is a solver writing it anew? Read it again when it has"
-                )
+                raise self._shortened()
             done += more
+
+    def _shortened(self) -> FormatError:
+        return FormatError(
+            f"{self._name}: the file was {self._size} bytes long and became shorter while it was read; "
+            "is a solver writing it anew? Read it again when it has"
+        )
 
     def _check(self) -> None:
         """Make sure that what was read so far is all of one state of the file."""
