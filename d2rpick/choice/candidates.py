@@ -9,6 +9,7 @@ import numpy as np
 
 from d2rpick.choice import measures
 from d2rpick.choice.part_shares import PartMatch, contributions, main_contributors
+from d2rpick.choice.rest import at_rest
 from d2rpick.choice.uncertainty import fitted_reach, sampled_reach
 from d2rpick.histories.crossings import find_crossings, find_extrema
 from d2rpick.vibration.one_mode import Mode
@@ -37,10 +38,11 @@ class Candidate:
 
     Times in the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction``
     without unit.  ``kind``: "crossing" of the level, "extremum" near it, or "match" where the deformations of several
-    parts or modes come closest ("given" for a pair to be verified).  ``acceptable``: in the flight, same sign, error
-    within tolerance; else ``notes`` say why not.  ``run_time_share``: expected run time over that of the reference.
-    ``same_swing``: the energy turns less than twice from tr to td, so that hardly anything is saved.
-    ``parts``: what each part has of the mismatch, empty where single parts are not known.
+    parts or modes come closest, "start" of a flight in which nothing vibrates ("given" for a pair to be verified).
+    ``acceptable``: in the flight, same sign, error within tolerance; else ``notes`` say why not.  ``run_time_share``:
+    expected run time over that of the reference. ``same_swing``: the energy turns less than twice from tr to td, so
+    that hardly anything is saved. ``parts``: what each part has of the mismatch, empty where single parts are not
+    known.
     """
 
     rank: int
@@ -82,7 +84,13 @@ class Found(NamedTuple):
 
 
 def find_candidates(situation: Situation) -> tuple[Candidate, ...]:
-    """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order."""
+    """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order.
+
+    Where nothing vibrates in the flight, its start alone.
+    """
+    start = situation.earliest_tr
+    if start is not None and at_rest(situation):
+        return judge(situation, [Found(max(start, float(situation.history.time[0])), "start", None)])
     of_level = [*_from_samples(situation), *_from_mode(situation)]
     taken = np.array([one.tr for one in of_level])
     new = [one for one in _from_profile(situation) if np.all(np.abs(taken - one.tr) > situation.history.step)]
@@ -196,7 +204,7 @@ def _candidate(situation: Situation, found: Found, known: _OfVibration | None, *
     objections = tuple(_objections(situation, tr, known, level_error))
     rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
     parts = contributions(situation, tr) if known else ()
-    same_swing = situation.turns_since(tr) < 2
+    same_swing = situation.turns_since(tr) < 2 and not at_rest(situation)
     remarks = (*_SAME_SWING * same_swing, *_remarks(situation, (high - low) / 2, known, parts))
     return Candidate(
         rank=0,
@@ -236,6 +244,8 @@ def _objections(
         yield f"before {situation.end_of_load}"
     if situation.td > situation.latest_td:
         yield f"td after {situation.end_of_flight}"
+    if situation.settings.strict and not situation.flight.certain:
+        yield "the flight was read off the energy alone, which is not certain"
     if situation.drowned:
         yield "the level at td has sunk into the scatter of the record"
     if situation.prescribed and situation.mode is None:
@@ -244,6 +254,8 @@ def _objections(
         yield _UNDESCRIBED[situation.basis]
     elif known and not known.sign_match:
         yield "opposite sign of the deformation"
+    elif at_rest(situation):
+        return
     elif error is None:
         yield "no positive energy to compare"
     elif error > situation.settings.tolerance:
