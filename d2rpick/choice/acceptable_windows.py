@@ -16,8 +16,8 @@ from d2rpick.vibration.roots import narrow
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.situation import Situation
-    from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.history import Samples
 
 # Each level of tolerance is this part of the one before.
@@ -40,7 +40,9 @@ def tolerance_levels(tolerance: float) -> tuple[float, ...]:
     return tuple(levels)
 
 
-def acceptable_windows(answer: Suggestion) -> tuple[Samples, ...]:
+def acceptable_windows(
+    situation: Situation, candidates: Sequence[Candidate], recommended: float | None
+) -> tuple[Samples, ...]:
     """Find the windows in which a tr is acceptable, at the tolerance and at each finer level.
 
     Every end and middle at the full tolerance was judged by the rule of ``verify``; ends lie inside.  In between the
@@ -48,22 +50,24 @@ def acceptable_windows(answer: Suggestion) -> tuple[Samples, ...]:
 
     Parameters
     ----------
-    answer : Suggestion
-        For the run.  From some time on the error stays within the tolerance up to td: the same swing, where hardly
-        anything is saved.  That window counts only where the recommended tr lies in it.
+    situation : Situation
+    candidates : sequence of Candidate
+        All of them.
+    recommended : float or None
+        The tr that is recommended [time].  From some time on the error stays within the tolerance up to td: the same
+        swing, where hardly anything is saved.  That window counts only where the recommended tr lies in it.
 
     Returns
     -------
     tuple of array, each of shape (n, 2)
         For each of ``tolerance_levels``: first and last time of each window, ascending [time].
     """
-    situation, own = answer.situation, answer.recommended
     levels = tolerance_levels(situation.settings.tolerance)
-    grid = _grid(answer)
+    grid = _grid(situation, candidates)
     widest, *finer = _windows_below(situation, grid, np.minimum(levels, _residual_left(situation)))
     judged = approve(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
     kept = widest[np.reshape(judged, (-1, 3)).all(axis=1)]
-    if kept.size and kept[-1, 1] >= grid[-1] and not (own and kept[-1, 0] <= own.tr):
+    if kept.size and kept[-1, 1] >= grid[-1] and not (recommended is not None and kept[-1, 0] <= recommended):
         kept = kept[:-1]
     return (kept, *(_within(windows, kept) for windows in finer))
 
@@ -112,14 +116,13 @@ def common_windows(runs: Sequence[Samples]) -> Samples:
     return np.asarray(stretches[counts == len(runs)])
 
 
-def _grid(answer: Suggestion) -> Samples:
+def _grid(situation: Situation, candidates: Sequence[Candidate]) -> Samples:
     """Times in the flight before td between which the rule changes once at most."""
-    situation = answer.situation
     history, td = situation.history, situation.td
     start = situation.earliest_tr
     if start is None or start >= td:
         return np.zeros(0)
-    found = [candidate.tr for candidate in answer.candidates]
+    found = [candidate.tr for candidate in candidates]
     times = np.concatenate([history.time, found, situation.vibration.knots(), [start, np.nextafter(td, -np.inf)]])
     return np.unique(times[(times >= max(start, history.time[0])) & (times < td)])
 

@@ -9,13 +9,14 @@ import numpy as np
 
 from d2rpick.choice.warnings import end_of_flight, end_of_load
 from d2rpick.vibration import measures
+from d2rpick.vibration.moments import Moment
 from d2rpick.vibration.part_shares import main_contributors
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.situation import Situation
-    from d2rpick.vibration.moments import Measured, Moment
+    from d2rpick.vibration.moments import Measured
     from d2rpick.vibration.part_shares import PartMatch
 
 
@@ -30,11 +31,11 @@ class Candidate:
 
     Times in the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction``
     without unit.  ``kind``: "crossing" of the level, "extremum" near it, or "match" where the deformations of several
-    parts or modes come closest ("given" for a pair to be verified).  ``acceptable``: in the flight, same sign, error
-    within tolerance; else ``notes`` say why not.  ``run_time_share``: expected run time over that of the reference.
-    ``same_swing``: the energy turns less than twice from tr to td, so that hardly anything is saved.
-    ``residual_high``: how large the residual may be if what the oscillator leaves over is a further mode.
-    ``parts``: what each part has of the mismatch, empty where single parts are not known.
+    parts or modes come closest, "start" of a flight in which nothing vibrates ("given" for a pair to be verified).
+    ``acceptable``: in the flight, same sign, error within tolerance; else ``notes`` say why not.  ``run_time_share``:
+    expected run time over that of the reference.  ``same_swing``: the energy turns less than twice from tr to td, so
+    that hardly anything is saved.  ``residual_high``: how large the residual may be if what the oscillator leaves over
+    is a further mode.  ``parts``: what each part has of the mismatch, empty where single parts are not known.
     """
 
     rank: int
@@ -69,7 +70,13 @@ class Candidate:
 
 
 def find_candidates(situation: Situation) -> tuple[Candidate, ...]:
-    """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order."""
+    """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order.
+
+    Where nothing vibrates in the flight, its start alone.
+    """
+    start = situation.earliest_tr
+    if start is not None and situation.at_rest:
+        return judge(situation, [Moment(max(start, float(situation.history.time[0])), "start", None)])
     found = situation.vibration.moments(situation.settings.tolerance)
     of_level = np.array([one.tr for one in found if one.kind != "match"])
     new = [one for one in found if one.kind != "match" or np.all(np.abs(of_level - one.tr) > situation.history.step)]
@@ -95,7 +102,7 @@ def _candidate(situation: Situation, found: Moment, known: Measured | None, *, l
     objections = tuple(_objections(situation, tr, known, level_error))
     rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
     parts = situation.vibration.part_matches(tr) if known else ()
-    same_swing = situation.turns_since(tr) < 2
+    same_swing = situation.turns_since(tr) < 2 and not situation.at_rest
     remarks = (*_SAME_SWING * same_swing, *_remarks(situation, (high - low) / 2, known, parts))
     return Candidate(
         rank=0,
@@ -134,11 +141,15 @@ def _objections(situation: Situation, tr: float, known: Measured | None, level_e
         yield f"before {end_of_load(situation)}"
     if situation.td > situation.latest_td:
         yield f"td after {end_of_flight(situation)}"
+    if situation.settings.strict and not situation.flight.certain:
+        yield "the flight was read off the energy alone, which is not certain"
     yield from situation.vibration.doubts
     if not situation.vibration.unknown and known is None:
         yield situation.vibration.undescribed
     elif known and not known.sign_match:
         yield "opposite sign of the deformation"
+    elif situation.at_rest:
+        return
     elif error is None:
         yield "no positive energy to compare"
     elif error > situation.settings.tolerance:

@@ -7,9 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from d2rpick.flight.energy_alone import round_off
+
 if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
+
+
+# Of e: about the largest double.
+_LARGEST_EXPONENT = 700.0
 
 
 class Expectation(NamedTuple):
@@ -54,11 +60,15 @@ def expectation(situation: Situation, energy_tr: float | None) -> Expectation | 
     ``energy_tr`` is what the recommended tr locks in [energy], None where nothing is recommended.
     """
     mean, energy_td = mean_in_flight(situation), situation.energy_td
-    if situation.basis != "energy" or mean is None or not energy_td > 0:
+    if situation.basis != "energy" or mean is None or not energy_td > 0 or situation.at_rest:
         return None
     time, energy = _flight(situation)
     resting = max(0.0, float(energy.min()))
-    left = float(1 / np.exp(-situation.flight.damping * (time - situation.td)).mean())
+    # what damping leaves of them is nothing where the decay has no double any more
+    decay = np.exp(np.minimum(-situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT))
+    left = float(1 / decay.mean())
+    if resting + (mean - resting) * left <= round_off(situation.history):
+        return None
 
     def ratio(locked: float) -> float:
         return (resting + (locked - resting) / 2) / (resting + (mean - resting) * left)
@@ -77,7 +87,7 @@ def mean_in_flight(situation: Situation) -> float | None:
     """Mean energy of the flight, up to td where its end is not known [energy]; None unless it is positive."""
     energy = _flight(situation)[1]
     mean = float(energy.mean()) if energy.size else 0.0
-    return mean if mean > 0 else None
+    return mean if mean > round_off(situation.history) else None
 
 
 def _flight(situation: Situation) -> tuple[Samples, Samples]:

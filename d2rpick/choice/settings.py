@@ -17,8 +17,9 @@ class Settings:
     the next contact.  ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
     given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
-    the energy level alone.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the
-    step while rigid to that while deformable; without the first nothing is said of the run time.
+    the energy level alone.  ``strict``: accept no tr of a flight that is not certain.
+    ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the step while rigid to that
+    while deformable; without the first nothing is said of the run time.
     """
 
     after: float | None = None
@@ -29,5 +30,6 @@ class Settings:
     oscillator: Mode | None = None
     fit_window: tuple[float, float] | None = None
     replay: bool = True
+    strict: bool = False
     cost_share: float | None = None
     step_ratio: float = 1.0

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.choice.rest import nothing_vibrates
 from d2rpick.histories.crossings import find_extrema
 from d2rpick.vibration.model import Evidence, describing, model_at
 
@@ -57,6 +58,11 @@ class Situation:
     def latest_td(self) -> float:
         """End of the flight with the margin; infinite when no contact was seen [time]."""
         return float("inf") if self.flight.end is None else self.flight.end - self.settings.margin
+
+    @cached_property
+    def at_rest(self) -> bool:
+        """Whether nothing vibrates from the start of the flight to td."""
+        return nothing_vibrates(self)
 
     @property
     def in_flight(self) -> bool:

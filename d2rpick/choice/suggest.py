@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.choice.acceptable_windows import acceptable_windows
 from d2rpick.choice.candidates import Candidate, find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import Expectation, expectation
@@ -26,10 +27,19 @@ class Pair(NamedTuple):
     residual: float | None
 
 
+class AcceptableWindow(NamedTuple):
+    """From ``start`` to ``end`` [time] every tr is acceptable; ``share`` is its share of the flight up to td [-]."""
+
+    start: float
+    end: float
+    share: float
+
+
 class Suggestion(NamedTuple):
     """Answer of ``suggest``: ranked candidates, the recommended pair, a better td, and what to be aware of.
 
-    ``td_window`` is where td was chosen, if it was; ``expected`` what the energy alone tells of the time after td.
+    ``windows`` are those of acceptable tr, on basis "energy", ``td_window`` is where td was chosen, if it was;
+    ``expected`` what the energy alone tells of the time after td.
     """
 
     situation: Situation
@@ -40,6 +50,7 @@ class Suggestion(NamedTuple):
     health: Health | None = None
     td_window: tuple[float, float] | None = None
     expected: Expectation | None = None
+    windows: tuple[AcceptableWindow, ...] | None = None
 
 
 def suggest(history: History, td: float, settings: Settings) -> Suggestion:
@@ -61,7 +72,8 @@ def suggest_at(situation: Situation) -> Suggestion:
         cautions.append(Caution("no-better-td", "no peak of the energy in the flight has an acceptable tr"))
     recommended = Pair(best.tr, situation.td, best.residual) if best else None
     expected = expectation(situation, best.energy if best else None)
-    return Suggestion(situation, candidates, recommended, better, tuple(cautions), expected=expected)
+    windows = _windows(situation, candidates, best)
+    return Suggestion(situation, candidates, recommended, better, tuple(cautions), expected=expected, windows=windows)
 
 
 def better_pair(situation: Situation) -> Pair | None:
@@ -79,6 +91,19 @@ def better_pair(situation: Situation) -> Pair | None:
         if best and not best.same_swing:
             return Pair(best.tr, td, best.residual)
     return None
+
+
+def _windows(
+    situation: Situation, candidates: tuple[Candidate, ...], best: Candidate | None
+) -> tuple[AcceptableWindow, ...] | None:
+    """Windows of acceptable tr where the level alone decides: any tr in one is as good as a crossing."""
+    if situation.basis != "energy":
+        return None
+    start = situation.earliest_tr
+    if start is None or not situation.in_flight:
+        return ()
+    found = acceptable_windows(situation, candidates, best.tr if best else None)[0].tolist()
+    return tuple(AcceptableWindow(low, high, (high - low) / (situation.td - start)) for low, high in found)
 
 
 def _why_none(situation: Situation, ranked: tuple[Candidate, ...]) -> str:

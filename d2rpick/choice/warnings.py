@@ -34,6 +34,10 @@ def cautions_of(situation: Situation) -> Iterator[Caution]:
 
 def _of_energy(situation: Situation) -> Iterator[Caution]:
     td, mode, share = situation.td, situation.vibration.mode, situation.kinetic_share
+    if situation.at_rest:
+        found = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
+        yield Caution("at-rest", f"{found}: there is nothing to match, any tr there is right; its start saves the most")
+        return
     if situation.energy_td <= 0:
         found = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
         yield Caution("no-energy", f"{found}; a level to lock in needs a positive energy")
@@ -63,7 +67,9 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
     for doubt in flight.doubts:
         yield Caution("flight-sources-disagree", doubt)
     if flight.source == "energy":
-        found = f"the end of the load, {flight.start:.6g}, was read off the energy alone"
+        found = f"the end of the load, {flight.start:.6g}, was read off the energy alone, which is not certain"
+        if flight.settled is not None and flight.start is not None and flight.settled < flight.start:
+            found += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are given up for safety"
         yield Caution("flight-from-energy", f"{found}; give it with --after where it is known")
     if earliest is None:
         yield Caution("no-flight", "nothing in the record shows when the load is over; give that time with --after")

@@ -227,6 +227,9 @@ def judging_options(function: Decorated) -> Decorated:
         oscillator_options(required=False),
         click.option("--fit-window", type=(TIME, TIME), metavar="LO HI", help="Identify the oscillator here only."),
         click.option("--no-verify", is_flag=True, help="Judge by the energy level alone, without an oscillator."),
+        click.option(
+            "--strict", is_flag=True, help="Recommend nothing where the energy alone shows when the load is over."
+        ),
     )(function)  # fmt: skip
 
 
@@ -341,6 +344,7 @@ def settings(options: dict[str, Any]) -> Settings:
         oscillator=to_mode(given, options["v0"]) if given else None,
         fit_window=window,
         replay=not options["no_verify"],
+        strict=options["strict"],
         cost_share=cost_share,
         step_ratio=step_ratio or 1.0,
     )

@@ -25,6 +25,10 @@ _WAIT: Final = 0.25
 _LEVEL: Final = 1 / 8
 
 
+# Below a millionth of the largest energy of the run, energy is round-off: single precision keeps seven digits.
+_ROUND_OFF: Final = 1e-6
+
+
 class QuietTime(NamedTuple):
     """Window in which the energy shows no load; ``end`` None where no next contact is seen [time].
 
@@ -38,6 +42,11 @@ class QuietTime(NamedTuple):
 
 def quiet_time(history: History, td: float) -> QuietTime | None:
     """Find the window around ``td`` [time] in which the energy stays in its band on one level, or None."""
+    start = float(history.time[0])
+    if np.abs(history.energy[history.time <= td]).max() <= round_off(
+        history
+    ):  # a fall from the start: nothing has happened yet
+        return QuietTime(start, _burst(history, start, td), start)
     settled = end_of_load(history, td)
     if settled is None:
         return None
@@ -97,3 +106,11 @@ def _widened(values: Samples, share: float) -> tuple[float, float]:
     """Band of some values, widened on both sides by a share of its width."""
     room = share * float(np.ptp(values))
     return float(values.min()) - room, float(values.max()) + room
+
+
+def round_off(history: History) -> float:
+    """Energy below which an internal energy is round-off beside the energies of the run [energy]."""
+    balance = history.balance
+    terms = (balance.internal, balance.kinetic, balance.external_work, balance.total) if balance else ()
+    largest = max(float(np.abs(term).max(initial=0.0)) for term in (history.energy, *terms) if term is not None)
+    return _ROUND_OFF * largest

@@ -118,7 +118,7 @@ def _tightened(law: Law, window: tuple[int, int], noise: float) -> tuple[int, in
     The tolerance hides the last, weak pushes of a load.  The middle of the flight knows how exactly the run obeys
     the law, be that by printed digits, round-off or the solver's own errors.
     """
-    start = window[0]
+    start, room = window[0], 0.0
     for _ in range(_MOST_SHRINKS):
         first, last = window
         inset = round(_ENDS * (last - first))
@@ -129,8 +129,24 @@ def _tightened(law: Law, window: tuple[int, int], noise: float) -> tuple[int, in
         if tighter == window:
             break
         window = tighter
+    window = _without_what_is_hidden(law, window, room)
     # a solver may write the first state before its first step, with what belongs half a step earlier
     return (0 if window[0] == 1 and start == 0 else window[0]), window[1]
+
+
+def _without_what_is_hidden(law: Law, window: tuple[int, int], room: float) -> tuple[int, int]:
+    """Cut off what of a push the ``room`` still hides at the ends of a window.
+
+    A push that fades smoothly leaves a deviation that falls with the square of the time that is left of it: from four
+    times the room to the room takes as long as from there to its end.
+    """
+    first, last = window
+    wide = longest_window(law, (first + last) // 2, 4 * room)
+    most = round(_ENDS * (last - first))
+    return (
+        first + min(most, max(0, first - wide[0])) if wide[0] > 0 else first,
+        last - min(most, max(0, wide[1] - last)) if wide[1] < law.time.size - 1 else last,
+    )
 
 
 def _long_enough(time: Samples, window: tuple[int, int]) -> bool:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.situation import Situation
-    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.choice.suggest import AcceptableWindow, Suggestion
     from d2rpick.choice.verify import Verdict
     from d2rpick.histories.history import Samples
     from d2rpick.studies.study import Study
@@ -94,9 +94,10 @@ def _any_letters() -> Iterator[None]:
 
 
 def draw_suggestion(answer: Suggestion, *, narrow: bool = False) -> Figure:
-    """Energy with level, candidates and the recommended pair; below it the motion after that pair."""
+    """Energy with level, candidates or windows, and the recommended pair; below it the motion after that pair."""
     tr = answer.recommended.tr if answer.recommended else None
-    return _draw(answer.situation, answer.candidates, tr, narrow=narrow)
+    shown = tuple(c for c in answer.candidates if answer.windows is None or c.recommended)
+    return _draw(answer.situation, shown, tr, answer.windows or (), narrow=narrow)
 
 
 def draw_better(answer: Suggestion, *, narrow: bool = False) -> Figure:
@@ -151,12 +152,24 @@ def _scale(axes: Axes, levels: Samples, highest: float) -> None:
         axes.set_ylim(bottom=min(float(levels.min()) / 2, float(np.median(levels)) / 10**_DECADES_BELOW_LEVEL))
 
 
-def _draw(situation: Situation, candidates: tuple[Candidate, ...], tr: float | None, *, narrow: bool = False) -> Figure:
+def _draw(
+    situation: Situation,
+    candidates: tuple[Candidate, ...],
+    tr: float | None,
+    windows: tuple[AcceptableWindow, ...] = (),
+    *,
+    narrow: bool = False,
+) -> Figure:
     with_motion = tr is not None and isinstance(situation.vibration.mode, Mode) and situation.vibration.described(tr)
     width, one, two = _SIZES[narrow]
     figure = Figure(figsize=(width, two if with_motion else one), layout="constrained")
     axes = figure.subplots(2 if with_motion else 1, 1, sharex=True, squeeze=False)[:, 0]
     _draw_energy(axes[0], situation, candidates)
+    if windows:
+        starts, ends = ([getattr(window, name) for window in windows] for name in ("start", "end"))
+        axes[0].hlines(
+            [situation.energy_td] * len(windows), starts, ends, color=GOOD, linewidth=5, label="acceptable tr"
+        )
     if with_motion and tr is not None:
         _draw_motion(axes[1], situation, tr)
     unit = situation.history.time_unit
@@ -180,7 +193,7 @@ def _draw_energy(axes: Axes, situation: Situation, candidates: tuple[Candidate, 
         axes.axvspan(flight.start, end, color=FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
     axes.plot(history.time, history.energy, color=REFERENCE, linewidth=1, label=_plain(history.channel))
     axes.axhline(level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
-    for acceptable, fill, name in ((True, GOOD, "acceptable tr"), (False, "none", "other candidates")):
+    for acceptable, fill, name in ((True, GOOD, "acceptable candidates"), (False, "none", "other candidates")):
         some = [c for c in candidates if c.acceptable == acceptable]
         if some:
             times, energies = [c.tr for c in some], [c.energy for c in some]

@@ -12,9 +12,11 @@ from d2rpick.report.situation import frame, heading, mechanics
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.suggest import Pair, Suggestion
+    from d2rpick.choice.suggest import AcceptableWindow, Pair, Suggestion
 
 SCHEMA = "d2rpick/suggest/1"
+# Windows of acceptable tr that a line names.
+_NAMED = 4
 HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")
 
 # Keys of a candidate in JSON.
@@ -58,6 +60,12 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
             "td_window": list(answer.td_window) if answer.td_window else None,
             **mechanics(answer.situation),
             "candidates": [{**asdict(c), "parts": [part._asdict() for part in c.parts]} for c in answer.candidates],
+            "acceptable_windows": None
+            if answer.windows is None
+            else [
+                {"start": w.start, "end": w.end, "share": w.share, "recommended": holds(w, recommended)}
+                for w in answer.windows
+            ],
             "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
             "health": asdict(answer.health) if answer.health else None,
             "expected": answer.expected._asdict() if answer.expected else None,
@@ -68,7 +76,7 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
 
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     """What can be expected of the recommended pair, a name and a sentence each."""
-    lines = []
+    lines = [("acceptable", acceptable(answer))] if answer.windows else []
     best = next((c for c in answer.candidates if c.recommended), None)
     if best and best.run_time_share is not None:
         rigid = f"rigid for {best.rigid_fraction:.0%} of the record"
@@ -83,6 +91,21 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
         )
         lines.append(("mean after", f"about {own}{at_level}; mean in flight {expected.mean_energy:.6g}"))
     return lines
+
+
+def acceptable(answer: Suggestion) -> str:
+    """The windows of acceptable tr: the one with the recommended tr, the longest others, and what they share."""
+    windows, pair = answer.windows or (), answer.recommended
+    named = sorted(windows, key=lambda one: (not holds(one, pair), one.start - one.end))[:_NAMED]
+    share = sum(one.share for one in windows)
+    shown = [f"{w.start:.6g} to {w.end:.6g} ({w.share:.1%}{', recommended' * holds(w, pair)})" for w in named]
+    more = f" and {len(windows) - len(named)} shorter windows" if len(windows) > len(named) else ""
+    return f"every tr from {'; '.join(shown)}{more}; in all {share:.0%} of the flight up to td"
+
+
+def holds(window: AcceptableWindow, pair: Pair | None) -> bool:
+    """Whether the recommended tr lies in a window."""
+    return pair is not None and window.start <= pair.tr <= window.end
 
 
 def as_value(answer: Suggestion) -> str:

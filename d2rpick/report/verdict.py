@@ -61,7 +61,9 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
 
 
 def word(answer: Verdict) -> str:
-    """The verdict in a word or two."""
+    """The verdict in a few words."""
+    if answer.verified and answer.situation.basis == "energy":
+        return "verified by the energy level alone"
     return "verified" if answer.verified else "unknown" if answer.tr_ok is None else "not verified"
 
 

@@ -175,7 +175,7 @@ def ask(question: Question, source: str) -> Row:
         basis=answer.situation.basis,
         warnings=tuple(code for code in said if code not in _NOT_REPEATED),
         time_unit=reference.history.time_unit,
-        acceptable=acceptable_windows(answer),
+        acceptable=acceptable_windows(answer.situation, answer.candidates, best.tr if best else None),
         files=files,
         curve=outline(reference.history) if question.curve else None,
     )

@@ -30,6 +30,11 @@ TD = 0.064
 PAPER = History(TIME, ENERGY, ("paper",), "made", "energy")
 
 
+def windows_of(answer: Suggestion) -> tuple[Samples, ...]:
+    own = answer.recommended
+    return acceptable_windows(answer.situation, answer.candidates, own.tr if own else None)
+
+
 def holds(windows: Samples, times: Samples) -> Samples:
     """Whether each time lies in a window."""
     at = times[:, np.newaxis]
@@ -47,7 +52,7 @@ def check(answer: Suggestion, seed: int) -> None:
 def _check(answer: Suggestion, seed: int) -> None:
     situation = answer.situation
     history, td, asked = situation.history, situation.td, situation.settings
-    windows, *finer = acceptable_windows(answer)
+    windows, *finer = windows_of(answer)
     assert np.all(windows[:, 0] <= windows[:, 1])
     assert np.all(windows[1:, 0] > windows[:-1, 1])
     rng = np.random.default_rng(seed)
@@ -102,7 +107,7 @@ def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tol
     for history, td in ((record, TD), (rollover, 0.37)):
         for replay in (True, False):
             answer = suggest(history, td, Settings(tolerance=tolerance, replay=replay))
-            assert len(acceptable_windows(answer)[0])
+            assert len(windows_of(answer)[0])
             check(answer, 1)
 
 
@@ -116,12 +121,12 @@ def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> Non
     parts = suggest(chain.history(), td, Settings())
     assert parts.situation.basis == "parts"
     check(parts, 1)
-    assert len(acceptable_windows(parts)[0])
+    assert len(windows_of(parts)[0])
 
 
 def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_sign() -> None:
     answer = suggest(PAPER, TD, Settings())
-    for windows in acceptable_windows(answer):
+    for windows in windows_of(answer):
         acceptable = np.array(sorted(c.tr for c in answer.candidates if c.acceptable))
         assert len(windows) == len(acceptable)
         assert np.all((windows[:, 0] < acceptable) & (acceptable < windows[:, 1]))
@@ -129,14 +134,14 @@ def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_s
 
 def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
     answer = suggest(PAPER, TD, Settings())
-    assert acceptable_windows(answer)[0][-1, 1] < TD - 0.01
+    assert windows_of(answer)[0][-1, 1] < TD - 0.01
     late = suggest(PAPER, 0.068, Settings(after=0.0655))
     assert late.recommended is None
-    assert not any(windows.size for windows in acceptable_windows(late))
+    assert not any(windows.size for windows in windows_of(late))
     flat = History(np.linspace(0, 1, 50), 1 + 1e-3 * np.cos(np.arange(50) * 2.0), ("flat",), "made", "energy")
     quiet = suggest(flat, 0.9, Settings(after=0.1, replay=False))
     assert quiet.recommended
-    (window,) = acceptable_windows(quiet)[0]
+    (window,) = windows_of(quiet)[0]
     assert window.tolist() == [0.1, np.nextafter(0.9, 0)]
 
 
@@ -149,7 +154,7 @@ def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
     ],
 )
 def test_where_nothing_verifies_there_is_no_window(asked: Settings) -> None:
-    assert not any(windows.size for windows in acceptable_windows(suggest(PAPER, TD, asked)))
+    assert not any(windows.size for windows in windows_of(suggest(PAPER, TD, asked)))
 
 
 def test_levels_end_where_errors_count_as_equal() -> None:
@@ -160,7 +165,7 @@ def test_levels_end_where_errors_count_as_equal() -> None:
 def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
     other = Mode(1.004 * OMEGA_2, MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
     histories = [PAPER, History(TIME, other.energy(TIME), ("other",), "made", "energy")]
-    both = common_windows([acceptable_windows(suggest(history, 0.0687534, Settings()))[0] for history in histories])
+    both = common_windows([windows_of(suggest(history, 0.0687534, Settings()))[0] for history in histories])
     times = np.linspace(0.01, 0.06, 400)
     expected = [all(verify(history, t, 0.0687534, Settings()).verified for history in histories) for t in times]
     assert holds(both, times).tolist() == expected
