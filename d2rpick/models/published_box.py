@@ -184,6 +184,8 @@ def _variants(base: Parameters) -> Exhibit:
         "run": number, "own_tr_ms": own, "common_tr_ms": 0 * number + 1e3 * common,
         "level_error_percent": 100 * np.array([row.level_error for row in rows]),
         "roll_error_deg": np.array([row.roll_error for row in rows]),
+        "rigid_own": (1e3 * window.td - own) / (1e3 * _END),
+        "rigid_common": 0 * number + (window.td - common) / _END,
         "end_error_deg": np.array([row.end_error for row in rows]),
     }  # fmt: skip
     after, before = ([row for row in rows if row.variant.before is flag] for flag in (False, True))
@@ -195,13 +197,25 @@ def _variants(base: Parameters) -> Exhibit:
     dots = {"style": "dots", "x": "run"}
     panels = (
         (
-            Panel("tr of each run", "tr [ms]", (Curve("own tr", "own_tr_ms", **dots),),
-                  levels=((legend, 1e3 * common),), xlabel=xlabel),
-            Panel("at the common tr", "level error [%]", (Curve("level error", "level_error_percent", **dots),),
-                  xlabel=xlabel),
-            Panel("at the common tr", "roll error [degrees]", (
-                Curve("at td", "roll_error_deg", **dots), Curve("after the landing", "end_error_deg", **dots)),
-                  xlabel=xlabel),
+            Panel(
+                "tr of each run", "tr [ms]", (Curve("own tr", "own_tr_ms", **dots),),
+                levels=((legend, 1e3 * common),), xlabel=xlabel,
+            ),
+            Panel(
+                "rigid fraction of the run, up to which the saving goes", "rigid fraction [-]",
+                (Curve("own tr", "rigid_own", **dots), Curve("common tr", "rigid_common", **dots)), xlabel=xlabel,
+            ),
+        ),
+        (
+            Panel(
+                "at the common tr", "level error [%]", (Curve("level error", "level_error_percent", **dots),),
+                xlabel=xlabel,
+            ),
+            Panel(
+                "at the common tr", "roll error [degrees]",
+                (Curve("at td", "roll_error_deg", **dots), Curve("after the landing", "end_error_deg", **dots)),
+                xlabel=xlabel,
+            ),
         ),
     )  # fmt: skip
     same = max(abs(1e3 * ((row.own_tr or 0) - (after[0].own_tr or 0))) for row in after)
