@@ -62,7 +62,11 @@ class Situation:
     @cached_property
     def at_rest(self) -> bool:
         """Whether nothing vibrates from the start of the flight to td."""
-        return nothing_vibrates(self)
+        start = self.earliest_tr
+        if start is None or not self.in_flight:
+            return False
+        deformed = self.vibration.unknown is None
+        return nothing_vibrates(self.history, start, self.td, self.settings.tolerance, deformed=deformed)
 
     @property
     def in_flight(self) -> bool:
