@@ -62,9 +62,9 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
         yield Caution("no-free-flight", f"{found}; its start was read off the {flight.source} instead")
     if flight.source == "energy":
         found = f"the end of the load, {flight.start:.6g}, was read off the energy alone"
-        yield Caution("flight-from-energy", f"{found}; give it with --after where it is known")
+        yield Caution("flight-from-energy", f"{found}; give it as `after` where it is known")
     if earliest is None:
-        yield Caution("no-flight", "nothing in the record shows when the load is over; give that time with --after")
+        yield Caution("no-flight", "nothing in the record shows when the load is over; give that time as `after`")
     elif td <= earliest:
         yield Caution("td-in-load", f"td = {td:.6g} lies before {end_of_load(situation)}")
     if td > situation.latest_td:

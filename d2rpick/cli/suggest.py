@@ -116,7 +116,7 @@ def _answer(reference: Reference, td: float | tuple[float, float] | None, settin
     if td is None:
         from d2rpick.choice.suggest_td import advice
 
-        raise click.UsageError(advice(reference.history, settings))
+        raise click.UsageError(f"{advice(reference.history, settings)}; give --td or --td-window")
     return suggest_of(reference, td, settings)
 
 
@@ -124,11 +124,11 @@ def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
     """Draw the figures, wide and narrow, and write the page around them."""
     from d2rpick.report import figures
     from d2rpick.report.page import Record
-    from d2rpick.report.suggestion_page import as_page, better_pair
+    from d2rpick.report.suggestion_page import as_page
 
     caption = "Internal energy with its level at td, and the choice"
     drawn = {caption: figures.both_widths(figures.draw_suggestion, answer, "choice")}
-    if better_pair(answer):
+    if answer.clearly_better:
         drawn["The better pair"] = figures.both_widths(figures.draw_better, answer, "better")
     return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn))
 

@@ -56,11 +56,11 @@ def test_all_crossings_of_the_published_example_and_their_signs() -> None:
 def test_the_published_example_is_recommended_warned_of_and_bettered() -> None:
     answer = suggest(paper.history(), paper.TD, PLAIN)
     assert answer.recommended is not None
-    assert answer.better_td is not None
+    assert answer.better_pair is not None
     assert answer.recommended.tr == pytest.approx(0.0128852793630525, rel=1e-9)
     assert answer.recommended.residual == pytest.approx(0.957444, abs=1e-6)
-    assert (answer.better_td.td, answer.better_td.tr) == pytest.approx((paper.BETTER_TD, paper.BETTER_TR), rel=1e-8)
-    assert answer.better_td.residual == pytest.approx(0.0, abs=1e-6)
+    assert (answer.better_pair.td, answer.better_pair.tr) == pytest.approx((paper.BETTER_TD, paper.BETTER_TR), rel=1e-8)
+    assert answer.better_pair.residual == pytest.approx(0.0, abs=1e-6)
     assert answer.situation.kinetic_share == pytest.approx(paper.KINETIC_SHARE, rel=1e-8)
     assert codes(answer) == {"poor-td"}
 
@@ -175,7 +175,7 @@ def test_limits_object_to_what_would_only_be_warned_of(limit: dict[str, float]) 
     answer = suggest(paper.history(), paper.TD, Settings(**limit))  # type: ignore[arg-type]
     assert answer.recommended is None
     assert "no-candidate" in codes(answer)
-    assert answer.better_td is not None
+    assert answer.better_pair is not None
     judged = verify(paper.history(), 0.0128853, paper.TD, Settings(**limit))  # type: ignore[arg-type]
     assert (judged.tr_ok, judged.verified) == (True, False)
     assert "limit" in judged.reasons[0]
@@ -199,7 +199,7 @@ def test_td_after_the_next_contact_is_not_acceptable() -> None:
 
 
 def test_the_sign_is_judged_before_the_tolerance() -> None:
-    judged = verify(paper.history(), 0.0122658849405802, paper.TD, Settings(tolerance=10.0))
+    judged = verify(paper.history(), 0.0122658849405802, paper.TD, Settings(tolerance=1.0))
     assert judged.tr_ok is False
     assert judged.reasons == ("opposite sign of the deformation",)
 
