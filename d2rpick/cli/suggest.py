@@ -9,6 +9,7 @@ import click
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
+from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
     from d2rpick.choice.of_run import Reference
@@ -41,7 +42,7 @@ Examples:
 )
 @shared.history_options
 @shared.choosing_options
-@shared.output_options("table", "json", "csv", "markdown", "value", "card")
+@shared.output_options(*FORMATS["suggestion"], "card")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -59,7 +60,6 @@ def command(
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
     from d2rpick.choice.of_run import Reference
-    from d2rpick.report import suggestion as report
 
     if _only_in_environment(ctx, "td", overruled_by="td_window"):
         td = None
@@ -82,14 +82,7 @@ def command(
         written = _card(answer, output)
         finish(ctx, objection=not written, exit_zero=exit_zero)
         return
-    texts = {
-        "table": lambda: report.as_table(answer, limit),
-        "markdown": lambda: report.as_markdown(answer, limit),
-        "csv": lambda: report.as_csv(answer),
-        "json": lambda: report.as_json(answer, ctx.meta["d2rpick.command"]),
-        "value": lambda: report.as_value(answer),
-    }
-    output.result(texts[output_format]())
+    output.result(write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit)))
     finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
 
 
