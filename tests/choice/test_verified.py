@@ -90,12 +90,3 @@ def test_too_few_states_per_period_recommend_nothing() -> None:
     assert answer.situation.basis == "energy"
     assert answer.recommended is None
     assert any("states per period" in note for note in answer.candidates[0].notes)
-
-
-@pytest.mark.parametrize(
-    ("asked", "name"),
-    [({"tolerance": 20}, "tolerance"), ({"margin": -1}, "margin"), ({"cost_share": 1.5}, "cost_share")],
-)
-def test_settings_out_of_their_range_are_refused_by_name(asked: dict[str, Any], name: str) -> None:
-    with pytest.raises(ValueError, match=name):
-        Settings(**asked)
