@@ -28,7 +28,7 @@ _LARGEST = 1e150
 def examine(history: History, td: float, settings: Settings) -> Situation:
     """Find the flight around ``td`` and the oscillator in it.
 
-    RangeError when td, --after or the fit window lie outside the record, or it has fewer than 3 states.
+    RangeError when td, ``after`` or the fit window lie outside the record, or it has fewer than 3 states.
     """
     if history.time.size < 3:
         found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
@@ -38,7 +38,7 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
     if largest > _LARGEST:
         raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
     if settings.after is not None:
-        _inside(history, settings.after, "--after")
+        _inside(history, settings.after, "`after`")
     seen = seen_flight(history, td)
     flying = None if seen.refusal else seen.flight
     fit, span = _oscillator(history, td, settings, flying)
@@ -64,7 +64,7 @@ def _oscillator(
         bounds = bounds._replace(start=min(settings.after, td))
     if settings.fit_window:
         for bound in settings.fit_window:
-            _inside(history, bound, "--fit-window")
+            _inside(history, bound, "`fit_window`")
         fit = identify_within(history, Span(*settings.fit_window))
         return _resolved(history, fit), span_of(history, td, fit, bounds) if fit.describes_record else None
     if settings.oscillator:
@@ -96,9 +96,9 @@ def _with_parts(evidence: Evidence, history: History, td: float, within: Span) -
     return evidence._replace(parts=parts, signed=PartVibration(parts, whole) if parts.signed and whole else None)
 
 
-def _inside(history: History, time: float, option: str) -> None:
+def _inside(history: History, time: float, argument: str) -> None:
     if not history.time[0] <= time <= history.time[-1]:
         raise RangeError(
-            f"{', '.join(history.source)}: {option} {time:g} lies outside the record, "
+            f"{', '.join(history.source)}: {argument} {time:g} lies outside the record, "
             f"{history.time[0]:g} to {history.time[-1]:g}"
         )

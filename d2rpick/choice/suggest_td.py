@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import expectation, mean_in_flight, shortfall
-from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, rank
+from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, keeps, rank
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
 from d2rpick.flight.flight import SOURCES, all_seen
 
@@ -62,7 +62,7 @@ def advice(history: History, settings: Settings) -> str:
     peaks = [t for t in examine(history, (start + end) / 2, settings).peaks(start, end) if t < end]
     where = f"the flight ends at {end:.6g}" if seen else f"no next contact was seen up to the end at {end:.6g}"
     last = f"the last peak of the energy before it is at {peaks[-1]:.6g}" if peaks else "the energy has no peak there"
-    return f"{', '.join(history.source)}: {where}, {last}; give --td or --td-window"
+    return f"{', '.join(history.source)}: {where}, {last}"
 
 
 def _flying(look: Look, window: tuple[float, float]) -> Situation:
@@ -93,13 +93,14 @@ def _highest(situation: Situation, window: tuple[float, float], look: Look) -> S
         peaks = [t for t in situation.peaks(*window) if shortfall(history.energy_at(t), mean) < 1]
         peaks_before = set(situation.peaks(float(history.time[0]), window[1]))
         for td in sorted(peaks, key=lambda t: shortfall(history.energy_at(t), mean)):
-            if not any(c.acceptable and not c.same_swing for c in find_candidates(situation.at(td))):
+            there = situation.at(td)
+            if not any(keeps(there, c) and not c.same_swing for c in find_candidates(there)):
                 continue  # an oscillator is not sought again for each peak
             found = suggest_at(look(td))
             errors = [
                 (shortfall(c.energy, mean), c)
                 for c in found.candidates
-                if c.acceptable and not c.same_swing and c.tr in peaks_before
+                if keeps(found.situation, c) and not c.same_swing and c.tr in peaks_before
             ]
             limit = min((error for error, _ in errors), default=0.0) + EQUALLY_GOOD
             good = [c for error, c in errors if error <= limit < float("inf")]

@@ -9,6 +9,7 @@ import click
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
 from d2rpick.cli.progress import reading
+from d2rpick.report.formats import FORMATS, Shown, write
 
 EXAMPLES = """\b
 Examples:
@@ -19,7 +20,7 @@ Examples:
 
 @click.command("info", epilog=EXAMPLES)
 @shared.history_options
-@shared.output_options("table", "json", "csv", "markdown")
+@shared.output_options(*FORMATS["overview"])
 @click.pass_context
 def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **options: Any) -> None:  # noqa: ARG001
     """Show what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health."""
@@ -31,10 +32,4 @@ def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **option
         output = Output.of(options, *run.sources)
         overview = survey(run, shared.selection(options))
     output.notes((), report.cautions(overview))
-    texts = {
-        "table": lambda: report.as_table(overview),
-        "markdown": lambda: report.as_markdown(overview),
-        "csv": lambda: report.as_csv(overview),
-        "json": lambda: report.as_json(overview, ctx.meta["d2rpick.command"]),
-    }
-    output.result(texts[output_format]())
+    output.result(write("overview", output_format, overview, Shown(ctx.meta["d2rpick.command"])))

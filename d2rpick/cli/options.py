@@ -97,7 +97,7 @@ _MARGIN = click.option(
     help="Time kept clear after the load and before the next contact.",
 )  # fmt: skip
 _TOLERANCE = click.option(
-    "--tolerance", type=NOT_NEGATIVE, default=0.2, show_default=True, metavar="L",
+    "--tolerance", type=FRACTION, default=0.2, show_default=True, metavar="L",
     help="On the lock-in error, or on the level error where no oscillator is known.",
 )  # fmt: skip
 EXIT_ZERO = click.option("--exit-zero", is_flag=True, help="Exit with 0 where the answer is an objection (1).")

@@ -15,6 +15,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import counting
 from d2rpick.errors import D2RPickError, FormatError
+from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -52,7 +53,7 @@ Examples:
 @click.option(
     "--report", metavar="FILE", type=shared.FILE, help="Write all of it to one HTML page to read, print and sign."
 )
-@shared.output_options("table", "json", "csv", "markdown", "ndjson")
+@shared.output_options(*FORMATS["study"])
 @click.pass_context
 def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exit_zero: bool, **options: Any) -> None:
     """Ask for tr in many runs: how far they agree, and one tr for all of them.
@@ -82,25 +83,11 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
     output.notes((), answer.cautions)
     _write_files(answer, options, output._replace(inputs=_files_of(rows)))
     before = [] if streaming else [line(row, asked) for row in rows]
-    output.result(_text(answer, output_format, ctx.meta["d2rpick.command"], before))
+    output.result(write("study", output_format, answer, Shown(ctx.meta["d2rpick.command"], lines=before)))
     if not answer.judged:
         click.echo(f"d2rpick: no run could be judged; the first: {rows[0].message}", err=True)
         ctx.exit(2)
     finish(ctx, objection=answer.objection, exit_zero=exit_zero)
-
-
-def _text(answer: Study, output_format: str, command_line: Sequence[str], lines: Sequence[str]) -> str:
-    """Result in its format; ``lines`` are those of newline-delimited JSON that were not given out yet."""
-    from d2rpick.report import study as report
-
-    texts = {
-        "table": lambda: report.as_table(answer),
-        "markdown": lambda: report.as_markdown(answer),
-        "csv": lambda: report.as_csv(answer),
-        "json": lambda: report.as_json(answer, command_line),
-        "ndjson": lambda: "\n".join([*lines, report.as_last_line(answer, command_line)]),
-    }
-    return texts[output_format]()
 
 
 def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:

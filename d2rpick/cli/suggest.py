@@ -10,6 +10,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
+from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
     from d2rpick.choice.of_run import Reference
@@ -43,7 +44,7 @@ Examples:
 @shared.history_options
 @shared.choosing_options
 @card_options
-@shared.output_options("table", "json", "csv", "markdown", "value", "card")
+@shared.output_options(*FORMATS["suggestion"], "card")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -61,7 +62,6 @@ def command(
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
     from d2rpick.choice.of_run import Reference
-    from d2rpick.report import suggestion as report
 
     if _only_in_environment(ctx, "td", overruled_by="td_window"):
         td = None
@@ -83,14 +83,7 @@ def command(
         output.write(options["report"], text_bytes(_page(answer, run, options)))
     if output_format == "card":
         return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
-    texts = {
-        "table": lambda: report.as_table(answer, limit),
-        "markdown": lambda: report.as_markdown(answer, limit),
-        "csv": lambda: report.as_csv(answer),
-        "json": lambda: report.as_json(answer, ctx.meta["d2rpick.command"]),
-        "value": lambda: report.as_value(answer),
-    }
-    output.result(texts[output_format]())
+    output.result(write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit)))
     return finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
 
 
@@ -117,7 +110,7 @@ def _answer(reference: Reference, td: float | tuple[float, float] | None, settin
     if td is None:
         from d2rpick.choice.suggest_td import advice
 
-        raise click.UsageError(advice(reference.history, settings))
+        raise click.UsageError(f"{advice(reference.history, settings)}; give --td or --td-window")
     return suggest_of(reference, td, settings)
 
 

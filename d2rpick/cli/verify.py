@@ -10,6 +10,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
+from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
     from d2rpick.choice.verify import Verdict
@@ -51,12 +52,11 @@ class _Verify(click.Command):
 @shared.history_options
 @shared.choosing_options
 @card_options
-@shared.output_options("table", "json", "csv", "markdown")
+@shared.output_options(*FORMATS["verdict"])
 @click.pass_context
 def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exit_zero: bool, **options: Any) -> None:
     """Judge one pair of switch times against the HISTORY of a run without switching."""
     from d2rpick.choice.of_run import Reference, compare_with, verify_of
-    from d2rpick.report import verdict as report
 
     prints = prints_card(options, output_format)
     with reading(options["history"], quiet=options["quiet"]):
@@ -75,13 +75,7 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
         output.write(options["plot"], figures.render(figures.draw_verdict(answer), options["plot"]))
     if options["report"]:
         output.write(options["report"], text_bytes(_page(answer, run, switched, options)))
-    texts = {
-        "table": lambda: report.as_table(answer),
-        "markdown": lambda: report.as_markdown(answer),
-        "csv": lambda: report.as_csv(answer),
-        "json": lambda: report.as_json(answer, ctx.meta["d2rpick.command"]),
-    }
-    output.result(texts[output_format]())
+    output.result(write("verdict", output_format, answer, Shown(ctx.meta["d2rpick.command"])))
     finish(ctx, objection=not answer.verified, exit_zero=exit_zero)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import Reference, verify_of
-from d2rpick.choice.suggest import better_pair, suggest_at
+from d2rpick.choice.suggest import find_better_pair, suggest_at
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution
 from d2rpick.rules.base import Fault, name_units
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # What verify warns of and no rule reports.
 _KEPT: Final = ("truncated-input", "energy-only", "no-free-flight", "flight-from-energy", "plastic-or-preload")
-_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time with --after"
+_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time as `after`"
 
 
 @dataclass
@@ -124,7 +124,7 @@ def faults_of(verdict: Verdict) -> Iterator[Fault]:
     yield from found
     situation = verdict.situation
     if situation.kinetic_share is not None and situation.kinetic_share > POOR_KINETIC_SHARE:
-        better = better_pair(situation)
+        better = find_better_pair(situation)
         way_out = f"better: td = {better.td:.6g} with tr = {better.tr:.6g}" if better else "no better td was found"
         what = f"{situation.kinetic_share:.0%} of the vibration energy is kinetic at td = {situation.td:.6g}"
         yield Fault("D2R203", True, f"{what} and cannot be kept by any tr; {way_out}")
@@ -181,9 +181,9 @@ def _of_error(verdict: Verdict) -> Iterator[Fault]:
 
 def _way_out(verdict: Verdict) -> str:
     """Name a tr that suits the td, or where to look for a pair."""
-    other = suggest_at(verdict.situation)
+    other = suggest_at(verdict.situation, with_better=False)
     if other.recommended:
         return f"tr = {other.recommended.tr:.6g} suits this td"
-    if other.better_td:
-        return f"no tr suits this td; td = {other.better_td.td:.6g} with tr = {other.better_td.tr:.6g} does"
+    if better := find_better_pair(verdict.situation):
+        return f"no tr suits this td; td = {better.td:.6g} with tr = {better.tr:.6g} does"
     return "no tr suits this td; see d2rpick suggest"

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 # A run has one of these; the first two were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = "ok", "none", "unreadable", "out-of-range", "failed"
 # Cautions about single runs that a row says otherwise, or that are about what a study does not answer.
-_NOT_REPEATED = ("no-candidate", "no-better-td")
+_NOT_REPEATED = ("no-candidate",)
 # Runs that a sentence names.
 _NAMED = 3
 # A common tr saves at least this part of the rigid time of the earliest one.
@@ -160,12 +160,12 @@ def ask(question: Question, source: str) -> Row:
     files = stamps(source)
     try:
         reference = read([source], question.selection, question.input_format)
-        answer = suggest_of(reference, question.td, question.settings)
+        answer = suggest_of(reference, question.td, question.settings, with_better=False)
     except (D2RPickError, OSError) as error:
         status = OUT_OF_RANGE if isinstance(error, RangeError) else UNREADABLE
         text = f"{source}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)
         return Row(source, status, text, files=files)
-    best = next((candidate for candidate in answer.candidates if candidate.recommended), None)
+    best = answer.chosen
     said = {caution.code: caution.message for caution in answer.cautions}
     row = Row(
         source=source,

@@ -410,7 +410,7 @@ def test_a_history_that_tells_no_flight_is_an_objection() -> None:
     place("main.k", deck_of(0.5, 0.55))
     found = answer("check", "main.k", "--history", "rising.csv")
     (message,) = (f["message"] for f in found["findings"] if f["rule"] == "D2R204")
-    assert "nothing in the history shows when the load is over; give that time with --after" in message
+    assert "nothing in the history shows when the load is over; give that time as `after`" in message
     assert "D2R204" not in rules(answer("check", "main.k", "--history", "rising.csv", "--after", "0.2"))
 
 
