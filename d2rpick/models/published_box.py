@@ -218,15 +218,15 @@ def _told(window: Window, rows: tuple[Tried, ...]) -> str:
     after, before = ([tr for row, tr in known if row.variant.before is flag] for flag in (False, True))
     loads = [1e3 * (_run(row.variant.parameters).released or 0.0) for row in rows]
     worst = max(rows, key=lambda row: row.level_error)
-    given_up = 1e3 * window.tr - min(tr for _, tr in known)
+    given_up, roll = 1e3 * window.tr - min(tr for _, tr in known), max(abs(row.roll_error) for row in rows)
     names = "; ".join(f"{place} {row.variant.name}" for place, row in enumerate(rows, start=1))
     return (
         f"True for what acts after td: tr moves by {max(after) - min(after):.2g} ms. What acts before td moves it: "
         f"from {min(before):.1f} to {max(before):.1f} ms. One tr still serves all runs, the latest, "
-        f"{1e3 * window.tr:.1f} ms: the roll at td is right within {max(abs(row.roll_error) for row in rows):.2f} "
-        f"degrees, and up to {given_up:.1f} ms of rigid time are given up. No crossing is common: at the common tr the "
-        f"level is off by up to {100 * worst.level_error:.0f} % ({worst.variant.name}), with a tolerance of 20 %. It "
-        f"fails where a tr is taken over that lies before the end of the load of another run, which is between {min(loads):.1f} and "
+        f"{1e3 * window.tr:.1f} ms: the roll at td is right within {roll:.2f} degrees, and up to {given_up:.1f} ms of "
+        "rigid time are given up. No crossing is common: at the common tr the level is off by up to "
+        f"{100 * worst.level_error:.0f} % ({worst.variant.name}), with a tolerance of 20 %. It fails where a tr is "
+        f"taken over that lies before the end of the load of another run, which is between {min(loads):.1f} and "
         f"{max(loads):.1f} ms. The roof alone cannot be varied in this box. Runs: {names}."
     )
 
