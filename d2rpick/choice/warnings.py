@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.choice.rest import at_rest
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -36,6 +34,8 @@ def cautions_of(situation: Situation) -> Iterator[Caution]:
 
 def _of_energy(situation: Situation) -> Iterator[Caution]:
     td, mode, share = situation.td, situation.mode, situation.kinetic_share
+    from d2rpick.choice.rest import at_rest  # not above: decks are checked without numbers
+
     if at_rest(situation):
         found = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
         yield Caution("at-rest", f"{found}: there is nothing to match, any tr there is right; its start saves the most")
