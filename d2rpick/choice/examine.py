@@ -18,7 +18,7 @@ from d2rpick.vibration.span import Span, described_span, identify_within, span_o
 
 if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
-    from d2rpick.flight.window import FreeFlight
+    from d2rpick.flight.flight import Seen
     from d2rpick.histories.history import History
 
 # Beyond, squares of energies are no numbers any more; no unit system comes near.
@@ -41,7 +41,9 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
         _inside(history, settings.after, "`after`")
     seen = seen_flight(history, td)
     flying = None if seen.refusal else seen.flight
-    fit, span = _oscillator(history, td, settings, flying)
+    # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
+    at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
+    fit, span = _oscillator(history, at, settings, seen)
     flight = find_flight(history, td, settings.after, seen, span)
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
@@ -54,12 +56,13 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
 
 
 def _oscillator(
-    history: History, td: float, settings: Settings, seen: FreeFlight | None
+    history: History, td: float, settings: Settings, seen: Seen
 ) -> tuple[Identification | None, Span | None]:
     """Find the oscillator, given or identified, and the window around td that it describes."""
     if not settings.replay:
         return None, None
-    bounds = Span(seen.start, seen.end) if seen else Span(float(history.time[0]), float(history.time[-1]))
+    whole = bool(seen.flight or seen.refusal)
+    bounds = Span(*seen.flight[:2]) if seen.flight else Span(float(history.time[0]), float(history.time[-1]))
     if settings.after is not None:
         bounds = bounds._replace(start=min(settings.after, td))
     if settings.fit_window:
@@ -68,11 +71,11 @@ def _oscillator(
         fit = identify_within(history, Span(*settings.fit_window))
         return _resolved(history, fit), span_of(history, td, fit, bounds) if fit.describes_record else None
     if settings.oscillator:
-        span, fit = described_span(history, td, bounds, partial(assess, settings.oscillator), whole=seen is not None)
+        span, fit = described_span(history, td, bounds, partial(assess, settings.oscillator), whole=whole)
         return fit, span
-    span, fit = described_span(history, td, bounds, identify, whole=seen is not None)
+    span, fit = described_span(history, td, bounds, identify, whole=whole)
     if span is None:
-        span, several = described_span(history, td, bounds, identify_several, whole=seen is not None)
+        span, several = described_span(history, td, bounds, identify_several, whole=whole)
         fit = several if span else fit
     return _resolved(history, fit), span
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 FEWEST_STATES: Final = 6
 # What sampling and the solver's own sums leave of the work of gravity, as a share of its change: contacts do more.
 _OWN_ERROR: Final = 1e-3
+# Where no velocity is written, damping of the motion bends the parabola of the work of gravity.
+_BENT: Final = 1e-2
 # Mass follows from kinetic energy and velocity where it moves; states slower than this share (squared) are left out.
 _SLOW: Final = 1e-2
 # Mass so found is a bound already; a table may hold the kinetic energy of the chosen parts only, and a load that works
@@ -54,8 +56,9 @@ def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | N
     one_sided = [gravity]
     if balance.kinetic is not None:
         one_sided.append(-_integral(time, balance.kinetic[inside]))
+    error = _BENT if balance.velocity is None else _OWN_ERROR
     rest = float(np.abs(_rest(work, free, one_sided, most)).max())
-    own = balance.precision.quantum(float(np.abs(work).max())) + _OWN_ERROR * float(np.ptp(work))
+    own = balance.precision.quantum(float(np.abs(work).max())) + error * float(np.ptp(work))
     return max(0.0, rest - own)
 
 
