@@ -172,7 +172,7 @@ def identify_several(time: Samples, energy: Samples) -> Identification:
     return min(refused, key=lambda attempt: attempt.rms)
 
 
-def assess(mode: Mode, time: Samples, energy: Samples) -> Identification:
+def judge_given(mode: Mode, time: Samples, energy: Samples) -> Identification:
     """Hold a mode that is known, not fitted, against a record: it must follow the samples as a fit must.
 
     Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
