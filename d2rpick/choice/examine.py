@@ -11,7 +11,7 @@ from d2rpick.choice.situation import Situation
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.histories.history import window
-from d2rpick.vibration.identify import Identification, assess, identify, identify_several
+from d2rpick.vibration.identify import Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, energy_at
 from d2rpick.vibration.second_mode import resolved
 from d2rpick.vibration.span import Span, described_span, identify_within, span_of
@@ -71,7 +71,7 @@ def _oscillator(
         fit = identify_within(history, Span(*settings.fit_window))
         return _resolved(history, fit), span_of(history, td, fit, bounds) if fit.describes_record else None
     if settings.oscillator:
-        span, fit = described_span(history, td, bounds, partial(assess, settings.oscillator), whole=whole)
+        span, fit = described_span(history, td, bounds, partial(judge_given, settings.oscillator), whole=whole)
         return fit, span
     span, fit = described_span(history, td, bounds, identify, whole=whole)
     if span is None:

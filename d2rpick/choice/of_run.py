@@ -108,12 +108,12 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
 
 
 def _comparison(verdict: Verdict, run: Run, switched: Reference) -> Comparison:
-    from d2rpick.choice.comparison import compare
+    from d2rpick.choice.comparison import compare_runs
 
     situation = verdict.situation
     flight, parts = situation.flight, situation.history.parts
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
-    return compare(
+    return compare_runs(
         situation.history,
         switched.history,
         (verdict.candidate.tr, situation.td),

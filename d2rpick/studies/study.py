@@ -241,17 +241,17 @@ def _common(td: float, rows: Sequence[Row]) -> Common:
         finer = common_windows([row.acceptable[level] for row in judged])
         worth = finer[finer[:, 0] <= latest]
         low, high = worth[0] if worth.size else (low, high)
-    tr = shortest((3 * low + high) / 4, (low + 3 * high) / 4)
+    tr = fewest_digits((3 * low + high) / 4, (low + 3 * high) / 4)
     (window,) = shared[(shared[:, 0] <= tr) & (tr <= shared[:, 1])].tolist()
     return Common(tr, tuple(window), None)
 
 
-def shortest(low: float, high: float) -> float:
+def fewest_digits(low: float, high: float) -> float:
     """Give a number of the fewest digits between ``low`` and ``high``, the nearest to their middle.
 
     Examples
     --------
-    >>> shortest(0.0128717, 0.0128989)
+    >>> fewest_digits(0.0128717, 0.0128989)
     0.01289
     """
     middle = (low + high) / 2
@@ -264,7 +264,7 @@ def _why_none(judged: Sequence[Row]) -> str:
     stretches, counts = coverage([row.acceptable[0] for row in judged])
     if not counts.size:
         return f"no tr is acceptable in any of {runs_of(len(judged))}"
-    tr = shortest(*stretches[np.argmax(counts)])
+    tr = fewest_digits(*stretches[np.argmax(counts)])
     left = [row.source for row in judged if not _holds(row.acceptable[0], tr)]
     return (
         f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {len(judged) - len(left)}, "

@@ -201,7 +201,7 @@ def _least_wrong(refused: list[Identification], time: Samples) -> Identification
     return min(refused, key=lambda attempt: attempt.rms)
 
 
-def assess(mode: Mode, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
+def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
     """Hold a mode that is known, not fitted, against a record: it must follow the samples as a fit must.
 
     Parameters and result as for ``identify``; the mode stays as it is and has no scatter.

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.moments import Measured, Moment
     from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.part_shares import PartMatch
-    from d2rpick.vibration.part_signs import Parts, PartVibration, Unsigned
+    from d2rpick.vibration.part_signs import PartVibration, SignedParts, Unsigned
     from d2rpick.vibration.span import Span
 
 
@@ -108,7 +108,7 @@ class Evidence(NamedTuple):
     span: Span | None = None
     given: bool = False
     prescribed: bool = False
-    parts: Parts | None = None
+    parts: SignedParts | None = None
     signed: PartVibration | None = None
 
 

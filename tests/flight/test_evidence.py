@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import struct
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pytest
-from d2rpick.report.writers import ROLLOVER_WRITERS
 
 from d2rpick.choice.examine import examine
 from d2rpick.choice.flights import find_flights
@@ -19,19 +17,18 @@ from d2rpick.flight.flight import seen_flight
 from d2rpick.histories.history import Balance, Given, History
 from d2rpick.histories.opening import open_run
 from d2rpick.histories.selection import Selection
+from d2rpick.models.rollover.files import WRITERS
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import simulate
 from tests.command import answer, codes, run
-from tests.made_t01 import T01Writer
+from tests.sample_box import t01
 from tests.shared import columns, shared
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from d2rpick.models.rollover.record import Record
 
 MILLISECOND = 1e-3
-T01_CODES = (1, 2, 3, 4, 5)  # internal and kinetic energy and the momentum of a part
 
 
 class Rolled(NamedTuple):
@@ -40,33 +37,6 @@ class Rolled(NamedTuple):
     files: dict[str, Path]
     start: float
     end: float
-
-
-def t01(record: Record) -> bytes:
-    """Write box and step as a solver would, with energies and momenta of both and of the model."""
-    made = T01Writer()
-    made.record(struct.pack(">i", 3040) + b"rollover".ljust(80))
-    made.record(b"RADIOSS".ljust(80))
-    made.integers(2, 1, 1, 1, 0, 11)
-    made.integers(*range(1, 12))
-    for number, title in ((1, b"box"), (2, b"step")):
-        made.record(struct.pack(">i", number) + title.ljust(40) + struct.pack(">4i", 0, 1, 1, len(T01_CODES)))
-        made.integers(*T01_CODES)
-    for number in (1, 1):
-        made.record(struct.pack(">i", number) + b"steel".ljust(40))
-    made.record(struct.pack(">5i", 0, 0, 0, 2, 0) + b"GLOBAL MODEL".ljust(40))
-    made.integers(1, 2)
-    internal, kinetic, momentum = record.internal_energy, record.kinetic_energy, record.momentum
-    for i, time in enumerate(record.time.tolist()):
-        whole = momentum[i].sum()
-        made.reals([time])
-        made.reals([internal[i].sum(), kinetic[i].sum(), whole.real, 0.0, whole.imag, 1.0, 1e-6, 0.0,
-                    record.external_work[i], 0.0, record.contact_energy[i]])  # fmt: skip
-        made.reals([
-            value for part in (0, 1)
-            for value in (internal[i, part], kinetic[i, part], momentum[i, part].real, 0.0, momentum[i, part].imag)
-        ])  # fmt: skip
-    return bytes(made.data)
 
 
 @pytest.fixture(
@@ -83,9 +53,9 @@ def rolled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     assert record.released is not None
     assert record.landed is not None
     folder = tmp_path_factory.mktemp("rolled")
-    files = {name: folder / f"run.{name}" for name in (*ROLLOVER_WRITERS, "T01")}
+    files = {name: folder / f"run.{name}" for name in (*WRITERS, "T01")}
     for name, file in files.items():
-        file.write_bytes(t01(record) if name == "T01" else ROLLOVER_WRITERS[name](record))
+        file.write_bytes(t01(record) if name == "T01" else WRITERS[name](record))
     return Rolled(files, record.released, record.landed)
 
 
