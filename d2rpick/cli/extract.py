@@ -33,10 +33,11 @@ def command(write_as: str | None, **options: Any) -> None:
     from d2rpick.report import writers
 
     form = write_as or writers.format_of(options["output_file"], list(writers.TABLE_WRITERS))
-    with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run(options)
+    asked = shared.Reading.of(options)
+    with reading(asked.names, quiet=asked.quiet):
+        run = asked.open()
         output = Output.of(options, *run.sources)
-        history = run.history(shared.selection(options))
+        history = run.history(asked.selection)
         table = {"time": history.time, "internal_energy": history.energy}
         if history.parts and len(history.parts) > 1:
             energies = run.part_energies(history.parts)

@@ -12,6 +12,8 @@ from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.suggest import Suggestion
@@ -65,19 +67,20 @@ def command(
         td = None
     if _only_in_environment(ctx, "td_window", overruled_by="td"):
         td_window = None
-    _check_usage(td, td_window, card=output_format == "card", parts=options["part"])
-    with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run(options)
+    asked, settings, extras = shared.Reading.of(options), shared.settings(options), shared.Extras.of(options)
+    _check_usage(td, td_window, card=output_format == "card", parts=asked.selection.parts)
+    with reading(asked.names, quiet=asked.quiet):
+        run = asked.open()
         output = Output.of(options, *run.sources)
-        reference = Reference.of(run, shared.selection(options))
-    answer = _answer(reference, td_window if td is None else td, shared.settings(options))
+        reference = Reference.of(run, asked.selection)
+    answer = _answer(reference, td_window if td is None else td, settings)
     output.notes(reference.history.notes, answer.cautions)
-    if options["plot"]:
+    if extras.plot:
         from d2rpick.report import figures
 
-        output.write(options["plot"], figures.render(figures.draw_suggestion(answer), options["plot"]))
-    if options["report"]:
-        output.write(options["report"], text_bytes(_page(answer, run, options)))
+        output.write(extras.plot, figures.render(figures.draw_suggestion(answer), extras.plot))
+    if extras.report:
+        output.write(extras.report, text_bytes(_page(answer, run, extras.judging)))
     if output_format == "card":
         written = _card(answer, output)
         finish(ctx, objection=not written, exit_zero=exit_zero)
@@ -113,7 +116,7 @@ def _answer(reference: Reference, td: float | tuple[float, float] | None, settin
     return suggest_of(reference, td, settings)
 
 
-def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
+def _page(answer: Suggestion, run: Run, judging: Sequence[str]) -> str:
     """Draw the figures, wide and narrow, and write the page around them."""
     from d2rpick.report import figures
     from d2rpick.report.page import Record
@@ -123,7 +126,7 @@ def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
     drawn = {caption: figures.both_widths(figures.draw_suggestion, answer, "choice")}
     if answer.clearly_better:
         drawn["The better pair"] = figures.both_widths(figures.draw_better, answer, "better")
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn))
+    return as_page(answer, Record(run, shared.repeat(), judging, drawn))
 
 
 def _card(answer: Suggestion, output: Output) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,6 +13,8 @@ from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from d2rpick.choice.verify import Verdict
     from d2rpick.histories.opening import Run
 
@@ -52,31 +55,35 @@ class _Verify(click.Command):
 @shared.choosing_options
 @shared.output_options(*FORMATS["verdict"])
 @click.pass_context
-def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exit_zero: bool, **options: Any) -> None:
+def command(
+    ctx: click.Context, /, tr: float, td: float, switched: tuple[str, ...], output_format: str, exit_zero: bool,
+    **options: Any,
+) -> None:  # fmt: skip
     """Judge one pair of switch times against the HISTORY of a run without switching."""
     from d2rpick.choice.of_run import Reference, compare_with, verify_of
 
-    with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run(options)
-        switched = _switched(options)
-        output = Output.of(options, *run.sources, *(switched.sources if switched else ()))
-        reference = Reference.of(run, shared.selection(options))
-    answer = verify_of(reference, tr, td, shared.settings(options))
-    if switched:
-        with reading(options["switched"], quiet=options["quiet"]):
-            answer = compare_with(answer, reference, Reference.of(switched, shared.selection(options)))
+    asked, settings, extras = shared.Reading.of(options), shared.settings(options), shared.Extras.of(options)
+    finished = replace(asked, names=switched)
+    with reading(asked.names, quiet=asked.quiet):
+        run, other = asked.open(), finished.open() if switched else None
+        output = Output.of(options, *run.sources, *(other.sources if other else ()))
+        reference = Reference.of(run, asked.selection)
+    answer = verify_of(reference, tr, td, settings)
+    if other:
+        with reading(finished.names, quiet=asked.quiet):
+            answer = compare_with(answer, reference, Reference.of(other, asked.selection))
     output.notes(reference.history.notes, answer.cautions)
-    if options["plot"]:
+    if extras.plot:
         from d2rpick.report import figures
 
-        output.write(options["plot"], figures.render(figures.draw_verdict(answer), options["plot"]))
-    if options["report"]:
-        output.write(options["report"], text_bytes(_page(answer, run, options)))
+        output.write(extras.plot, figures.render(figures.draw_verdict(answer), extras.plot))
+    if extras.report:
+        output.write(extras.report, text_bytes(_page(answer, run, extras.judging)))
     output.result(write("verdict", output_format, answer, Shown(ctx.meta["d2rpick.command"])))
     finish(ctx, objection=not answer.verified, exit_zero=exit_zero)
 
 
-def _page(answer: Verdict, run: Run, options: dict[str, Any]) -> str:
+def _page(answer: Verdict, run: Run, judging: Sequence[str]) -> str:
     """Draw the figure, wide and narrow, and write the page around it."""
     from d2rpick.report import figures
     from d2rpick.report.page import Record
@@ -84,13 +91,4 @@ def _page(answer: Verdict, run: Run, options: dict[str, Any]) -> str:
 
     caption = "Internal energy with its level at td, and the pair"
     drawn = {caption: figures.both_widths(figures.draw_verdict, answer, "pair")}
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn))
-
-
-def _switched(options: dict[str, Any]) -> Run | None:
-    """Open the switched run, as the reference is read; None where none was given."""
-    from d2rpick.histories.opening import open_run
-
-    if not options["switched"]:
-        return None
-    return open_run(options["switched"], shared.selection(options), options["input_format"])
+    return as_page(answer, Record(run, shared.repeat(), judging, drawn))
