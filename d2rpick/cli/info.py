@@ -27,9 +27,10 @@ def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **option
     from d2rpick.choice.overview import survey
     from d2rpick.report import overview as report
 
-    with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run(options)
+    asked = shared.Reading.of(options)
+    with reading(asked.names, quiet=asked.quiet):
+        run = asked.open()
         output = Output.of(options, *run.sources)
-        overview = survey(run, shared.selection(options))
+        overview = survey(run, asked.selection)
     output.notes((), report.cautions(overview))
     output.result(write("overview", output_format, overview, Shown(ctx.meta["d2rpick.command"])))

@@ -69,18 +69,20 @@ def command(
         td_window = None
     _check_usage(td, td_window, card=output_format == "card", ids=(*options["part"], *options["node"]))
     prints = prints_card(options, output_format)
-    with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run({**options, "part": ()})
+    asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
+    extras = shared.Extras.of(options)
+    with reading(asked.names, quiet=asked.quiet):
+        run = asked.open()
         output = Output.of(options, *run.sources)
         reference = Reference(run, energy_of(run, options, prints=prints))
-    answer = _answer(reference, td_window if td is None else td, shared.settings(options))
+    answer = _answer(reference, td_window if td is None else td, settings)
     output.notes(reference.history.notes, answer.cautions)
-    if options["plot"]:
+    if extras.plot:
         from d2rpick.report import figures
 
-        output.write(options["plot"], figures.render(figures.draw_suggestion(answer), options["plot"]))
-    if options["report"]:
-        output.write(options["report"], text_bytes(_page(answer, run, options)))
+        output.write(extras.plot, figures.render(figures.draw_suggestion(answer), extras.plot))
+    if extras.report:
+        output.write(extras.report, text_bytes(_page(answer, run, options)))
     if output_format == "card":
         return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
     output.result(write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit)))
