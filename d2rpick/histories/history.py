@@ -211,7 +211,11 @@ class History:
         """Energy at ``time``, linear between the states; RangeError outside the record."""
         if not self.time[0] <= time <= self.time[-1]:
             span = f"{self.time[0]:g} to {self.time[-1]:g}"
-            raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}")
+            from d2rpick.histories.legs import later_legs  # not above: pathlib costs start-up
+
+            legs = later_legs(self.source) if time > self.time[-1] else []
+            more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
+            raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}{more}")
         return float(np.interp(time, self.time, self.energy))
 
     def mean_energy(self, start: float, end: float) -> float | None:
