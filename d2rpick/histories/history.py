@@ -216,7 +216,11 @@ class History:
         """Energy at ``time``, linear between the states; RangeError outside the record."""
         if not self.time[0] <= time <= self.time[-1]:
             span = f"{self.time[0]:g} to {self.time[-1]:g}"
-            raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}")
+            from d2rpick.histories.legs import later_legs  # not above: pathlib costs start-up
+
+            legs = later_legs(self.source) if time > self.time[-1] else []
+            more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
+            raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}{more}")
         before = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
         cell = slice(before, before + 2)  # of whole arrays that are read-only, numpy would make copies
         return float(np.interp(time, self.time[cell], self.energy[cell]))

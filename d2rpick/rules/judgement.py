@@ -24,8 +24,15 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import Run, Selection
 
 # What verify warns of and no rule reports.
-_KEPT: Final = ("truncated-input", "energy-only", "no-free-flight", "flight-from-energy", "plastic-or-preload")
-_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time as `after`"
+_KEPT: Final = (
+    "truncated-input",
+    "energy-only",
+    "no-free-flight",
+    "flight-from-energy",
+    "flight-sources-disagree",
+    "plastic-or-preload",
+)
+_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time"
 
 
 @dataclass

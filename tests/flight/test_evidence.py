@@ -20,7 +20,8 @@ from d2rpick.histories.selection import Selection
 from d2rpick.models.rollover.files import WRITERS
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import simulate
-from tests.command import answer, codes, run
+from tests.cli.test_output import check_by_schema
+from tests.command import ENERGY, ROLLOVER, answer, codes, run
 from tests.sample_box import t01
 from tests.shared import columns, shared
 
@@ -226,3 +227,32 @@ def test_sources_that_contradict_each_other_are_both_named_and_the_shorter_fligh
     (doubt,) = situation.flight.doubts
     assert "by the momentum" in doubt
     assert "by the contact energy" in doubt
+
+
+ALONE = ("--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
+
+
+def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> None:
+    assert "(energy alone, not certain)" in run("suggest", *ALONE).stdout
+    found = answer("suggest", *ALONE)
+    assert (found["flight"]["source"], found["flight"]["certain"]) == ("energy", False)
+    pair = ("verify", "--tr", str(found["recommended"]["tr"]), *ALONE)
+    assert "verdict  verified by the energy level alone" in run(*pair).stdout
+    assert [run(*asked, "--strict").exit_code for asked in (("suggest", *ALONE), pair)] == [1, 1]
+    (message,) = (w["message"] for w in found["warnings"] if w["code"] == "flight-from-energy")
+    assert "given up for safety" in message
+
+
+def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> None:
+    found = answer("suggest", *ALONE)
+    check_by_schema(found)
+    windows = found["acceptable_windows"]
+    (own,) = (window for window in windows if window["recommended"])
+    assert own["start"] <= found["recommended"]["tr"] <= own["end"]
+    assert all(found["flight"]["start"] <= w["start"] < w["end"] <= 0.37 for w in windows)
+    assert sum(w["share"] for w in windows) <= 1
+    for window in windows[:3]:
+        for tr in (window["start"], (window["start"] + window["end"]) / 2, window["end"]):
+            assert answer("verify", "--tr", repr(tr), *ALONE)["verified"]
+    assert f"{own['start']:.6g} to {own['end']:.6g}" in run("suggest", *ALONE).stdout
+    assert answer("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None
