@@ -28,7 +28,7 @@ def test_nothing_fails_at_any_td_and_no_flight_contradicts_the_health(path: Path
         reference = Reference.of(open_run([str(path)]))
     except D2RPickError:
         return  # refused; what is said of it is tested with the readers
-    for td in np.linspace(*reference.history.time[[0, -1]], _TIMES).tolist():
+    for td in np.linspace(reference.history.time[0], reference.history.time[-1], _TIMES).tolist():
         try:
             answer = suggest_of(reference, td, PLAIN)
         except D2RPickError:
