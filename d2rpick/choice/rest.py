@@ -27,7 +27,8 @@ def at_rest(situation: Situation) -> bool:
     inside = history.energy[slice(*np.searchsorted(history.time, [start, np.nextafter(td, np.inf)]))]
     if not inside.size:
         return False
-    if float(np.abs(inside).max()) <= round_off(history):
+    least = round_off(history)  # 0 where no energy is written at all: that tells nothing
+    if least > 0 and float(np.abs(inside).max()) <= least:
         return True
     level = history.energy_at(td)
     if situation.vibration or level <= 0 or inside.min() < 0:
