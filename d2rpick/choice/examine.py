@@ -10,7 +10,7 @@ import numpy as np
 from d2rpick.choice.situation import Situation
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import find_flight, seen_flight
-from d2rpick.histories.history import window
+from d2rpick.histories.samples import window
 from d2rpick.vibration.identify import Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, energy_at
 from d2rpick.vibration.second_mode import resolved

@@ -14,6 +14,7 @@ import numpy as np
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.flight.work import FEWEST_STATES, work_beyond_gravity
+from d2rpick.histories.samples import window as within
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -202,7 +203,7 @@ def _ratio(balance: Balance) -> dict[str, Any]:
 
 def _in_window(balance: Balance, start: float, end: float, locked: float | None) -> dict[str, Any]:
     """What should not happen in free flight, as shares of the energy there."""
-    inside = slice(*np.searchsorted(balance.time, [start, np.nextafter(end, np.inf)]))
+    inside = within(balance.time, start, end)
     if locked is None and balance.internal is not None:
         locked = float(np.mean(balance.internal[inside])) if balance.time[inside].size else None
     if locked is None or locked <= _FLOOR:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from d2rpick.errors import HistoryError, RangeError
+from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -234,18 +235,6 @@ class History:
         """Times and energies of the states from ``start`` to ``end``, both included [time], [energy]."""
         inside = window(self.time, start, end)
         return self.time[inside], self.energy[inside]
-
-
-def window(time: Samples, start: float, end: float) -> slice:
-    """Slice of ascending times from ``start`` to ``end``, both included [time].
-
-    Examples
-    --------
-    >>> window(np.array([0.0, 1.0, 2.0, 3.0]), 1.0, 2.0)
-    slice(1, 3, None)
-    """
-    first, last = np.searchsorted(time, [start, np.nextafter(end, np.inf)]).tolist()
-    return slice(first, last)
 
 
 def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
