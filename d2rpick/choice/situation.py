@@ -68,6 +68,10 @@ class Situation:
         deformed = self.vibration.unknown is None
         return nothing_vibrates(self.history, start, self.td, self.settings.tolerance, deformed=deformed)
 
+    def errors(self, times: Samples) -> Samples:
+        """What a tolerance is held against, of the shape of ``times`` [-]: at rest nothing, else the vibration's."""
+        return np.zeros(times.shape) if self.at_rest else self.vibration.errors(times)
+
     @property
     def in_flight(self) -> bool:
         """Whether td lies in a known flight, with the margin."""
