@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\b
 Examples:
-  d2rpick reproduce --output-dir paper
+  d2rpick reproduce --output-dir paper --section 2
   d2rpick reproduce --output-dir paper --overwrite --section 3 --solver sample_data/oscillator_solver_6_80.csv
-  d2rpick reproduce --output-dir paper --overwrite --section 4 --report paper.html -f markdown
+  d2rpick reproduce --output-dir paper --overwrite --section 5 --report paper.html -f markdown
 """
 # Columns of a solver's table beside time_s, by what it is.
 SOLVER = {

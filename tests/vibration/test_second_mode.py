@@ -83,7 +83,7 @@ def test_candidates_state_how_large_their_residual_may_be() -> None:
 
 @pytest.mark.parametrize("kind", ["one", "small", "large"])
 def test_of_random_records_95_percent_are_within_their_bounds(kind: str) -> None:
-    found = small_second_modes(kind, range(25))
-    assert len(found) >= 12
+    found = small_second_modes(kind, range(10))
+    assert len(found) >= 5
     off = [max(one.stated - one.true, one.true - one.highest, 0.0) for one in found]
     assert np.percentile(off, 95) <= 0.05
