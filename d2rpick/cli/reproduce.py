@@ -11,6 +11,7 @@ from d2rpick.cli.output import Output, finish
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from d2rpick.histories.history import Samples
     from d2rpick.models.exhibit import Exhibit
@@ -72,8 +73,9 @@ def command(
     from d2rpick.report import reproduction
 
     output = Output.of({**options, "report": report}, *solver)
-    rows, shown = table(), list(_exhibits(section, _solver(solver)))
-    files = _write(output, output_dir, rows, shown)
+    curves, place = _solver(solver), _made(output_dir)  # before the half minute that the box takes
+    rows, shown = table(), list(_exhibits(section, curves))
+    files = _write(output, place, rows, shown)
     if report:
         from d2rpick.report.reproduction_page import as_page
 
@@ -116,19 +118,25 @@ def _solver(names: Sequence[str]) -> dict[str, dict[str, Samples]]:
     return found
 
 
-def _write(output: Output, folder: str, rows: Sequence[Row], shown: Sequence[Exhibit]) -> list[str]:
-    """Write all files, or none where one may not be written; give their names."""
+def _made(folder: str) -> Path:
+    """Create the folder where it is missing; D2RPickError where that cannot be done."""
     from pathlib import Path
 
     from d2rpick.errors import D2RPickError
-    from d2rpick.histories.formats import csv_table
-    from d2rpick.report import figures, figures_models, reproduction
 
     place = Path(folder)
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise D2RPickError(f"{folder}: the folder cannot be created ({error.strerror}); choose another one") from error
+    return place
+
+
+def _write(output: Output, place: Path, rows: Sequence[Row], shown: Sequence[Exhibit]) -> list[str]:
+    """Write all files, or none where one may not be written; give their names."""
+    from d2rpick.histories.formats import csv_table
+    from d2rpick.report import figures, figures_models, reproduction
+
     index = reproduction.as_markdown(rows, shown, pictures=True)
     contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{reproduction.as_csv(rows)}\n".encode()}
     for one in shown:

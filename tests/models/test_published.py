@@ -127,8 +127,11 @@ def test_the_saving_is_predicted_beside_what_was_measured() -> None:
     assert saving.RUNS[1].by_count - saving.RUNS[1].measured > 0.1
 
 
-def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
+def test_the_figures_of_the_box_say_what_a_coarse_box_does(monkeypatch: pytest.MonkeyPatch) -> None:
     coarse = Parameters(mesh=4)
+    every = tuple(published_box.variants_of(coarse))
+    some = (every[0], every[2], every[4], every[-1])  # two that act after td, two before
+    monkeypatch.setattr(published_box, "variants_of", lambda _: iter(some))
     made = {exhibit.name: exhibit for exhibit in (make() for _, make in published_box.exhibits_of(coarse)[1:])}
     assert [exhibit.figure for exhibit in made.values()] == ["2a, b", "2c", "8", "section 4"]
     assert made["early"].agrees
@@ -136,8 +139,8 @@ def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
     at_td = np.searchsorted(made["revised"].columns["time_ms"], 370.0)
     assert abs(made["revised"].columns[tr][at_td]) < abs(made["revised"].columns["droll_70_deg"][at_td])
     variants = made["variants"].columns
-    assert np.ptp(variants["own_tr_ms"][:4]) < 1e-9  # what acts after td leaves tr alone
-    assert np.ptp(variants["own_tr_ms"][4:]) > 0.1
+    assert np.ptp(variants["own_tr_ms"][:2]) < 1e-9  # what acts after td leaves tr alone
+    assert np.ptp(variants["own_tr_ms"][2:]) > 0.1
     assert np.all(variants["own_tr_ms"] <= variants["common_tr_ms"] + 1e-9)
     for exhibit in made.values():
         figure = draw_exhibit(exhibit)
