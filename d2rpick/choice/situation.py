@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.choice.rest import nothing_vibrates
-from d2rpick.histories.crossings import find_extrema
 from d2rpick.vibration.model import Evidence, describing, model_at
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from d2rpick.choice.settings import Settings
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
@@ -77,13 +78,11 @@ class Situation:
         """Times in (start, end], ascending, where the energy peaks: of an oscillator, of the samples without one."""
         return describing(self.history, self.td, self.evidence).peaks(start, end)
 
-    def turns_since(self, time: float) -> int:
-        """How often the sampled energy turns between ``time`` and td."""
-        return int(np.count_nonzero((self._turns > time) & (self._turns < self.td)))
-
-    @cached_property
-    def _turns(self) -> Samples:
-        return np.array([e.time for e in find_extrema(self.history.time, self.history.energy)])
+    def turns_since(self, times: Samples) -> NDArray[np.intp]:
+        """How often the sampled energy turns between each of ``times`` and td, of the shape of ``times``."""
+        turns = self.history.turns
+        after = np.searchsorted(turns, self.td) - np.searchsorted(turns, times, side="right")
+        return np.asarray(np.maximum(after, 0))
 
     def at(self, td: float) -> Situation:
         """Give the same record, flight and evidence seen from another ``td``."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING
 
@@ -112,7 +111,7 @@ def _highest(situation: Situation, window: tuple[float, float], look: Look) -> S
 def _recommending(found: Suggestion, best: Candidate) -> Suggestion:
     """Give the suggestion with another candidate recommended."""
     return found._replace(
-        candidates=tuple(replace(c, recommended=c is best) for c in found.candidates),
+        candidates=found.candidates.recommending(best.rank - 1),
         recommended=Pair(best.tr, found.situation.td, best.residual),
         expected=expectation(found.situation, best.energy),
     )
