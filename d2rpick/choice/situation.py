@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.choice.rest import nothing_vibrates
+from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.model import Evidence, describing, model_at
 
 if TYPE_CHECKING:
@@ -22,13 +23,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Situation:
-    """A history seen from one td [time]; ``evidence`` is what was found of a vibration in it."""
+    """A history seen from one td [time].
+
+    ``evidence`` is what was found of a vibration in it, ``fits`` is what was tried.
+    """
 
     history: History
     td: float
     settings: Settings
     flight: Flight
     evidence: Evidence
+    fits: Fits = field(default_factory=Fits, compare=False, repr=False)
 
     @cached_property
     def vibration(self) -> Vibration:

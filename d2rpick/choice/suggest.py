@@ -140,7 +140,7 @@ def _windows(
 
 def _verifies(situation: Situation, tr: float, td: float) -> bool:
     """Whether ``verify`` would verify a pair, in full and in the six digits that people read."""
-    anew = examine(situation.history, td, situation.settings)
+    anew = examine(situation.history, td, situation.settings, situation.fits)
     printed = float(f"{tr:.6g}"), float(f"{td:.6g}")
     try:
         return all(verify_at(anew.at(late), early).verified for early, late in ((tr, td), printed))

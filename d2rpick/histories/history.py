@@ -48,6 +48,14 @@ class Precision(NamedTuple):
             return 0.0
         return float(10.0 ** (np.floor(np.log10(abs(value))) - self.digits + 1))
 
+    def quanta(self, values: Samples) -> Samples:
+        """The same around each of ``values``."""
+        if self.decimals is not None:
+            return np.full(values.shape, 10.0**-self.decimals)
+        sizes = np.abs(values)
+        powers = np.floor(np.log10(sizes, out=np.zeros(sizes.shape), where=sizes > 0)) - self.digits + 1
+        return np.where(sizes > 0, 10.0**powers, 0.0)
+
 
 EXACT = Precision()
 
