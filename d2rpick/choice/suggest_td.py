@@ -72,8 +72,17 @@ def advice(history: History, settings: Settings) -> str:
 def _flying(look: Look, window: tuple[float, float]) -> Situation:
     """Situation at the start, middle or end of the window: in the flight that is known best, the first of these."""
     low, high = window
-    situations = [look(td) for td in (low, (low + high) / 2, high)]
-    return min(situations, key=lambda one: (not one.in_flight, SOURCES.index(one.flight.source)))
+    situations = []
+    for td in (low, (low + high) / 2, high):
+        situations.append(look(td))
+        if _certainty(situations[-1]) == (False, 0):
+            break  # none can be known better
+    return min(situations, key=_certainty)
+
+
+def _certainty(situation: Situation) -> tuple[bool, int]:
+    """How well it is known that td lies in a flight, the smallest first."""
+    return not situation.in_flight, SOURCES.index(situation.flight.source)
 
 
 def _best(situation: Situation, times: tuple[float, ...], look: Look) -> Situation | None:

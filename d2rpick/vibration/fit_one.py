@@ -36,7 +36,8 @@ _CELLS_PER_PERIOD: Final = 24  # of the strongest vibration in E, which a preloa
 
 # Of the least squares:
 COARSE: Final = 400  # samples on which starts are compared and first refined
-_MEDIUM: Final = 4096  # samples on which a fit is refused before it is refined on more
+_MEDIUM: Final = 2048  # samples on which a fit is refused before it is refined on more
+_NEAR: Final = 1e-6  # of the sum of squares still to be gained where a fit is refused: nothing beside the structure
 STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
 CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
 _MAX_STEPS: Final = 40  # a good start needs 4 to 8
@@ -81,7 +82,7 @@ def refine(starts: Sequence[Samples], model: Model, s: Samples, e: Samples, wors
 
 
 def fails(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
-    """Whether the best fit near ``parameters`` to a few thousand samples leaves a structure that refuses it.
+    """Whether the best fit near ``parameters`` to some two thousand samples leaves a structure that refuses it.
 
     Never where there are no more samples than that: then the fit to all of them costs no more.
     """
@@ -89,7 +90,7 @@ def fails(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
     if stride == 1:
         return False
     some_s, some_e = s[::stride], e[::stride]
-    ended = minimise(parameters, model, some_s, some_e)[0]
+    ended = minimise(parameters, model, some_s, some_e, near=_NEAR)[0]
     return surely_structured(some_e - model(ended, some_s)[0], float(np.std(some_e)))
 
 
@@ -161,11 +162,12 @@ def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) ->
 
 @np.errstate(over="ignore", invalid="ignore")  # a trial step too far; it is rejected
 def minimise(
-    parameters: Samples, model: Model, s: Samples, e: Samples, hopeless: float = np.inf
+    parameters: Samples, model: Model, s: Samples, e: Samples, hopeless: float = np.inf, near: float = 1e-12
 ) -> tuple[Samples, float]:
     """Refine parameters by Levenberg-Marquardt; return them and the sum of squares.
 
-    Parameters that the model gives no derivatives by stay.  It ends early where steps like the last would not bring
+    Parameters that the model gives no derivatives by stay.  It ends where a step gains no more than ``near`` of the
+    sum of squares, and early where steps like the last would not bring
     the sum of squares down to ``hopeless``.
     """
     damping = 1e-4  # of the unit diagonal: starts are close, so steps may be long
@@ -186,7 +188,7 @@ def minimise(
                 break
         else:
             damping *= 10
-        if expected <= 1e-12 * cost + 1e-31 * e.size:
+        if expected <= near * cost + 1e-31 * e.size:
             break
     return parameters, cost
 
