@@ -16,7 +16,7 @@ from d2rpick.vibration.roots import narrow
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.candidates import Candidates
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
 
@@ -40,9 +40,7 @@ def tolerance_levels(tolerance: float) -> tuple[float, ...]:
     return tuple(levels)
 
 
-def acceptable_windows(
-    situation: Situation, candidates: Sequence[Candidate], recommended: float | None
-) -> tuple[Samples, ...]:
+def acceptable_windows(situation: Situation, candidates: Candidates, recommended: float | None) -> tuple[Samples, ...]:
     """Find the windows in which a tr is acceptable, at the tolerance and at each finer level.
 
     Every end and middle at the full tolerance was judged by the rule of ``verify``; ends lie inside.  In between the
@@ -51,7 +49,7 @@ def acceptable_windows(
     Parameters
     ----------
     situation : Situation
-    candidates : sequence of Candidate
+    candidates : Candidates
         All of them.
     recommended : float or None
         The tr that is recommended [time].  From some time on the error stays within the tolerance up to td: the same
@@ -116,14 +114,14 @@ def common_windows(runs: Sequence[Samples]) -> Samples:
     return np.asarray(stretches[counts == len(runs)])
 
 
-def _grid(situation: Situation, candidates: Sequence[Candidate]) -> Samples:
+def _grid(situation: Situation, candidates: Candidates) -> Samples:
     """Times in the flight before td between which the rule changes once at most."""
     history, td = situation.history, situation.td
     start = situation.earliest_tr
     if start is None or start >= td:
         return np.zeros(0)
-    found = [candidate.tr for candidate in candidates]
-    times = np.concatenate([history.time, found, situation.vibration.knots(), [start, np.nextafter(td, -np.inf)]])
+    ends = [start, np.nextafter(td, -np.inf)]
+    times = np.concatenate([history.time, candidates.tr, situation.vibration.knots(), ends])
     return np.unique(times[(times >= max(start, history.time[0])) & (times < td)])
 
 

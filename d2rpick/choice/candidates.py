@@ -1,21 +1,30 @@
-"""Candidates for tr at a given td: where they are, how far they can be trusted, what speaks against them."""
+"""Candidates for tr at a given td: where they are, how far they can be trusted, what speaks against them.
+
+They are judged as columns; a `Candidate` is made only where one is looked at.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
-from d2rpick.choice.warnings import end_of_flight, end_of_load
+from d2rpick.choice.objections import objections
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import Moment
 from d2rpick.vibration.part_shares import main_contributors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
+    from numpy.typing import NDArray
+
+    from d2rpick.choice.objections import Objection
     from d2rpick.choice.situation import Situation
+    from d2rpick.histories.history import Samples
     from d2rpick.vibration.moments import Measured
     from d2rpick.vibration.part_shares import PartMatch
 
@@ -69,7 +78,134 @@ class Candidate:
         return np.inf if error is None else error
 
 
-def find_candidates(situation: Situation) -> tuple[Candidate, ...]:
+@dataclass(frozen=True, eq=False)
+class Candidates(Sequence[Candidate]):
+    """Candidates of one td in some order: columns of what decides, each of shape (n,), made for all of them at once.
+
+    ``tr`` [time]; ``energy`` [energy]; ``level_error`` [-], NaN where an energy is not positive; ``reach``: how far
+    the true time may lie away [time]; ``same_swing``; ``moments`` and ``known``, as the vibration gave them.
+    ``recommended`` is the place of the one that is, ``ranked`` tells whether the order is that of the ranks.
+    """
+
+    situation: Situation
+    moments: tuple[Moment, ...]
+    known: tuple[Measured | None, ...]
+    tr: Samples
+    energy: Samples
+    level_error: Samples
+    reach: Samples
+    same_swing: NDArray[np.bool_]
+    objections: tuple[Objection, ...]
+    recommended: int | None = None
+    ranked: bool = False
+
+    @classmethod
+    def of(cls, situation: Situation, moments: Sequence[Moment]) -> Candidates:
+        """Measure each tr and hold it against flight, sign and tolerance."""
+        vibration = situation.vibration
+        tr = np.array([one.tr for one in moments])
+        known, energy = tuple(vibration.measured(tr)), vibration.energies(tr)
+        level_error = measures.level_errors(energy, situation.energy_td)
+        return cls(
+            situation=situation,
+            moments=tuple(moments),
+            known=known,
+            tr=tr,
+            energy=energy,
+            level_error=level_error,
+            reach=vibration.reach(moments),
+            same_swing=(situation.turns_since(tr) < 2) & (not situation.at_rest),
+            objections=tuple(objections(situation, tr, known, level_error)),
+        )
+
+    @cached_property
+    def acceptable(self) -> NDArray[np.bool_]:
+        """Which of them nothing speaks against."""
+        against = np.zeros(len(self), dtype=bool)
+        for one in self.objections:
+            against |= one.holds
+        return ~against
+
+    @cached_property
+    def residual(self) -> Samples:
+        """Residuals, NaN where unknown [-]."""
+        return np.array([np.nan if one is None else one.residual for one in self.known])
+
+    @property
+    def error(self) -> Samples:
+        """What the order goes by, as ``Candidate.error`` [-]."""
+        error = np.where(np.isnan(self.residual), self.level_error, self.residual)
+        return np.where(np.isnan(error), np.inf, error)
+
+    def ordered(self, order: NDArray[np.intp]) -> Candidates:
+        """Give the same, ranked in this order of their places."""
+        return replace(
+            self,
+            moments=tuple(self.moments[i] for i in order.tolist()),
+            known=tuple(self.known[i] for i in order.tolist()),
+            tr=self.tr[order],
+            energy=self.energy[order],
+            level_error=self.level_error[order],
+            reach=self.reach[order],
+            same_swing=self.same_swing[order],
+            objections=tuple(one.ordered(order) for one in self.objections),
+            ranked=True,
+        )
+
+    def recommending(self, place: int) -> Candidates:
+        """Give the same with another one recommended."""
+        return replace(self, recommended=place)
+
+    def __len__(self) -> int:
+        return self.tr.size
+
+    @overload
+    def __getitem__(self, place: int) -> Candidate: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[Candidate, ...]: ...
+    def __getitem__(self, place: int | slice) -> Candidate | tuple[Candidate, ...]:
+        """Make the candidate, or the candidates, at some place."""
+        if isinstance(place, slice):
+            return tuple(map(self._made, range(len(self))[place]))
+        return self._made(range(len(self))[place])
+
+    def _made(self, i: int) -> Candidate:
+        situation, found, known = self.situation, self.moments[i], self.known[i]
+        history, td, tr = situation.history, situation.td, found.tr
+        energy, level, reach, same_swing = (
+            column[i].item() for column in (self.energy, self.level_error, self.reach, self.same_swing)
+        )
+        rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
+        parts = situation.vibration.part_matches(tr) if known else ()
+        against = tuple(one.sentence(i) for one in self.objections if one.holds[i])
+        return Candidate(
+            rank=(i + 1) * self.ranked,
+            tr=tr,
+            kind=found.kind,
+            energy=energy,
+            energy_ratio=energy / situation.energy_td if situation.energy_td > 0 else None,
+            level_error=None if np.isnan(level) else level,
+            rising=found.rising,
+            sign_match=known and known.sign_match,
+            lock_in_error=known and known.lock_in_error,
+            residual=known and known.residual,
+            part_mismatch=known and known.part_mismatch,
+            rigid_time=td - tr,
+            rigid_fraction=rigid_fraction,
+            timing_tolerance=known and known.timing_tolerance,
+            tr_low=tr - reach,
+            tr_high=tr + reach,
+            acceptable=not against,
+            recommended=i == self.recommended,
+            notes=(*against, *_SAME_SWING * same_swing, *_remarks(situation, reach, known, parts)),
+            run_time_share=_run_time_share(situation, rigid_fraction),
+            same_swing=same_swing,
+            parts=parts,
+            residual_high=known and known.residual_high,
+        )
+
+
+def find_candidates(situation: Situation) -> Candidates:
     """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order.
 
     Where nothing vibrates in the flight, its start alone.
@@ -83,77 +219,9 @@ def find_candidates(situation: Situation) -> tuple[Candidate, ...]:
     return judge(situation, sorted(new, key=lambda one: one.tr))
 
 
-def judge(situation: Situation, found: Sequence[Moment]) -> tuple[Candidate, ...]:
+def judge(situation: Situation, found: Sequence[Moment]) -> Candidates:
     """Measure each tr and hold it against flight, sign and tolerance."""
-    if not found:
-        return ()
-    reaches = situation.vibration.reach(found)
-    measured = situation.vibration.measured(np.array([one.tr for one in found]))
-    return tuple(
-        _candidate(situation, one, known, low=one.tr - reach, high=one.tr + reach)
-        for one, known, reach in zip(found, measured, reaches.tolist(), strict=True)
-    )
-
-
-def _candidate(situation: Situation, found: Moment, known: Measured | None, *, low: float, high: float) -> Candidate:
-    history, td, tr = situation.history, situation.td, found.tr
-    energy, energy_td = situation.vibration.energy(tr), situation.energy_td
-    level_error = measures.level_error(energy, energy_td)
-    objections = tuple(_objections(situation, tr, known, level_error))
-    rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
-    parts = situation.vibration.part_matches(tr) if known else ()
-    same_swing = situation.turns_since(tr) < 2 and not situation.at_rest
-    remarks = (*_SAME_SWING * same_swing, *_remarks(situation, (high - low) / 2, known, parts))
-    return Candidate(
-        rank=0,
-        tr=tr,
-        kind=found.kind,
-        energy=energy,
-        energy_ratio=energy / energy_td if energy_td > 0 else None,
-        level_error=level_error,
-        rising=found.rising,
-        sign_match=known and known.sign_match,
-        lock_in_error=known and known.lock_in_error,
-        residual=known and known.residual,
-        part_mismatch=known and known.part_mismatch,
-        rigid_time=td - tr,
-        rigid_fraction=rigid_fraction,
-        timing_tolerance=known and known.timing_tolerance,
-        tr_low=low,
-        tr_high=high,
-        acceptable=not objections,
-        recommended=False,
-        notes=objections + remarks,
-        run_time_share=_run_time_share(situation, rigid_fraction),
-        same_swing=same_swing,
-        parts=parts,
-        residual_high=known and known.residual_high,
-    )
-
-
-def _objections(situation: Situation, tr: float, known: Measured | None, level_error: float | None) -> Iterator[str]:
-    """Why this tr is not acceptable, one sentence each."""
-    error = known.lock_in_error if known else level_error
-    earliest = situation.earliest_tr
-    if earliest is None:
-        yield "unknown: nothing shows when the load is over"
-    elif tr < earliest:
-        yield f"before {end_of_load(situation)}"
-    if situation.td > situation.latest_td:
-        yield f"td after {end_of_flight(situation)}"
-    if situation.settings.strict and not situation.flight.certain:
-        yield "the flight was read off the energy alone, which is not certain"
-    yield from situation.vibration.doubts
-    if not situation.vibration.unknown and known is None:
-        yield situation.vibration.undescribed
-    elif known and not known.sign_match:
-        yield "opposite sign of the deformation"
-    elif situation.at_rest:
-        return
-    elif error is None:
-        yield "no positive energy to compare"
-    elif error > situation.settings.tolerance:
-        yield f"error {error:.3g} above the tolerance {situation.settings.tolerance:g}"
+    return Candidates.of(situation, found)
 
 
 def _remarks(situation: Situation, reach: float, known: Measured | None, parts: Sequence[PartMatch]) -> Iterator[str]:

@@ -11,6 +11,7 @@ from d2rpick.choice.situation import Situation
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.histories.samples import window
+from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.identify import Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, energy_at
 from d2rpick.vibration.second_mode import resolved
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
 _LARGEST = 1e150
 
 
-def examine(history: History, td: float, settings: Settings) -> Situation:
+def examine(history: History, td: float, settings: Settings, fits: Fits | None = None) -> Situation:
     """Find the flight around ``td`` and the oscillator in it.
+
+    ``fits`` are those of an earlier look at the same record with the same settings.
 
     RangeError when td, ``after`` or the fit window lie outside the record, or it has fewer than 3 states.
     """
@@ -43,7 +46,8 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
     flying = None if seen.refusal else seen.flight
     # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
     at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
-    fit, span = _oscillator(history, at, settings, seen)
+    fits = Fits() if fits is None else fits
+    fit, span = _oscillator(history, at, settings, seen, fits)
     flight = find_flight(history, td, settings.after, seen, span)
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
@@ -52,11 +56,11 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
         end = flight.end or (float(history.time[-1]) if flying or span else td)
         start = min(td, float(history.time[0]) if flight.start is None else flight.start)
         evidence = _with_parts(evidence, history, td, Span(start, end))
-    return Situation(history, td, settings, flight, evidence)
+    return Situation(history, td, settings, flight, evidence, fits)
 
 
 def _oscillator(
-    history: History, td: float, settings: Settings, seen: Seen
+    history: History, td: float, settings: Settings, seen: Seen, fits: Fits
 ) -> tuple[Identification | None, Span | None]:
     """Find the oscillator, given or identified, and the window around td that it describes."""
     if not settings.replay:
@@ -69,20 +73,25 @@ def _oscillator(
         for bound in settings.fit_window:
             _inside(history, bound, "`fit_window`")
         fit = identify_within(history, Span(*settings.fit_window))
-        return _resolved(history, fit), span_of(history, td, fit, bounds) if fit.describes_record else None
+        return _resolved(history, fit, fits), span_of(history, td, fit, bounds) if fit.describes_record else None
     if settings.oscillator:
-        span, fit = described_span(history, td, bounds, partial(judge_given, settings.oscillator), whole=whole)
+        given = fits.remembered("given", partial(judge_given, settings.oscillator))
+        span, fit = described_span(history, td, bounds, given, whole=whole)
         return fit, span
-    span, fit = described_span(history, td, bounds, identify, whole=whole)
+    span, fit = described_span(history, td, bounds, fits.remembered("one", identify), whole=whole)
     if span is None:
-        span, several = described_span(history, td, bounds, identify_several, whole=whole)
+        fitter = fits.remembered("several", identify_several)
+        span, several = described_span(history, td, bounds, fitter, whole=whole)
         fit = several if span else fit
-    return _resolved(history, fit), span
+    return _resolved(history, fit, fits), span
 
 
-def _resolved(history: History, fit: Identification) -> Identification:
+def _resolved(history: History, fit: Identification, fits: Fits) -> Identification:
     """Look for a small second mode in what an accepted oscillator leaves over."""
-    return resolved(*history.between(fit.start, fit.end), fit) if fit.describes_record else fit
+    if not fit.describes_record:
+        return fit
+    window = history.between(fit.start, fit.end)
+    return fits.once(("resolved", fit.start, fit.end, fit.rms), lambda: resolved(*window, fit))
 
 
 def _with_parts(evidence: Evidence, history: History, td: float, within: Span) -> Evidence:

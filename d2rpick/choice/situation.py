@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.choice.rest import nothing_vibrates
-from d2rpick.histories.crossings import find_extrema
+from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.model import Evidence, describing, model_at
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from d2rpick.choice.settings import Settings
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
@@ -21,13 +23,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Situation:
-    """A history seen from one td [time]; ``evidence`` is what was found of a vibration in it."""
+    """A history seen from one td [time].
+
+    ``evidence`` is what was found of a vibration in it, ``fits`` is what was tried.
+    """
 
     history: History
     td: float
     settings: Settings
     flight: Flight
     evidence: Evidence
+    fits: Fits = field(default_factory=Fits, compare=False, repr=False)
 
     @cached_property
     def vibration(self) -> Vibration:
@@ -81,13 +87,11 @@ class Situation:
         """Times in (start, end], ascending, where the energy peaks: of an oscillator, of the samples without one."""
         return describing(self.history, self.td, self.evidence).peaks(start, end)
 
-    def turns_since(self, time: float) -> int:
-        """How often the sampled energy turns between ``time`` and td."""
-        return int(np.count_nonzero((self._turns > time) & (self._turns < self.td)))
-
-    @cached_property
-    def _turns(self) -> Samples:
-        return np.array([e.time for e in find_extrema(self.history.time, self.history.energy)])
+    def turns_since(self, times: Samples) -> NDArray[np.intp]:
+        """How often the sampled energy turns between each of ``times`` and td, of the shape of ``times``."""
+        turns = self.history.turns
+        after = np.searchsorted(turns, self.td) - np.searchsorted(turns, times, side="right")
+        return np.asarray(np.maximum(after, 0))
 
     def at(self, td: float) -> Situation:
         """Give the same record, flight and evidence seen from another ``td``."""

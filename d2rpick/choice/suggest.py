@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.acceptable_windows import acceptable_windows
-from d2rpick.choice.candidates import Candidate, find_candidates
+from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import Expectation, expectation
 from d2rpick.choice.ranking import best_of, over_limits, rank
@@ -15,6 +14,7 @@ from d2rpick.choice.warnings import Caution, cautions_of
 from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
+    from d2rpick.choice.candidates import Candidate, Candidates
     from d2rpick.choice.health import Health
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
@@ -51,7 +51,7 @@ class Suggestion(NamedTuple):
     """
 
     situation: Situation
-    candidates: tuple[Candidate, ...]
+    candidates: Candidates
     recommended: Pair | None
     better_pair: Pair | None
     cautions: tuple[Caution, ...]
@@ -63,7 +63,8 @@ class Suggestion(NamedTuple):
     @property
     def chosen(self) -> Candidate | None:
         """The candidate that is recommended."""
-        return next((candidate for candidate in self.candidates if candidate.recommended), None)
+        place = self.candidates.recommended
+        return None if place is None else self.candidates[place]
 
     @property
     def clearly_better(self) -> Pair | None:
@@ -86,7 +87,7 @@ def suggest_at(situation: Situation, *, with_better: bool = True) -> Suggestion:
     candidates = rank(find_candidates(situation))
     best = best_of(situation, candidates)
     if best:
-        candidates = tuple(replace(c, recommended=c is best) for c in candidates)
+        candidates = candidates.recommending(best.rank - 1)
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
     if not best:
@@ -125,7 +126,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 
 
 def _windows(
-    situation: Situation, candidates: tuple[Candidate, ...], best: Candidate | None
+    situation: Situation, candidates: Candidates, best: Candidate | None
 ) -> tuple[AcceptableWindow, ...] | None:
     """Windows of acceptable tr where the level alone decides: any tr in one is as good as a crossing."""
     if situation.basis != "energy":
@@ -139,7 +140,7 @@ def _windows(
 
 def _verifies(situation: Situation, tr: float, td: float) -> bool:
     """Whether ``verify`` would verify a pair, in full and in the six digits that people read."""
-    anew = examine(situation.history, td, situation.settings)
+    anew = examine(situation.history, td, situation.settings, situation.fits)
     printed = float(f"{tr:.6g}"), float(f"{td:.6g}")
     try:
         return all(verify_at(anew.at(late), early).verified for early, late in ((tr, td), printed))
@@ -147,7 +148,7 @@ def _verifies(situation: Situation, tr: float, td: float) -> bool:
         return False
 
 
-def _why_none(situation: Situation, ranked: tuple[Candidate, ...]) -> str:
+def _why_none(situation: Situation, ranked: Candidates) -> str:
     if not ranked:
         level = situation.energy_td
         return f"before td = {situation.td:.6g} the energy neither passes its level {level:.6g} nor turns near it"

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import expectation, mean_in_flight, shortfall
-from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, keeps, rank
+from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, kept, rank
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
 from d2rpick.flight.flight import SOURCES, all_seen
+from d2rpick.vibration.fits import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from d2rpick.choice.candidates import Candidate
+    from numpy.typing import NDArray
+
+    from d2rpick.choice.candidates import Candidate, Candidates
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
@@ -36,7 +40,7 @@ def suggest_in_window(history: History, window: tuple[float, float], settings: S
     """
     for time in window:
         history.energy_at(time)
-    look = cache(partial(examine, history, settings=settings))  # the record is examined once for each td
+    look = cache(partial(examine, history, settings=settings, fits=Fits()))  # the record is examined once for each td
     situation = _flying(look, window)
     window_in_flight = window[0], max(window[0], min(window[1], situation.latest_td))
     if situation.vibration.unknown:
@@ -68,8 +72,17 @@ def advice(history: History, settings: Settings) -> str:
 def _flying(look: Look, window: tuple[float, float]) -> Situation:
     """Situation at the start, middle or end of the window: in the flight that is known best, the first of these."""
     low, high = window
-    situations = [look(td) for td in (low, (low + high) / 2, high)]
-    return min(situations, key=lambda one: (not one.in_flight, SOURCES.index(one.flight.source)))
+    situations = []
+    for td in (low, (low + high) / 2, high):
+        situations.append(look(td))
+        if _certainty(situations[-1]) == (False, 0):
+            break  # none can be known better
+    return min(situations, key=_certainty)
+
+
+def _certainty(situation: Situation) -> tuple[bool, int]:
+    """How well it is known that td lies in a flight, the smallest first."""
+    return not situation.in_flight, SOURCES.index(situation.flight.source)
 
 
 def _best(situation: Situation, times: tuple[float, ...], look: Look) -> Situation | None:
@@ -91,28 +104,31 @@ def _highest(situation: Situation, window: tuple[float, float], look: Look) -> S
     history, mean = situation.history, mean_in_flight(situation)
     if mean is not None:
         peaks = [t for t in situation.peaks(*window) if shortfall(history.energy_at(t), mean) < 1]
-        peaks_before = set(situation.peaks(float(history.time[0]), window[1]))
+        peaks_before = situation.peaks(float(history.time[0]), window[1])
         for td in sorted(peaks, key=lambda t: shortfall(history.energy_at(t), mean)):
             there = situation.at(td)
-            if not any(keeps(there, c) and not c.same_swing for c in find_candidates(there)):
+            if not _shortening(there, find_candidates(there)).any():
                 continue  # an oscillator is not sought again for each peak
-            found = suggest_at(look(td))
-            errors = [
-                (shortfall(c.energy, mean), c)
-                for c in found.candidates
-                if keeps(found.situation, c) and not c.same_swing and c.tr in peaks_before
-            ]
+            ranked = rank(find_candidates(look(td)))
+            on_peaks = np.isin(ranked.tr, peaks_before) & _shortening(look(td), ranked)
+            errors = [(shortfall(ranked.energy[i], mean), i) for i in np.flatnonzero(on_peaks).tolist()]
             limit = min((error for error, _ in errors), default=0.0) + EQUALLY_GOOD
-            good = [c for error, c in errors if error <= limit < float("inf")]
+            good = [i for error, i in errors if error <= limit < float("inf")]
             if good:
-                return _recommending(found, min(good, key=lambda c: c.tr))
+                return _recommending(suggest_at(look(td)), min(good, key=lambda i: ranked.tr[i]))
     return suggest_at(look(window[1]))
 
 
-def _recommending(found: Suggestion, best: Candidate) -> Suggestion:
-    """Give the suggestion with another candidate recommended."""
+def _shortening(situation: Situation, candidates: Candidates) -> NDArray[np.bool_]:
+    """Which candidates are acceptable, keep the limits and save something."""
+    return kept(situation, candidates) & ~candidates.same_swing
+
+
+def _recommending(found: Suggestion, place: int) -> Suggestion:
+    """Give the suggestion with the candidate at another place recommended."""
+    best = found.candidates[place]
     return found._replace(
-        candidates=tuple(replace(c, recommended=c is best) for c in found.candidates),
+        candidates=found.candidates.recommending(place),
         recommended=Pair(best.tr, found.situation.td, best.residual),
         expected=expectation(found.situation, best.energy),
     )

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from d2rpick.histories.history import Samples
+    from numpy.typing import NDArray
+
+    Samples = NDArray[np.float64]
 
 
 class Crossing(NamedTuple):
@@ -66,7 +68,7 @@ def find_crossings(time: Samples, energy: Samples, level: float) -> tuple[Crossi
         after == before + 1, (level - energy[before]) / (energy[before + 1] - energy[before]), 1.0
     )  # with samples on the level in between, the first of them: a share of 1
     at = time[before] + share * (time[before + 1] - time[before])
-    found += [Crossing(float(t), bool(up)) for t, up in zip(at, side[after] > 0, strict=True)]
+    found += map(Crossing, at.tolist(), (side[after] > 0).tolist())
     if off[-1] < side.size - 1:
         found.append(Crossing(float(time[off[-1] + 1]), bool(side[off[-1]] < 0)))
     return tuple(found)
@@ -86,10 +88,13 @@ def find_extrema(time: Samples, energy: Samples) -> tuple[Extremum, ...]:
     >>> find_extrema(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 4.0, 4.0, 2.0]))
     (Extremum(time=1.0, energy=4.0, peak=True),)
     """
+    at, peak = find_turns(energy)
+    return tuple(map(Extremum, time[at].tolist(), energy[at].tolist(), peak.tolist()))
+
+
+def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Places of the extrema among the samples, by the rule of ``find_extrema``, and which of them are peaks."""
     slope = np.sign(np.diff(energy))
     moving = np.flatnonzero(slope)
     turn = np.flatnonzero(slope[moving[:-1]] != slope[moving[1:]])
-    at = moving[turn] + 1
-    return tuple(
-        Extremum(float(time[i]), float(energy[i]), bool(up)) for i, up in zip(at, slope[moving[turn]] > 0, strict=True)
-    )
+    return moving[turn] + 1, slope[moving[turn]] > 0

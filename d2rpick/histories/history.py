@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from d2rpick.errors import HistoryError, RangeError
+from d2rpick.histories.crossings import find_turns
 from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
@@ -47,6 +48,14 @@ class Precision(NamedTuple):
         if value == 0.0:
             return 0.0
         return float(10.0 ** (np.floor(np.log10(abs(value))) - self.digits + 1))
+
+    def quanta(self, values: Samples) -> Samples:
+        """The same around each of ``values``."""
+        if self.decimals is not None:
+            return np.full(values.shape, 10.0**-self.decimals)
+        sizes = np.abs(values)
+        powers = np.floor(np.log10(sizes, out=np.zeros(sizes.shape), where=sizes > 0)) - self.digits + 1
+        return np.where(sizes > 0, 10.0**powers, 0.0)
 
 
 EXACT = Precision()
@@ -213,6 +222,20 @@ class History:
         """Largest output interval [time]: how coarsely the record samples its vibration."""
         return float(np.max(np.diff(self.time)))
 
+    @cached_property
+    def turns(self) -> Samples:
+        """Times of the states at which the energy turns, ascending [time]."""
+        return np.asarray(self.time[self._turns[0]])
+
+    @cached_property
+    def peaks(self) -> Samples:
+        """Those of them at which it peaks [time]."""
+        return np.asarray(self.turns[self._turns[1]])
+
+    @cached_property
+    def _turns(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        return find_turns(self.energy)
+
     def energy_at(self, time: float) -> float:
         """Energy at ``time``, linear between the states; RangeError outside the record."""
         if not self.time[0] <= time <= self.time[-1]:
@@ -225,6 +248,14 @@ class History:
         before = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
         cell = slice(before, before + 2)  # of whole arrays that are read-only, numpy would make copies
         return float(np.interp(time, self.time[cell], self.energy[cell]))
+
+    def energies_at(self, times: Samples) -> Samples:
+        """Energies at many times within the record, linear between the states, of their shape."""
+        before = np.clip(np.searchsorted(self.time, times, side="right") - 1, 0, max(self.time.size - 2, 0))
+        after = np.minimum(before + 1, self.time.size - 1)
+        (t0, e0), (t1, e1) = ((self.time[at], self.energy[at]) for at in (before, after))
+        slope = np.divide(e1 - e0, t1 - t0, out=np.zeros(np.shape(times)), where=t1 > t0)
+        return np.where(times >= t1, e1, slope * (times - t0) + e0)
 
     def mean_energy(self, start: float, end: float) -> float | None:
         """Mean energy of the states in a window; None where there is none [energy]."""

@@ -12,6 +12,8 @@ from d2rpick.library.frames import frame_of
 from d2rpick.library.repeat import command_line
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
     from matplotlib.figure import Figure
 
@@ -87,7 +89,7 @@ class Suggestion(Answer):
     are None, with the reason in ``warnings``.
     """
 
-    candidates: tuple[Candidate, ...] = field(repr=False)
+    candidates: Sequence[Candidate] = field(repr=False)
     recommended: Pair | None
     better_pair: Pair | None
     _core: choice.Suggestion = field(repr=False)

@@ -14,6 +14,7 @@ import numpy as np
 
 from d2rpick.histories.samples import integral
 from d2rpick.vibration.one_mode import energy_and_jacobian
+from d2rpick.vibration.structure import surely_structured
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,6 +37,8 @@ _CELLS_PER_PERIOD: Final = 24  # of the strongest vibration in E, which a preloa
 
 # Of the least squares:
 COARSE: Final = 400  # samples on which starts are compared and first refined
+_MEDIUM: Final = 2048  # samples on which a fit is refused before it is refined on more
+_NEAR: Final = 1e-6  # of the sum of squares still to be gained where a fit is refused: nothing beside the structure
 STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
 CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
 _MAX_STEPS: Final = 40  # a good start needs 4 to 8
@@ -45,7 +48,8 @@ _BLOCK: Final = 8192  # samples whose derivatives are held at a time, so that th
 def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float = np.inf) -> Samples | None:
     """Return the least-squares parameters with the first ``size`` of them free, the others zero.
 
-    None where on a few of the samples the fit leaves more than ``worst`` of the variance.
+    None where on a few of the samples the fit leaves more than ``worst`` of the variance or, where that is finite, on
+    some more of them a structure that is too large.
     """
 
     def model(parameters: Samples, times: Samples) -> tuple[Samples, Samples]:
@@ -54,7 +58,7 @@ def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst:
     stride = -(-s.size // COARSE)
     coarse_s, coarse_e = s[::stride], e[::stride]
     best = refine(_starts(poles, coarse_s, coarse_e, size), model, coarse_s, coarse_e, worst)
-    if best is None:
+    if best is None or (np.isfinite(worst) and fails(best, model, s, e)):
         return None
     if stride > 1:
         best = minimise(best, model, s, e)[0]
@@ -76,6 +80,19 @@ def refine(starts: Sequence[Samples], model: Model, s: Samples, e: Samples, wors
         if least < CERTAIN * variance:
             break
     return best
+
+
+def fails(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
+    """Whether the best fit near ``parameters`` to some two thousand samples leaves a structure that refuses it.
+
+    Never where there are no more samples than that: then the fit to all of them costs no more.
+    """
+    stride = -(-s.size // _MEDIUM)
+    if stride == 1:
+        return False
+    some_s, some_e = s[::stride], e[::stride]
+    ended = minimise(parameters, model, some_s, some_e, near=_NEAR)[0]
+    return surely_structured(some_e - model(ended, some_s)[0], float(np.std(some_e)))
 
 
 def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
@@ -145,11 +162,12 @@ def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) ->
 
 @np.errstate(over="ignore", invalid="ignore")  # a trial step too far; it is rejected
 def minimise(
-    parameters: Samples, model: Model, s: Samples, e: Samples, hopeless: float = np.inf
+    parameters: Samples, model: Model, s: Samples, e: Samples, hopeless: float = np.inf, near: float = 1e-12
 ) -> tuple[Samples, float]:
     """Refine parameters by Levenberg-Marquardt; return them and the sum of squares.
 
-    Parameters that the model gives no derivatives by stay.  It ends early where steps like the last would not bring
+    Parameters that the model gives no derivatives by stay.  It ends where a step gains no more than ``near`` of the
+    sum of squares, and early where steps like the last would not bring
     the sum of squares down to ``hopeless``.
     """
     damping = 1e-4  # of the unit diagonal: starts are close, so steps may be long
@@ -170,7 +188,7 @@ def minimise(
                 break
         else:
             damping *= 10
-        if expected <= 1e-12 * cost + 1e-31 * e.size:
+        if expected <= near * cost + 1e-31 * e.size:
             break
     return parameters, cost
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.vibration.fit_one import COARSE, STARTS, minimise, rates, refine
+from d2rpick.vibration.fit_one import COARSE, STARTS, fails, minimise, rates, refine
 from d2rpick.vibration.modes import sum_and_jacobian
 
 if TYPE_CHECKING:
@@ -28,13 +28,14 @@ def fit_several(s: Samples, e: Samples, count: int, worst: float = np.inf) -> Sa
 
     Each mode makes exp(-alpha s) times a constant and a vibration at twice its rate, so the constants add up and
     3 count exponentials leave room for what is none.  For known rates E is linear in the rest, which ranks the
-    rates and gives the parameters.  None also where on a few of the samples the fit leaves more than ``worst`` of
-    the variance.
+    rates and gives the parameters.  None also where a few of the samples refuse the fit, as for one mode.
     """
     stride = -(-s.size // COARSE)
     coarse_s, coarse_e = s[::stride], e[::stride]
     best = refine(_starts(s, e, coarse_s, coarse_e, count), sum_and_jacobian, coarse_s, coarse_e, worst)
-    return best if best is None or stride == 1 else minimise(best, sum_and_jacobian, s, e)[0]
+    if best is None or (np.isfinite(worst) and fails(best, sum_and_jacobian, s, e)):
+        return None
+    return best if stride == 1 else minimise(best, sum_and_jacobian, s, e)[0]
 
 
 def _starts(s: Samples, e: Samples, coarse_s: Samples, coarse_e: Samples, count: int) -> list[Samples]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from d2rpick.vibration.fit_one import COARSE, VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, minimise, rates
 from d2rpick.vibration.one_mode import Mode, energy_and_jacobian
+from d2rpick.vibration.structure import MAX_STRUCTURE, structure_of
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 # part of the misfit that neighbouring samples share.
 MAX_MISFIT: Final = 0.4  # beyond, more than 16 % of the variance is unexplained and can hide another mode
 HOPELESS: Final = 0.5**2  # of the variance, unexplained on 400 samples: six standard deviations beyond that misfit
-MAX_STRUCTURE: Final = 0.02  # of std(E): thirty times what one real solver leaves with one mode
 MAX_LOCAL_STRUCTURE: Final = 0.1  # of the fit's energy at that time: a second mode that outlives the first
 MIN_SAMPLES: Final = 24  # four for each parameter of the richest model
 MIN_SAMPLES_PER_PERIOD: Final = 10  # of the energy, pi / omega: below, an aliased fast mode passes for a slow one
@@ -288,10 +288,10 @@ def _judged(
     """Return a fit with its verdict, and whether it follows the samples; ``density`` is the least per period."""
     s, e = record.s, record.e
     rest = e - attempt.energy
-    rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), _structure(rest)
+    rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), structure_of(rest)
     vibration = attempt.scaled.vibration_energy(s)
     # where noise exceeds the vibration, a rest says nothing about a further mode
-    local_structure = _structure(rest / np.maximum(vibration, max(rms, _FLOOR * np.max(vibration))))
+    local_structure = structure_of(rest / np.maximum(vibration, max(rms, _FLOOR * np.max(vibration))))
     loose = _loose(attempt.name, rms / spread, structure / spread, local_structure)
     found_density = samples_per_period(s, attempt.scaled)
     reason = loose or _implausible(attempt.scaled, found_density, density, least_periods, record.end - record.start)
@@ -362,18 +362,6 @@ def _implausible(
             f"aliasing may fake this mode: ask for an output interval of {finer:.2g} or less"
         )
     return None
-
-
-def _structure(rest: Samples) -> float:
-    """Root of the covariance of neighbours in ``rest`` beyond three standard deviations of white noise's.
-
-    The larger of lags 1 and 2: a vibration sampled four times per period shows at the second only.
-    """
-    excess = 0.0
-    for lag in (1, 2):
-        products = rest[:-lag] * rest[lag:]
-        excess = max(excess, abs(float(np.sum(products))) - 3 * float(np.linalg.norm(products)))
-    return float(np.sqrt(excess / rest.size))
 
 
 def _covariance(jacobian: Samples, rest: Samples) -> Samples:

@@ -53,6 +53,14 @@ def level_error(energy_tr: float, energy_td: float) -> float | None:
     return abs(sqrt(energy_tr / energy_td) - 1)
 
 
+def level_errors(energies: Samples, level: float) -> Samples:
+    """The same of many energies at one ``level`` at td, of the shape of ``energies``; NaN where it is None."""
+    comparable = (energies >= 0) & (level > 0)
+    with np.errstate(over="ignore"):  # a level next to nothing: any other energy is infinitely far off
+        square = np.divide(energies, level, out=np.full(energies.shape, np.nan), where=comparable)
+    return np.asarray(np.abs(np.sqrt(square) - 1))
+
+
 def kinetic_share(vibration: Deformation, td: float) -> float:
     """K = T(td)/V(td) [-]: the share of the vibration energy that is kinetic at td, which no tr can save.
 

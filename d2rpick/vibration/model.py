@@ -71,6 +71,9 @@ class Vibration(Protocol):
     def energy(self, time: float) -> float:
         """E at a time: of the model where it describes the record, of the samples elsewhere [energy]."""
 
+    def energies(self, times: Samples) -> Samples:
+        """E at many times, of their shape [energy]."""
+
     def described(self, time: float) -> bool:
         """Whether the energy at a time is the model's own."""
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.histories.crossings import find_crossings, find_extrema
+from d2rpick.histories.crossings import find_crossings, find_turns
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import SUNK, Moment
 from d2rpick.vibration.uncertainty import sampled_reach
@@ -46,22 +46,27 @@ class OfEnergy:
         """E of the samples, linear between them [energy]."""
         return self.history.energy_at(time)
 
+    def energies(self, times: Samples) -> Samples:
+        """E at many times, of their shape [energy]."""
+        return self.history.energies_at(times)
+
     def described(self, time: float) -> bool:  # noqa: ARG002  by the protocol
         """Never: there is no model but the samples."""
         return False
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
         """Samples in (start, end] at which the energy peaks [time]."""
-        turns = find_extrema(self.history.time, self.history.energy)
-        return tuple(turn.time for turn in turns if turn.peak and start < turn.time <= end)
+        peaks = self.history.peaks
+        return tuple(peaks[(start < peaks) & (peaks <= end)].tolist())
 
     def moments(self, tolerance: float) -> list[Moment]:
         """Crossings of the level at td, and samples where the energy turns near it."""
         time, energy = sampled_before(self.history, self.td, level := self.energy(self.td))
-        errors = ((turn.time, measures.level_error(turn.energy, level)) for turn in find_extrema(time, energy))
+        turns = find_turns(energy)[0]
+        near = time[turns[measures.level_errors(energy[turns], level) <= tolerance]]
         return [
             *(Moment(c.time, "crossing", c.rising) for c in find_crossings(time, energy, level) if c.time < self.td),
-            *(Moment(t, "extremum", None) for t, error in errors if error is not None and error <= tolerance),
+            *(Moment(t, "extremum", None) for t in near.tolist()),
         ]
 
     def measured(self, times: Samples) -> list[None]:
@@ -70,12 +75,8 @@ class OfEnergy:
 
     def errors(self, times: Samples) -> Samples:
         """Level errors, of the shape of ``times``; infinite where an energy is not positive [-]."""
-        energy, level = np.interp(times, self.history.time, self.history.energy), self.energy(self.td)
-        if not level > 0:
-            return np.full(times.shape, np.inf)
-        with np.errstate(over="ignore"):  # a level next to nothing: any other energy is infinitely far off
-            errors = np.abs(np.sqrt(np.maximum(energy, 0.0) / level) - 1)
-        return np.where(energy >= 0, errors, np.inf)
+        errors = measures.level_errors(self.energies(times), self.energy(self.td))
+        return np.where(np.isnan(errors), np.inf, errors)
 
     def knots(self) -> Samples:
         """None but the samples, between which the energy is linear."""

@@ -76,6 +76,11 @@ class OfModes:
         """E of the mode where it describes the record, of the samples elsewhere [energy]."""
         return float(self.mode.energy(time)) if self.described(time) else self.history.energy_at(time)
 
+    def energies(self, times: Samples) -> Samples:
+        """E at many times, of their shape [energy]."""
+        described = (times >= self.span.start) & (times <= self.span.end)
+        return np.where(described, self.mode.energy(times), self.history.energies_at(times))
+
     def described(self, time: float) -> bool:
         """Whether ``time`` lies in the window that the mode describes."""
         return self.span.start <= time <= self.span.end

@@ -74,6 +74,10 @@ class OfParts:
         """E of the whole [energy]."""
         return self.whole.energy(time)
 
+    def energies(self, times: Samples) -> Samples:
+        """E of the whole at many times, of their shape [energy]."""
+        return self.whole.energies(times)
+
     def described(self, time: float) -> bool:
         """Whether the model of the whole describes its energy there."""
         return self.whole.described(time)

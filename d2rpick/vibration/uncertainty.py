@@ -109,7 +109,7 @@ def _rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
 
 
 def _half_quanta(precision: Precision, values: Samples) -> Samples:
-    return np.array([precision.quantum(float(value)) / 2 for value in values])
+    return precision.quanta(values) / 2
 
 
 def _time_quanta(history: History, times: Samples, td: float) -> Samples:

@@ -138,7 +138,7 @@ def hdf5_to_h5py() -> float:
     if not file.exists():
         time, energy = _rows(_ROWS, 2).T
         file.write_bytes(hdf5_file.write({"time": time, "internal_energy": energy}))
-    ours = "import sys; from d2rpick.histories.opening import read_history; read_history(sys.argv[1:])"
+    ours = "import sys; from d2rpick.choice.of_run import read; read(sys.argv[1:])"
     alone = "import sys, h5py; file = h5py.File(sys.argv[1]); file['time'][()], file['internal_energy'][()]"
     return _ratio(lambda: _process("-c", ours, str(file)), lambda: _process("-c", alone, str(file)))
 

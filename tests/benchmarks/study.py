@@ -36,15 +36,20 @@ assert all(found)
 """
 
 
-def write_runs(folder: Path, number: int, states: int) -> list[str]:
-    """Write records of the paper's oscillator whose rate scatters by a thousandth; names of the files."""
+def write_runs(folder: Path, number: int, states: int, noise: float = 0.0) -> list[str]:
+    """Write records of the paper's oscillator whose rate scatters by a thousandth; names of the files.
+
+    ``noise`` is the standard deviation of white noise, of the highest energy [-].
+    """
     rng = np.random.default_rng(7)
     time = np.linspace(0.0, 0.15, states)
     names = []
     for i in range(number):
         mode = type(MODE)(OMEGA_2 * (1 + 1e-3 * rng.standard_normal()), MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
         names.append(str(folder / f"run{i:04}.csv"))
-        table = np.stack([time, mode.energy(time)], axis=1)
+        energy = mode.energy(time)
+        energy += noise * energy.max() * rng.standard_normal(states)
+        table = np.stack([time, energy], axis=1)
         np.savetxt(names[-1], table, delimiter=",", header="time,internal_energy", comments="", fmt="%.7g")
     return names
 

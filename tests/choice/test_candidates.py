@@ -87,7 +87,7 @@ def test_margin_and_after_move_the_earliest_tr() -> None:
 @pytest.mark.parametrize("energy", [np.zeros(50), np.full(50, 3.0), -np.ones(50)])
 def test_energies_that_do_not_vibrate_give_no_candidate(energy: np.ndarray) -> None:
     answer = suggest(of(energy, np.arange(50.0)), 40.0, PLAIN)
-    assert answer.candidates == ()
+    assert not answer.candidates
     assert answer.recommended is None
     assert "no-candidate" in codes(answer)
 

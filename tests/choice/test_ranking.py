@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.candidates import Candidate
-from d2rpick.choice.ranking import EQUALLY_GOOD, rank
+from d2rpick.choice.candidates import find_candidates
+from d2rpick.choice.examine import examine
+from d2rpick.choice.ranking import EQUALLY_GOOD, keeps, kept, order, rank
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
 from tests import paper
 from tests.energies import codes, rollover
 
-PLAIN = Settings()
+if TYPE_CHECKING:
+    from d2rpick.histories.history import History
 
-candidates = st.builds(
-    lambda tr, error, acceptable: Candidate(
-        0, tr, "crossing", 1.0, 1.0, 0.0, True, True, error, error, None, 1 - tr, 1 - tr, None, None, None, acceptable,
-        False, (),
+rows = st.lists(
+    st.tuples(
+        st.floats(0, 0.9), st.one_of(st.floats(0, 0.1), st.floats(0, 2), st.just(np.inf)), st.sampled_from([0, 1, 2])
     ),
-    st.floats(0, 0.9),
-    st.one_of(st.floats(0, 0.1), st.floats(0, 2)),
-    st.booleans(),
-)  # fmt: skip
+    max_size=12,
+)
 
 
 @pytest.mark.parametrize("limit", [{"max_kinetic_share": 0.9}, {"max_residual": 0.95}])
@@ -45,14 +47,31 @@ def test_limits_that_cannot_be_judged_are_not_kept() -> None:
     assert "residual unknown" in " ".join(judged.reasons)
 
 
-@given(st.lists(candidates, max_size=12))
-def test_the_order_of_candidates(some: list[Candidate]) -> None:
-    ranked = rank(some)
-    assert [c.rank for c in ranked] == list(range(1, len(some) + 1))
-    assert sorted(c.tr for c in ranked) == sorted(c.tr for c in some)
-    assert [c.acceptable for c in ranked] == sorted((c.acceptable for c in some), reverse=True)
-    good = [c for c in ranked if c.acceptable]
-    if good:
-        near = min(c.error for c in good) + EQUALLY_GOOD
-        assert good[0].error <= near
-        assert good[0].tr == min(c.tr for c in good if c.error <= near)
+@given(rows)
+def test_the_order_of_candidates(some: list[tuple[float, float, int]]) -> None:
+    tr, error = np.array([row[0] for row in some]), np.array([row[1] for row in some])
+    group = np.array([row[2] for row in some], dtype=np.intp)
+    places = order(group, error, tr).tolist()
+    assert sorted(places) == list(range(len(some)))
+    assert [some[i][2] for i in places] == sorted(group.tolist())
+    for number in set(group.tolist()):
+        ranked = [some[i] for i in places if some[i][2] == number]
+        near = min(error for _, error, _ in ranked) + EQUALLY_GOOD
+        good = [row for row in ranked if row[1] <= near]
+        assert ranked == sorted(good, key=lambda row: row[0]) + sorted(
+            (row for row in ranked if row[1] > near), key=lambda row: (row[1], row[0])
+        )
+
+
+@pytest.mark.parametrize("limits", [{}, {"max_kinetic_share": 0.9}, {"max_residual": 0.95}, {"tolerance": 1e-3}])
+@pytest.mark.parametrize(("history", "td"), [(paper.history(), paper.TD), (rollover(), 0.37)])
+def test_candidates_are_kept_together_as_one_by_one(history: History, td: float, limits: dict[str, float]) -> None:
+    situation = examine(history, td, Settings(**limits))  # type: ignore[arg-type]
+    ranked = rank(find_candidates(situation))
+    assert len(ranked) > 3
+    assert kept(situation, ranked).tolist() == [keeps(situation, one) for one in ranked]
+    assert [one.rank for one in ranked] == list(range(1, len(ranked) + 1))
+    assert [one.error for one in ranked] == ranked.error.tolist()
+    assert [one.acceptable for one in ranked] == ranked.acceptable.tolist()
+    assert ranked[1:3] == (ranked[1], ranked[2])
+    assert ranked[-1].tr == ranked.tr[-1]

@@ -1,0 +1,79 @@
+"""Why a tr is not acceptable: each reason for all candidates of a td at once, its sentence only where one is shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from d2rpick.choice.warnings import end_of_flight, end_of_load
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from d2rpick.choice.situation import Situation
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.moments import Measured
+
+
+class Objection(NamedTuple):
+    """A reason and the candidates that it ``holds`` for, of shape (n,); ``error`` (n,) where the sentence names it."""
+
+    holds: NDArray[np.bool_]
+    reason: str
+    error: Samples | None = None
+
+    def sentence(self, place: int) -> str:
+        """Say it of the candidate at a place."""
+        return self.reason if self.error is None else f"error {self.error[place]:.3g} {self.reason}"
+
+    def ordered(self, order: NDArray[np.intp]) -> Objection:
+        """Give the same for candidates in another order."""
+        return Objection(self.holds[order], self.reason, None if self.error is None else self.error[order])
+
+
+def objections(
+    situation: Situation, tr: Samples, known: Sequence[Measured | None], level_error: Samples
+) -> Iterator[Objection]:
+    """Give every reason against some of the candidates.
+
+    Parameters
+    ----------
+    situation : Situation
+    tr : array of shape (n,)
+        [time]
+    known : sequence of length n
+        What was measured of each, None where it cannot be compared with td.
+    level_error : array of shape (n,)
+        NaN where an energy is not positive [-].
+    """
+    everywhere = np.ones(tr.size, dtype=bool)
+    earliest, vibration = situation.earliest_tr, situation.vibration
+    if earliest is None:
+        yield Objection(everywhere, "unknown: nothing shows when the load is over")
+    else:
+        yield Objection(tr < earliest, f"before {end_of_load(situation)}")
+    yield from (Objection(everywhere, reason) for reason in _against_td(situation))
+    compared = np.array([one is not None for one in known], dtype=bool)
+    described = compared | bool(vibration.unknown)
+    same_sign = ~np.array([one is not None and not one.sign_match for one in known], dtype=bool)
+    yield Objection(~described, vibration.undescribed)
+    yield Objection(~same_sign, "opposite sign of the deformation")
+    if situation.at_rest:
+        return
+    lock_in = np.array([np.nan if one is None else one.lock_in_error for one in known])
+    error, judged = np.where(compared, lock_in, level_error), described & same_sign
+    yield Objection(judged & np.isnan(error), "no positive energy to compare")
+    tolerance = situation.settings.tolerance
+    yield Objection(judged & (error > tolerance), f"above the tolerance {tolerance:g}", error)
+
+
+def _against_td(situation: Situation) -> Iterator[str]:
+    """Why no tr at all is acceptable at this td."""
+    if situation.td > situation.latest_td:
+        yield f"td after {end_of_flight(situation)}"
+    if situation.settings.strict and not situation.flight.certain:
+        yield "the flight was read off the energy alone, which is not certain"
+    yield from situation.vibration.doubts

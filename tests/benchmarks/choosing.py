@@ -1,0 +1,200 @@
+"""How long choosing takes on the records that engineers have: a structure that rings in many modes, with noise.
+
+All records are made up, seeded and lie in a temporary folder.  What is compared takes turns; processor seconds of
+whole processes count, since other work on the machine stretches the wall clock.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.histories.formats import csv_table
+from tests.benchmarks.study import LOOP, write_runs
+from tests.records import MODE
+from tests.text_files import matsum_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from d2rpick.histories.history import Samples
+
+ROOT = Path(__file__).resolve().parents[2]
+_ROUNDS = 3
+_PARTS, _PART_STATES = 500, 2000
+_RUNS, _RUN_STATES, _RUN_TD = 100, 10_000, 0.0687534
+# Cycles in the record, shares of the energy and phases of the five modes.
+_MODES = ((15.5, 1.0, 0.0), (28.5, 0.7, 1.0), (46.5, 0.5, 2.0), (69.5, 0.4, 3.0), (106.0, 0.3, 4.0))
+# Of the largest energy: with 1e5 states some 15,000 candidates.
+_NOISE = 0.003
+# Of a record of unit length: where td is asked for, and windows for it.
+_TD, _AFTER, _WINDOWS = 0.9, 0.1, {"narrow": (0.85, 0.9), "wide": (0.3, 0.9)}
+_folder = TemporaryDirectory()
+
+PANDAS = "import sys, pandas; pandas.read_csv(sys.argv[1])"
+FIGURE = (
+    "import io, matplotlib; from matplotlib.figure import Figure; figure = Figure(); "
+    "figure.subplots().plot(range(1500)); figure.savefig(io.BytesIO(), format='svg')"
+)
+MATSUM = (
+    "import sys; from d2rpick.histories.opening import open_run; run = open_run([sys.argv[1]]); "
+    "run.part_energies(run.parts)"
+)
+
+
+def noisy_to_pandas() -> float:
+    """`suggest --td` of 1e5 noisy states over pandas, which reads that csv and does nothing else."""
+    file = str(_noisy(100_000))
+    found = json.loads(_output("-m", "d2rpick", "suggest", "--td", str(_TD), "-f", "json", file))
+    assert 10_000 < len(found["candidates"]) < 20_000, len(found["candidates"])
+    return _ratio(_suggest(file), ("-c", PANDAS, file))
+
+
+def noisy_growth() -> float:
+    """`suggest --td` of 1e6 noisy states over the same of 1e5."""
+    return _ratio(_suggest(str(_noisy(1_000_000))), _suggest(str(_noisy(100_000))), rounds=1)
+
+
+def window_to_td(kind: str, width: str, *options: str) -> float:
+    """`--td-window` over `--td` in the same record of 1e5 states, ``kind`` "noisy" or "clean"."""
+    file = str(_noisy(100_000) if kind == "noisy" else _clean(100_000))
+    return _ratio(_suggest(file, *options, window=_WINDOWS[width]), _suggest(file, *options))
+
+
+def clean_growth(command: str) -> float:
+    """A command on a clean oscillator of 1e6 states over the same of 1e5."""
+
+    def build(file: str) -> tuple[str, ...]:
+        if command == "verify":
+            return "-m", "d2rpick", "verify", "--tr", "0.4", "--td", str(_TD), "--exit-zero", file
+        return _suggest(file, window=_WINDOWS["wide"] if command == "--td-window" else None)
+
+    return _ratio(build(str(_clean(1_000_000))), build(str(_clean(100_000))))
+
+
+def parts_to_matsum() -> float:
+    """`suggest --part` of 500 parts and 2000 states over reading that matsum: processes."""
+    file = str(_matsum())
+    choosing = ("-m", "d2rpick", "suggest", "--td", "0.16", "--part", "2001-2500", "--exit-zero", file)
+    return _ratio(choosing, ("-c", MATSUM, file))
+
+
+def study_to_loop() -> float:
+    """`study` of runs of 1e4 states, one process, over `suggest` of the library on each: per run, start-up in both."""
+    names = _runs()
+    return _ratio(("-m", "d2rpick", *_study(names, "1")), ("-c", LOOP, *names))
+
+
+def study_speed_up() -> float | None:
+    """Wall time of a `study` in one process over that in two; None on one core."""
+    return _speed_up(lambda jobs: _study(_runs(), jobs))
+
+
+def scan_speed_up() -> float | None:
+    """Wall time of `rollover --scan` in one process over that in two; None on one core."""
+    return _speed_up(lambda jobs: ("rollover", "--scan", "--mesh", "6", "--jobs", jobs, "-q", "--exit-zero"))
+
+
+def report_to_matplotlib() -> float:
+    """`suggest --report` of a sample over importing matplotlib and drawing one Figure to svg."""
+    page = str(Path(_folder.name) / "report.html")
+    ours = ("-m", "d2rpick", "suggest", "--td", "0.064", "--report", page, "--overwrite", "sample_data/energy.csv")
+    return _ratio(ours, ("-c", FIGURE), rounds=9)
+
+
+def _suggest(file: str, *options: str, window: tuple[float, float] | None = None) -> tuple[str, ...]:
+    when = ("--td", str(_TD)) if window is None else ("--td-window", *map(str, window))
+    return "-m", "d2rpick", "suggest", *when, "--after", str(_AFTER), "--exit-zero", *options, file
+
+
+def _study(names: Sequence[str], jobs: str) -> tuple[str, ...]:
+    return "study", "-q", "--exit-zero", "--td", str(_RUN_TD), "--jobs", jobs, "-f", "json", *names
+
+
+def _noisy(states: int) -> Path:
+    """Energy of five modes of one damping, with white noise."""
+    time = np.linspace(0.0, 1.0, states)
+    energy = sum(share * np.sin(2 * np.pi * cycles * time + phase) ** 2 for cycles, share, phase in _MODES)
+    energy = energy * np.exp(-0.8 * time)
+    noise = np.random.default_rng(14).standard_normal(states)
+    return _written(f"noisy{states}.csv", time, energy + _NOISE * energy.max() * noise)
+
+
+def _clean(states: int) -> Path:
+    """Energy of the oscillator of the paper."""
+    time = np.linspace(0.0, 1.0, states)
+    return _written(f"clean{states}.csv", time, MODE.energy(0.15 * time))
+
+
+def _written(name: str, time: Samples, energy: Samples) -> Path:
+    file = Path(_folder.name) / name
+    if not file.exists():
+        file.write_bytes(csv_table.write({"time": time, "internal_energy": np.round(energy, 9)}))
+    return file
+
+
+def _matsum() -> Path:
+    """Parts that vibrate in the modes of a chain, noise beside."""
+    file = Path(_folder.name) / "matsum"
+    if not file.exists():
+        rng = np.random.default_rng(14)
+        time = np.linspace(0.0, 0.2, _PART_STATES)
+        cycles = rng.choice([4.0, 7.0, 11.0], size=_PARTS)
+        phases, sizes = rng.uniform(0, np.pi, _PARTS), rng.uniform(1, 100, _PARTS)
+        swing = np.sin(2 * np.pi * 5 * cycles * time[:, np.newaxis] + phases) ** 2
+        energies = sizes * np.exp(-5 * time)[:, np.newaxis] * swing
+        energies += 1e-3 * sizes * np.abs(rng.standard_normal(energies.shape))
+        file.write_bytes(matsum_text(time, range(2001, 2001 + _PARTS), energies))
+    return file
+
+
+@cache
+def _runs() -> list[str]:
+    folder = Path(_folder.name) / "runs"
+    folder.mkdir()
+    return write_runs(folder, _RUNS, _RUN_STATES, noise=1e-3)
+
+
+def _ratio(one: Sequence[str], other: Sequence[str], rounds: int = _ROUNDS) -> float:
+    """Processor time of the first process over that of the second, in turns."""
+    times: tuple[list[float], list[float]] = ([], [])
+    for _ in range(rounds):
+        for command, found in zip((one, other), times, strict=True):
+            found.append(_processor_seconds(command))
+    return median(times[0]) / median(times[1])
+
+
+def _processor_seconds(command: Sequence[str]) -> float:
+    before = getrusage(RUSAGE_CHILDREN)
+    _output(*command)
+    after = getrusage(RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def _speed_up(command: Callable[[str], Sequence[str]]) -> float | None:
+    """Wall time of the quickest of some runs with one process over that with two; None on one core."""
+    if len(os.sched_getaffinity(0)) < 2:
+        return None
+    times: dict[str, list[float]] = {"1": [], "2": []}
+    for _ in range(_ROUNDS):
+        for jobs, found in times.items():
+            start = perf_counter()
+            _output("-m", "d2rpick", *command(jobs))
+            found.append(perf_counter() - start)
+    return min(times["1"]) / min(times["2"])
+
+
+def _output(*command: str) -> bytes:
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("D2RPICK_")}
+    return subprocess.run([sys.executable, *command], check=True, capture_output=True, cwd=ROOT, env=clean).stdout
