@@ -25,8 +25,9 @@ class Choosing(TypedDict, total=False):
     the next contact (0).  ``tolerance``: on the lock-in error, on the level error where no oscillator is known (0.2).
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: given instead of
     identified, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the oscillator
-    is identified there only.  ``replay`` False: judge by the energy level alone.  ``cost_share``, ``step_ratio``: of
-    the switched parts in the cost of a step, and of the step while rigid to that while deformable.
+    is identified there only.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr where the
+    energy alone shows when the load is over.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a
+    step, and of the step while rigid to that while deformable.
     """
 
     after: float | None
@@ -38,6 +39,7 @@ class Choosing(TypedDict, total=False):
     v0: float | None
     fit_window: tuple[float, float] | None
     replay: bool
+    strict: bool
     cost_share: float | None
     step_ratio: float
 
@@ -46,7 +48,7 @@ class Choosing(TypedDict, total=False):
 _LIMITS = {
     "after": (-math.inf, math.inf),
     "margin": (0.0, math.inf),
-    "tolerance": (0.0, math.inf),
+    "tolerance": (0.0, 1.0),
     "max_kinetic_share": (0.0, math.inf),
     "max_residual": (0.0, math.inf),
     "v0": (-math.inf, math.inf),
