@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import click
 
-from d2rpick import __version__
 from d2rpick.cli.wording import with_options
 from d2rpick.errors import D2RPickError, printable
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -51,9 +51,11 @@ QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "contact_energy": frozenset(
         {"contactenergy", "slidinginterfaceenergy", "slidingenergy", "slidinginterface", "sliding", "contacte"}
     ),
+    "frictional_contact_energy": frozenset({"frictionalcontactenergy"}),
     "hourglass_energy": frozenset({"hourglassenergy", "hourglasse", "hourglass", "hgeng", "allae"}),
     "damping_energy": frozenset({"dampingenergy", "systemdampingenergy", "systemdamping"}),
     "eroded_internal_energy": frozenset({"erodedinternalenergy", "erodedinternal"}),
+    "energy_ratio": frozenset({"totalenergyinitialenergy", "energyratio"}),
     "x_momentum": frozenset({"xmomentum", "momentumx", "xmom", "px"}),
     "y_momentum": frozenset({"ymomentum", "momentumy", "ymom", "py"}),
     "z_momentum": frozenset({"zmomentum", "momentumz", "zmom", "pz"}),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from d2rpick import __version__
 from d2rpick.models.published import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, better_pair, residual
 from d2rpick.report import tables
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

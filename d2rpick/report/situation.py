@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from d2rpick import __version__
 from d2rpick.errors import printable
 from d2rpick.report import keys
 from d2rpick.report.tables import measure
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from d2rpick import __version__
 from d2rpick.errors import printable
 from d2rpick.report import tables
 from d2rpick.studies.resume_file import PLAIN, plain
 from d2rpick.studies.study import runs_of
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick import __version__
 from d2rpick.choice.acceptable_windows import acceptable_windows, common_windows, coverage
 from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.warnings import Caution
@@ -19,6 +18,7 @@ from d2rpick.errors import D2RPickError, RangeError
 from d2rpick.histories.names import listing
 from d2rpick.histories.selection import Selection
 from d2rpick.histories.source import expand
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.histories.writing import TABLE_WRITERS, format_of
-from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, run
 from tests.reading import read_history
 from tests.shared import shared
 
@@ -124,6 +124,16 @@ def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
         assert found["flight"][name] == pytest.approx(expected["flight"][name], abs=5.1e-4)  # one state
     assert found["flight"]["source"] == expected["flight"]["source"]
     assert found["recommended"]["tr"] == pytest.approx(expected["recommended"]["tr"], rel=1e-5)
+
+
+@pytest.mark.parametrize("name", ["rollover_box.binout", "rollover_box.glstat"])
+def test_what_is_extracted_is_as_healthy_as_its_file(name: str, tmp_path: Path) -> None:
+    """Friction that is told apart stays apart, and the energy ratio is the one that the solver wrote."""
+    source, file = str(ROOT / "sample_data" / name), str(tmp_path / "extracted.csv")
+    assert run("extract", *(("--part", "box") if "binout" in name else ()), source, "-o", file).exit_code == 0
+    found, expected = answer("info", file)["health"], answer("info", source)["health"]
+    for key in ("energy_ratio_min", "energy_ratio_max", "sliding_share"):
+        assert found[key] == pytest.approx(expected[key], rel=1e-5, abs=1e-12)
 
 
 def test_the_box_has_one_flight_in_every_format_that_tells_its_momentum(box: dict[str, str]) -> None:

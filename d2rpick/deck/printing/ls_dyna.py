@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
-from d2rpick import __version__
 from d2rpick.deck.printing.common import (
     LONGEST,
     PHYSICS,
@@ -16,6 +15,7 @@ from d2rpick.deck.printing.common import (
     shortest,
 )
 from d2rpick.errors import DeckError
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
