@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # A residual that may be so much higher is worth a note.
 _MUCH_HIGHER = 0.1
-_SAME_SWING = ("on the same swing as td: hardly anything is saved",)
+_SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def _objections(situation: Situation, tr: float, known: Measured | None, level_e
     if situation.td > situation.latest_td:
         yield f"td after {end_of_flight(situation)}"
     if situation.settings.strict and not situation.flight.certain:
-        yield "the flight was read off the energy alone, which is not certain"
+        yield "the flight was found from the energy alone, which is not certain"
     yield from situation.vibration.doubts
     if not situation.vibration.unknown and known is None:
         yield situation.vibration.undescribed
@@ -151,7 +151,7 @@ def _objections(situation: Situation, tr: float, known: Measured | None, level_e
     elif situation.at_rest:
         return
     elif error is None:
-        yield "no positive energy to compare"
+        yield "the energy is not positive here, so there is nothing to compare"
     elif error > situation.settings.tolerance:
         yield f"error {error:.3g} above the tolerance {situation.settings.tolerance:g}"
 
@@ -166,7 +166,7 @@ def _remarks(situation: Situation, reach: float, known: Measured | None, parts: 
     if known and known.residual_high > known.residual + _MUCH_HIGHER:
         yield f"residual up to {known.residual_high:.2g} if what the oscillator leaves over is a further mode"
     if known and reach > known.timing_tolerance:
-        yield f"tr is known to ±{reach:.2g} only, its timing tolerance is {known.timing_tolerance:.2g}"
+        yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known.timing_tolerance:.2g}"
     if known is None and reach >= situation.history.step:
         yield "the level lies within the sampling error of an extremum"
 

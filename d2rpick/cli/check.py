@@ -10,6 +10,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
+from d2rpick.cli.wording import in_words
 from d2rpick.errors import ConfigurationError, DeckError
 
 if TYPE_CHECKING:
@@ -34,15 +35,15 @@ Examples:
     "--select",
     metavar="IDS",
     multiple=True,
-    help="Only these rules, by id or its beginning: D2R101,D2R2.  [default: by d2rpick.toml or pyproject.toml]",
+    help="Check only these rules, by id or its beginning: D2R101,D2R2.  [default: by d2rpick.toml or pyproject.toml]",
 )
-@click.option("--ignore", metavar="IDS", multiple=True, help="Not these rules; stronger than --select.")
+@click.option("--ignore", metavar="IDS", multiple=True, help="Skip these rules; overrules --select.")
 @click.option(
     "--fail-on",
     type=click.Choice(["error", "warning"]),
     default="error",
     show_default=True,
-    help="Lightest finding that is an objection.",
+    help="Least severe finding that sets exit code 1.",
 )
 @shared.output_options("table", "json", "ndjson", "github", "junit", "sarif")
 @click.pass_context
@@ -66,7 +67,7 @@ def command(
         click.echo(f"d2rpick: {one.reason}", err=True)
     limit = Severity(fail_on)
     if results or output_format != "table":
-        output.result(_text(ctx, output_format, results, failed, judge, limit))
+        output.result(in_words(_text(ctx, output_format, results, failed, judge, limit), output_format))
     if not results:
         ctx.exit(2)
     heavy = any(finding.severity.rank <= limit.rank for result in results for finding in result.findings)

@@ -112,7 +112,7 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
         if isinstance(one, bool) or not (isinstance(one, str) or hasattr(one, "__index__")):
             raise TypeError(f"{name} holds {one!r}; numbers and titles of parts were expected")
     if not listed:
-        raise ValueError(f"{name} is empty; name a part, or leave {name} out")
+        raise ValueError(f"{name} is empty; give a part, or leave {name} out")
     return tuple(str(one) for one in listed)
 
 
@@ -129,7 +129,7 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
         if not isinstance(one, str | os.PathLike):
             raise TypeError(f"{name} holds {one!r}; paths were expected")
     if not listed:
-        raise ValueError(f"{name} is empty; name a file or folder")
+        raise ValueError(f"{name} is empty; give a file or folder")
     return tuple(os.fsdecode(one) for one in listed)
 
 
@@ -155,7 +155,7 @@ def settings(choosing: Choosing) -> Settings:
     if len(chosen) > 1:
         raise ValueError(f"{chosen[0]} and {chosen[1]} exclude each other")
     if "step_ratio" in given and given.get("cost_share") is None:
-        raise ValueError("step_ratio needs cost_share too: together they tell the run time")
+        raise ValueError("step_ratio needs cost_share too: the run time needs both")
     return Settings(**given, oscillator=to_mode(oscillator, v0) if oscillator else None)
 
 

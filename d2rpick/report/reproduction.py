@@ -40,7 +40,7 @@ def as_markdown(rows: Sequence[Row], exhibits: Sequence[Exhibit], *, pictures: b
             f"Here: {one.found}",
             f"Agrees: {verdict(one)}.",
         ]
-    blocks += ["## Published and here", tables.as_markdown(HEAD, [cells(row) for row in rows]), *pairs_of()]
+    blocks += ["## Published and computed values", tables.as_markdown(HEAD, [cells(row) for row in rows]), *pairs_of()]
     blocks += ["## Misprints in the paper", "\n".join(f"* {misprint}" for misprint in MISPRINTS)]
     return "\n\n".join(blocks)
 

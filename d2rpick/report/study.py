@@ -72,7 +72,7 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
     found = "none"
     if spread:
         found = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}; "
-        found += "the intervals have a time in common" if answer.agree else "the intervals have no time in common"
+        found += "the intervals overlap" if answer.agree else "the intervals do not overlap"
     shared = f"none: {common.reason}"
     if common.tr is not None and common.window:
         low, high = common.window

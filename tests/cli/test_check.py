@@ -313,7 +313,7 @@ def test_a_comment_that_names_no_rule_is_told() -> None:
     deck = place("main.k", HEAD + PARTS + "$ d2rpick: ignore D2R1O4\n" + THERE + END)
     assert [w["code"] for w in answer("check", deck)["warnings"]] == ["unknown-rule"]
     assert (
-        "warning: unknown-rule: main.k: the comment before line 15 ignores no rule: 'D2R1O4'"
+        "warning: unknown-rule: main.k: the comment before line 15 does not name a rule to ignore: 'D2R1O4'"
         in run("check", deck).stderr
     )
 
@@ -375,7 +375,7 @@ def test_each_part_is_judged_by_its_own_energy_and_flight(tr: float) -> None:
     for part, energy in parts.items():
         judged = answer("verify", "--tr", str(tr), "--td", "0.37", "--part", part, BOX)
         in_load = any("before the end of the load" in reason for reason in judged["reasons"])
-        if in_load if energy == 0 else not judged["verified"]:  # without energy there is nothing to lock in
+        if in_load if energy == 0 else not judged["verified"]:  # without energy there are no channels to lock in
             expected.add(part)
     assert blamed == expected
     assert 0.0 in parts.values()

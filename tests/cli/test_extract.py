@@ -207,7 +207,7 @@ def test_the_format_asked_for_comes_before_that_of_the_name(tmp_path: Path) -> N
 def test_a_name_that_tells_no_format_is_refused_before_anything_is_read(name: str, tmp_path: Path) -> None:
     result = run("extract", "absent.csv", "-o", str(tmp_path / name))
     assert (result.exit_code, result.stdout) == (2, "")
-    assert result.stderr.endswith("the name tells no format; give --write-as csv, hdf5\n")
+    assert result.stderr.endswith("the suffix names no format; give --write-as: csv, hdf5\n")
     assert not (tmp_path / name).exists()
 
 
@@ -223,7 +223,7 @@ def test_an_existing_file_and_an_input_are_kept(tmp_path: Path) -> None:
 
 def test_format_of_takes_only_what_can_be_written() -> None:
     assert format_of("run.H5", ["csv", "hdf5"]) == "hdf5"
-    with pytest.raises(FormatError, match=r"run\.h5: the name tells no format; give --write-as csv"):
+    with pytest.raises(FormatError, match=r"run\.h5: the suffix names no format; give `write_as`: csv"):
         format_of("run.h5", ["csv"])
 
 

@@ -36,8 +36,8 @@ _SOLVER = (
     "Springs and dampers are not switched.",
 )
 _UNCAPPED = (
-    "DTMAX is 0: with nothing deformable left the step may grow without limit",
-    "  and the second switch comes late; d2rpick card --step-cap cures it.",
+    "DTMAX is 0: with nothing deformable left the time step may grow without",
+    "  limit and the second switch come late; set d2rpick card --step-cap.",
 )
 _UNMERGED = ("Parts that share nodes must be merged into one rigid body (d2rpick card --merge).",)
 
