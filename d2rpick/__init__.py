@@ -11,6 +11,8 @@ What is named here is imported when it is first used: the package itself imports
 
 from typing import TYPE_CHECKING, Any
 
+from d2rpick.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from d2rpick.errors import ConfigurationError as ConfigurationError
     from d2rpick.errors import D2RPickError as D2RPickError
@@ -30,8 +32,6 @@ if TYPE_CHECKING:
     from d2rpick.library.studies import Study as Study
     from d2rpick.library.studies import study as study
     from d2rpick.vibration.oscillator import Oscillator as Oscillator
-
-__version__ = "0.7.0"
 
 _HOME = {
     **dict.fromkeys(

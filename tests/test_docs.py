@@ -70,7 +70,6 @@ def test_the_sessions_show_the_commands_that_matter_most() -> None:
     assert {*COMMANDS} - {"rule"} <= shown
 
 
-@pytest.mark.skipif(not hasattr(d2rpick, "suggest"), reason="the package has no library interface")
 @pytest.mark.parametrize("page", [page for page in PAGES if "pycon" in languages(text_of(page))])
 def test_the_python_on_a_page_gives_what_it_shows(page: str) -> None:
     source = "".join(blocks(text_of(page), "pycon"))
@@ -121,7 +120,6 @@ def test_links_of_a_page_lead_somewhere(page: str) -> None:
         assert not anchor or anchor in anchors(path)
 
 
-@pytest.mark.skipif(not (ROOT / "d2rpick/vibration/model.py").exists(), reason="no protocol of the vibration here")
 def test_the_files_that_the_recipes_name_exist() -> None:
     named = re.findall(r"`((?:d2rpick|tests)/[\w/.-]+)`", text_of("docs/developing.md"))
     assert len(named) > 20

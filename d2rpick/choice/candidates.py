@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # A residual that may be so much higher is worth a note.
 _MUCH_HIGHER = 0.1
-_SAME_SWING = ("on the same swing as td: hardly anything is saved",)
+_SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,7 @@ def _remarks(situation: Situation, reach: float, known: Measured | None, parts: 
     if known and known.residual_high > known.residual + _MUCH_HIGHER:
         yield f"residual up to {known.residual_high:.2g} if what the oscillator leaves over is a further mode"
     if known and reach > known.timing_tolerance:
-        yield f"tr is known to ±{reach:.2g} only, its timing tolerance is {known.timing_tolerance:.2g}"
+        yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known.timing_tolerance:.2g}"
     if known is None and reach >= situation.history.step:
         yield "the level lies within the sampling error of an extremum"
 

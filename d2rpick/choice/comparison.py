@@ -97,7 +97,7 @@ def compare_runs(
     if min(after.size, reference_after.size) < 3:
         short = min(reference, switched, key=lambda history: history.time[-1])
         found = f"fewer than 3 states from td {td:g} to {end:g}"
-        raise RangeError(f"{', '.join(short.source)}: {found}; nothing can be compared there")
+        raise RangeError(f"{', '.join(short.source)}: {found}; too few to compare the runs")
     before, rest = switched.energy[switched.time < td], switched.between(td, np.inf)[1]
     if before.size and after[0] == before[-1] and _reported_wrong(before[-1], rest[1:]):
         after, rest = after[1:], rest[1:]  # the switch comes at the first step from td on: this state was still rigid
@@ -111,7 +111,9 @@ def compare_runs(
             f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {wanted:.6g}"
         )
     if error is not None and error > MOST_MOMENTUM_ERROR:
-        objections.append(f"the switched run's momentum after td is off by {error:.1%}: its motion is another one")
+        objections.append(
+            f"the switched run's momentum after td is off by {error:.1%}: its motion differs from the reference"
+        )
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -147,7 +149,7 @@ def _rigid_window(switched: History, tr: float, td: float) -> tuple[float, float
 def _not_rigid(switched: History, rigid: tuple[float, float] | None, tr: float, td: float) -> Iterator[str]:
     """Object when the energy does not stand still from about tr to about td, as far as the states tell."""
     if rigid is None:
-        yield f"the switched run has no state between tr {tr:g} and td {td:g}: nothing shows that it was rigid"
+        yield f"the switched run has no state between tr {tr:g} and td {td:g}: it may not have been rigid"
         return
     room = 2 * switched.step
     if rigid[0] > tr + room or rigid[1] < td - room or rigid[0] < tr - room or rigid[1] > td + room:

@@ -83,7 +83,9 @@ def assess(balance: Balance, window: tuple[float, float] | None = None, locked: 
     """
     peak = _peak(balance)
     if balance.internal is not None and peak is None:
-        reason = "the internal energy never exceeds a millionth of the energy of the run: its shares mean nothing"
+        reason = (
+            "the internal energy never exceeds a millionth of the energy of the run, so shares of it are meaningless"
+        )
         return Health(**_ratio(balance), window=window, reason=reason)
     return Health(
         hourglass_share=_share(balance.hourglass, peak),
@@ -103,12 +105,12 @@ def _too_short(balance: Balance, window: tuple[float, float]) -> str | None:
     states = int(np.count_nonzero((balance.time >= window[0]) & (balance.time <= window[1])))
     if balance.external_work is None or states >= FEWEST_STATES:
         return None
-    return f"the window holds {states} states: at least {FEWEST_STATES} tell a load that works there from gravity"
+    return f"the window holds {states} states: at least {FEWEST_STATES} are needed to tell a load from gravity"
 
 
 def cautions_of_health(health: Health) -> Iterator[Caution]:
     """What of the health of a run should be known, with stable codes."""
-    rest = "the internal energy is not to be relied on"
+    rest = "do not rely on the internal energy"
     if _above(health.hourglass_share, MOST_HOURGLASS):
         share = f"{health.hourglass_share:.0%}"
         yield Caution("hourglass", f"hourglass energy reaches {share} of the internal energy: {rest}")
@@ -122,13 +124,15 @@ def cautions_of_health(health: Health) -> Iterator[Caution]:
         yield Caution("energy-ratio", f"{found}: the run gains or loses energy")
     if _above(health.negative_sliding_share, MOST_NEGATIVE_SLIDING):
         share = f"{health.negative_sliding_share:.0%}"
-        yield Caution("negative-sliding", f"contact energy falls to -{share} of the internal energy: penetrations")
+        yield Caution(
+            "negative-sliding", f"contact energy falls to -{share} of the internal energy: check for penetrations"
+        )
     if _above(health.sliding_share, MOST_SLIDING):
         found = f"contact energy reaches {health.sliding_share:.0%} of the internal energy"
         yield Caution("sliding", f"{found}; only friction can explain that")
     if _above(health.eroded_share, MOST_WORK):
         found = f"deleted elements hold {health.eroded_share:.0%} of the internal energy"
-        yield Caution("eroded-energy", f"{found}: it is counted in that of the model but does not spring back")
+        yield Caution("eroded-energy", f"{found}: it counts as internal energy of the model but does not spring back")
     yield from _of_window(health)
 
 
@@ -145,7 +149,7 @@ def _of_window(health: Health) -> Iterator[Caution]:
         found = f"external work beyond gravity and damping is {health.window_work:.0%} of the energy {where}"
         yield Caution("work-in-window", f"{found}: where it acts on the parts, they do not fly freely")
     if _above(health.window_eroded, 0.0):
-        yield Caution("erosion", f"elements erode {where}; those of rigid parts would not")
+        yield Caution("erosion", f"elements are eroded {where}; elements of rigid parts would not be")
 
 
 def _above(value: float | None, limit: float) -> bool:

@@ -65,7 +65,7 @@ def objections(
         return
     lock_in = np.array([np.nan if one is None else one.lock_in_error for one in known])
     error, judged = np.where(compared, lock_in, level_error), described & same_sign
-    yield Objection(judged & np.isnan(error), "no positive energy to compare")
+    yield Objection(judged & np.isnan(error), "the energy is not positive here, so there is nothing to compare")
     tolerance = situation.settings.tolerance
     yield Objection(judged & (error > tolerance), f"above the tolerance {tolerance:g}", error)
 
@@ -75,5 +75,5 @@ def _against_td(situation: Situation) -> Iterator[str]:
     if situation.td > situation.latest_td:
         yield f"td after {end_of_flight(situation)}"
     if situation.settings.strict and not situation.flight.certain:
-        yield "the flight was read off the energy alone, which is not certain"
+        yield "the flight was found from the energy alone, which is not certain"
     yield from situation.vibration.doubts

@@ -18,8 +18,8 @@ _ONE_LEVEL: Final = 0.02
 def nothing_vibrates(history: History, start: float, td: float, tolerance: float, *, deformed: bool) -> bool:
     """Whether the energy is round-off from ``start`` to ``td`` [time] or, by the level error, stays on that of td.
 
-    ``tolerance`` is that on the level error [-].  Where a vibration is known (``deformed``), a constant level is none
-    of rest.
+    ``tolerance`` is that on the level error [-].  Where a vibration is known (``deformed``), a constant level does
+    not mean rest.
     """
     _, inside = history.between(start, td)
     if not inside.size:

@@ -151,7 +151,7 @@ def _verifies(situation: Situation, tr: float, td: float) -> bool:
 def _why_none(situation: Situation, ranked: Candidates) -> str:
     if not ranked:
         level = situation.energy_td
-        return f"before td = {situation.td:.6g} the energy neither passes its level {level:.6g} nor turns near it"
+        return f"before td = {situation.td:.6g} the energy neither passes its level {level:.6g} nor peaks near it"
     nearest = ranked[0]
     reasons = "; ".join((*nearest.notes, *over_limits(situation, nearest)))
     return f"none of {len(ranked)} candidates is acceptable; the nearest, tr = {nearest.tr:.6g}: {reasons}"

@@ -64,7 +64,9 @@ def advice(history: History, settings: Settings) -> str:
         start, seen = middle.flight.start or float(time[0]), middle.flight.end is not None
         end = float(time[-1]) if middle.flight.end is None else middle.flight.end
     peaks = [t for t in examine(history, (start + end) / 2, settings).peaks(start, end) if t < end]
-    where = f"the flight ends at {end:.6g}" if seen else f"no next contact was seen up to the end at {end:.6g}"
+    where = (
+        f"the flight ends at {end:.6g}" if seen else f"no contact was found before the end of the record at {end:.6g}"
+    )
     last = f"the last peak of the energy before it is at {peaks[-1]:.6g}" if peaks else "the energy has no peak there"
     return f"{', '.join(history.source)}: {where}, {last}"
 

@@ -26,7 +26,7 @@ class Caution(NamedTuple):
 def cautions_of(situation: Situation) -> Iterator[Caution]:
     """Everything to be aware of in a situation, the input first."""
     if not situation.history.complete:
-        yield Caution("truncated-input", "the input stops inside a state; only whole states were used")
+        yield Caution("truncated-input", "the input ends within a state; only complete states were used")
     yield from _of_energy(situation)
     yield from _of_parts(situation)
     yield from _of_flight(situation)
@@ -36,7 +36,7 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
     td, mode, share = situation.td, situation.vibration.mode, situation.kinetic_share
     if situation.at_rest:
         found = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
-        yield Caution("at-rest", f"{found}: there is nothing to match, any tr there is right; its start saves the most")
+        yield Caution("at-rest", f"{found}: any tr there is right, and the first one saves the most")
         return
     if situation.energy_td <= 0:
         found = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
@@ -45,10 +45,10 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
         yield Caution("energy-only", f"{unknown}; candidates are judged by their energy level alone")
     if share is not None and share > POOR_KINETIC_SHARE:
         lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g}"
-        yield Caution("poor-td", f"{lost} and cannot be kept by any tr")
+        yield Caution("poor-td", f"{lost} and no tr can keep it")
     if mode and (mode.preload or abs(mode.energy_plastic) > _NOTABLE_PLASTIC * float(mode.vibration_energy(td))):
         found = f"plastic work {mode.energy_plastic:.4g} and a preload energy of {mode.preload**2:.4g} fit the record"
-        yield Caution("plastic-or-preload", f"{found}; energy alone cannot tell them from each other with certainty")
+        yield Caution("plastic-or-preload", f"{found}; the energy alone cannot tell one from the other")
 
 
 def _of_parts(situation: Situation) -> Iterator[Caution]:
@@ -67,9 +67,9 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
     for doubt in flight.doubts:
         yield Caution("flight-sources-disagree", doubt)
     if flight.source == "energy":
-        found = f"the end of the load, {flight.start:.6g}, was read off the energy alone, which is not certain"
+        found = f"the end of the load, {flight.start:.6g}, was found from the energy alone, which is not certain"
         if flight.settled is not None and flight.start is not None and flight.settled < flight.start:
-            found += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are given up for safety"
+            found += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are left unused for safety"
         yield Caution("flight-from-energy", f"{found}; give it as `after` where it is known")
     if earliest is None:
         yield Caution("no-flight", "nothing in the record shows when the load is over; give that time as `after`")

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import click
 
-from d2rpick import __version__
 from d2rpick.cli.wording import with_options
 from d2rpick.errors import D2RPickError, printable
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,7 +54,7 @@ class _Group(click.Group):
             import difflib
 
             close = difflib.get_close_matches(args[0], COMMANDS, n=1)
-            hint = f"Did you mean {close[0]!r}?" if close else f"There are {', '.join(COMMANDS)}."
+            hint = f"Did you mean {close[0]!r}?" if close else f"The commands are {', '.join(COMMANDS)}."
             raise click.UsageError(f"No such command {args[0]!r}. {hint}", ctx)
         return super().resolve_command(ctx, args)
 
@@ -89,7 +89,9 @@ class _Group(click.Group):
             if isinstance(error, click.exceptions.Exit | click.Abort) or ctx.meta.get("d2rpick.debug"):
                 raise
             what = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            raise click.ClickException(f"a fault of this program, please report it with --debug ({what})") from error
+            raise click.ClickException(
+                f"internal error; please report it with the output of --debug ({what})"
+            ) from error
 
     def main(self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any) -> NoReturn:  # type: ignore[override]
         extra["standalone_mode"] = False

@@ -48,7 +48,7 @@ _ONLY_JUDGED = "--part chooses by whose energy a card for {} is judged; give a -
     metavar="IDS",
     multiple=True,
     type=shared.NAMES,
-    help="Parts to be switched, by number (3,7) or range (10-19); with --history by title too.",
+    help="Parts to switch, by number (3,7) or range (10-19), or with --history by title.",
 )
 @card_options
 @shared.reference_options
@@ -58,7 +58,7 @@ _ONLY_JUDGED = "--part chooses by whose energy a card for {} is judged; give a -
 def command(ctx: click.Context, /, exit_zero: bool, **options: Any) -> None:
     """Print solver input for switching windows, ready to be pasted.
 
-    With a history the times are judged once more as they are printed, and the verdict stands in the comments.
+    With a history, the times are judged again as printed, and the verdict is added as a comment.
     """
     from d2rpick.deck.printing import DEFAULT, cards
 

@@ -60,7 +60,7 @@ def card_options(function: shared.Decorated) -> shared.Decorated:
     options = (
         click.option(
             "--solver", type=Solver(),
-            help="Whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]",
+            help="Solver whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]",
         ),
         click.option(
             "--merge", type=click.IntRange(min=1), metavar="ID",
@@ -119,7 +119,7 @@ def need_ids(request: CardRequest, history: History) -> str:
 
 def needed(solver: Module) -> str:
     """Say which option names whom the card of ``solver`` switches."""
-    what = {"part": "the parts to be switched", "node": "the main nodes of the rigid bodies"}
+    what = {"part": "the parts to switch", "node": "the main nodes of the rigid bodies"}
     return f"a card for {solver.TITLE} needs --{solver.SWITCHES}, {what[solver.SWITCHES]}"
 
 

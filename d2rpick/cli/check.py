@@ -10,7 +10,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
-from d2rpick.cli.wording import with_options
+from d2rpick.cli.wording import in_words
 from d2rpick.errors import ConfigurationError, DeckError
 
 if TYPE_CHECKING:
@@ -35,15 +35,15 @@ Examples:
     "--select",
     metavar="IDS",
     multiple=True,
-    help="Only these rules, by id or its beginning: D2R101,D2R2.  [default: by d2rpick.toml or pyproject.toml]",
+    help="Check only these rules, by id or its beginning: D2R101,D2R2.  [default: by d2rpick.toml or pyproject.toml]",
 )
-@click.option("--ignore", metavar="IDS", multiple=True, help="Not these rules; stronger than --select.")
+@click.option("--ignore", metavar="IDS", multiple=True, help="Skip these rules; overrules --select.")
 @click.option(
     "--fail-on",
     type=click.Choice(["error", "warning"]),
     default="error",
     show_default=True,
-    help="Lightest finding that is an objection.",
+    help="Least severe finding that sets exit code 1.",
 )
 @shared.output_options("table", "json", "ndjson", "github", "junit", "sarif")
 @click.pass_context
@@ -67,7 +67,7 @@ def command(
         click.echo(f"d2rpick: {one.reason}", err=True)
     limit = Severity(fail_on)
     if results or output_format != "table":
-        output.result(_text(ctx, output_format, results, failed, judge, limit))
+        output.result(in_words(_text(ctx, output_format, results, failed, judge, limit), output_format))
     if not results:
         ctx.exit(2)
     heavy = any(finding.severity.rank <= limit.rank for result in results for finding in result.findings)
@@ -104,18 +104,11 @@ def _checked(
             configuration = configuration_for(name, asked)
             inputs.append(configuration.source)
             content = sys.stdin.buffer.read() if name == STDIN else None
-            results.append(_with_options(check_deck(name, configuration, judge, content)))
+            results.append(check_deck(name, configuration, judge, content))
             inputs += results[-1].files
         except (ConfigurationError, DeckError) as error:
             failed.append(Unreadable(name, str(error)))
     return results, failed, inputs
-
-
-def _with_options(result: Checked) -> Checked:
-    """Let findings name the options that cure, not the arguments of the library."""
-    from dataclasses import replace
-
-    return replace(result, findings=tuple(replace(f, message=with_options(f.message)) for f in result.findings))
 
 
 def _main_decks(named: Sequence[str]) -> tuple[list[str], list[Unreadable]]:

@@ -9,6 +9,7 @@ import click
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
 from d2rpick.cli.progress import reading
+from d2rpick.cli.wording import in_words
 from d2rpick.report.formats import FORMATS, Shown, write
 
 EXAMPLES = """\b
@@ -33,4 +34,5 @@ def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **option
         output = Output.of(options, *run.sources)
         overview = survey(run, asked.selection)
     output.notes((), report.cautions(overview))
-    output.result(write("overview", output_format, overview, Shown(ctx.meta["d2rpick.command"])))
+    text = write("overview", output_format, overview, Shown(ctx.meta["d2rpick.command"]))
+    output.result(in_words(text, output_format))

@@ -70,7 +70,7 @@ class File(click.types.StringParamType):
 
 
 class Names(click.types.StringParamType):
-    """Names that an environment variable parts by semicolons, since labels hold blanks."""
+    """Names that are separated by semicolons in an environment variable, since labels hold blanks."""
 
     envvar_list_splitter = ";"
 
@@ -92,30 +92,32 @@ def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated
     return apply
 
 
-_AFTER = click.option("--after", type=TIME, metavar="T", help="The load ends here.  [default: found from the record]")
+_AFTER = click.option("--after", type=TIME, metavar="T", help="End of the load.  [default: found from the record]")
 _MARGIN = click.option(
     "--margin", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="T",
-    help="Time kept clear after the load and before the next contact.",
+    help="Time to keep clear after the load and before the next contact.",
 )  # fmt: skip
 _TOLERANCE = click.option(
     "--tolerance", type=FRACTION, default=0.2, show_default=True, metavar="L",
-    help="On the lock-in error, or on the level error where no oscillator is known.",
+    help="Limit on the lock-in error, or on the level error where no oscillator is known.",
 )  # fmt: skip
-EXIT_ZERO = click.option("--exit-zero", is_flag=True, help="Exit with 0 where the answer is an objection (1).")
+EXIT_ZERO = click.option("--exit-zero", is_flag=True, help="Exit with 0 instead of 1 when the answer is an objection.")
 _FORMAT = click.option(
     "-F", "--input-format", type=click.Choice(["auto", *FORMATS]), default="auto", show_default=True,
-    help="Format of the history; auto goes by its content.",
+    help="Format of the history; auto recognises it by content.",
 )  # fmt: skip
-_TIME = click.option("--time", metavar="NAME|NUMBER", help="Time column, by its name, number or HDF5 path.")
+_TIME = click.option("--time", metavar="NAME|NUMBER", help="Time column, by name, number or HDF5 path.")
 _ENERGY = click.option(
     "--energy", metavar="NAME|NUMBER", multiple=True, type=NAMES,
-    help="Energy column, label or HDF5 path; given several times, their sum.",
+    help="Energy column, label or HDF5 path; repeat it to add several.",
 )  # fmt: skip
 _CHANNEL = click.option(
     "--channel", metavar="QUANTITY=NAME", multiple=True, type=NAMES,
     help="Channel of another quantity, where its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
 )  # fmt: skip
-_FLYING = click.option("--flying", metavar="IDS", multiple=True, type=NAMES, help="Parts that fly together with them.")
+_FLYING = click.option(
+    "--flying", metavar="IDS", multiple=True, type=NAMES, help="Parts that fly together with the switched parts."
+)
 
 
 # What of them says how to read a history and how to judge by it.
@@ -134,7 +136,7 @@ def reading_options(function: Decorated) -> Decorated:
         _FORMAT, _TIME, _ENERGY,
         click.option(
             "--part", metavar="IDS", multiple=True, type=NAMES,
-            help="Parts to be switched, by number (3,7), range (10-19) or title; their energies are added.",
+            help="Parts to switch, by number (3,7), range (10-19) or title; their energies are added.",
         ),
         _FLYING, _CHANNEL,
     )(function)  # fmt: skip
@@ -145,7 +147,7 @@ def reference_options(function: Decorated) -> Decorated:
     return _stack(
         click.option(
             "--history", metavar="HISTORY", multiple=True, type=FILE,
-            help="Energy history of the run without switching, to judge by: file, folder or glob; repeatable.",
+            help="Energy history of the run without switching to judge by: file, folder or glob; repeatable.",
         ),
         _FORMAT, _TIME, _ENERGY, _FLYING, _CHANNEL, _AFTER, _MARGIN, _TOLERANCE,
     )(function)  # fmt: skip
@@ -158,7 +160,7 @@ def output_options(*formats: str) -> Callable[[Decorated], Decorated]:
         return _stack(
             click.option(
                 "-f", "--output-format", type=click.Choice(formats), default=formats[0], show_default=True,
-                help="Form of the result.",
+                help="Format of the result.",
             ),
             EXIT_ZERO,
         )(file_options(function))  # fmt: skip
@@ -170,10 +172,10 @@ def file_options(function: Decorated) -> Decorated:
     """Where the result goes."""
     return _stack(
         click.option(
-            "-o", "--output-file", metavar="FILE", type=FILE, help="Write the result to FILE, whole or not at all."
+            "-o", "--output-file", metavar="FILE", type=FILE, help="Write the result to FILE, completely or not at all."
         ),
-        click.option("--overwrite", is_flag=True, help="Replace files that exist."),
-        click.option("-q", "--quiet", is_flag=True, help="No notes and warnings on stderr."),
+        click.option("--overwrite", is_flag=True, help="Replace existing files."),
+        click.option("-q", "--quiet", is_flag=True, help="Print no notes and warnings to stderr."),
         click.option(
             "--debug", is_flag=True, expose_value=False, callback=_remember_debug,
             help="Show the traceback of an error.",
@@ -187,11 +189,11 @@ def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
     return _stack(
         click.option("--stiffness", type=POSITIVE, required=required, help="Spring k."),
         click.option("--mass", type=POSITIVE, required=required, help="Suspended mass M."),
-        click.option("--frame-mass", type=POSITIVE, help="Frame mass m; or --beta."),
-        click.option("--beta", type=POSITIVE, help="M/m, instead of --frame-mass."),
+        click.option("--frame-mass", type=POSITIVE, help="Frame mass m (or give --beta)."),
+        click.option("--beta", type=POSITIVE, help="Mass ratio M/m (instead of --frame-mass)."),
         click.option(
             "--alpha", type=NOT_NEGATIVE, default=0.0 if required else None, show_default=required,
-            help="Damping rate, proportional to mass.",
+            help="Rate of damping proportional to mass.",
         ),
         click.option("--v0", type=TIME, help=f"Velocity of the frame at time 0{rest}."),
     )  # fmt: skip
@@ -203,14 +205,14 @@ def choosing_options(function: Decorated) -> Decorated:
         judging_options,
         click.option(
             "--cost-share", type=FRACTION, metavar="C",
-            help="Share of the cost of a step that the switched parts' elements take; tells the run time.",
+            help="Share of the cost of a time step spent on the elements of the switched parts; gives the run time.",
         ),
         click.option(
             "--step-ratio", type=POSITIVE, metavar="N", help="Time step while rigid over that before.  [default: 1]",
         ),
         click.option("--plot", metavar="FILE", type=FILE, help="Draw energy and motion to FILE (png, svg, pdf)."),
         click.option(
-            "--report", metavar="FILE", type=FILE, help="Write all of it to one HTML page to read, print and sign."
+            "--report", metavar="FILE", type=FILE, help="Write everything to one HTML page to read, print and sign."
         ),
     )(function)  # fmt: skip
 
@@ -222,11 +224,11 @@ def judging_options(function: Decorated) -> Decorated:
         _MARGIN,
         _TOLERANCE,
         click.option(
-            "--max-kinetic-share", type=NOT_NEGATIVE, metavar="K", help="Object to a td with a larger kinetic share.",
+            "--max-kinetic-share", type=NOT_NEGATIVE, metavar="K", help="Reject a td with a larger kinetic share.",
         ),
-        click.option("--max-residual", type=NOT_NEGATIVE, metavar="R", help="Object to a pair with a larger residual."),
+        click.option("--max-residual", type=NOT_NEGATIVE, metavar="R", help="Reject a pair with a larger residual."),
         oscillator_options(required=False),
-        click.option("--fit-window", type=(TIME, TIME), metavar="LO HI", help="Identify the oscillator here only."),
+        click.option("--fit-window", type=(TIME, TIME), metavar="LO HI", help="Identify the oscillator only here."),
         click.option("--no-verify", is_flag=True, help="Judge by the energy level alone, without an oscillator."),
         click.option(
             "--strict", is_flag=True, help="Recommend nothing where the energy alone shows when the load is over."
@@ -240,7 +242,7 @@ def selection(options: dict[str, Any]) -> Selection:
 
     parts = options.get("part", ())
     if options["energy"] and parts:
-        raise click.UsageError("--energy and --part exclude each other: columns or parts")
+        raise click.UsageError("--energy and --part exclude each other: give columns or parts")
     return Selection(options["time"], options["energy"], parts, options["flying"], _channels(options["channel"]))
 
 
@@ -302,7 +304,7 @@ def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
         source = click.get_current_context().get_parameter_source
         lost = [name for name in _JUDGING if source(name) is not click.core.ParameterSource.DEFAULT]
         if lost:
-            raise click.UsageError(f"--{_dashed(lost[0])} is about an energy history; name it with --history")
+            raise click.UsageError(f"--{_dashed(lost[0])} needs an energy history; give one with --history")
         return None
     from d2rpick.choice.settings import Settings
 
@@ -342,7 +344,9 @@ def oscillator(options: dict[str, Any]) -> Oscillator | None:
         return None
     missing = [name for name in names if options[name] is None]
     if missing:
-        raise click.UsageError(f"--{_dashed(given[0])} needs --{_dashed(missing[0])} too: an oscillator is given whole")
+        raise click.UsageError(
+            f"--{_dashed(given[0])} needs --{_dashed(missing[0])} too: give all parameters of the oscillator"
+        )
     if (options["frame_mass"] is None) == (options["beta"] is None):
         raise click.UsageError("the oscillator needs either --frame-mass or --beta")
     mass, frame_mass = options["mass"], options["frame_mass"]
@@ -361,9 +365,9 @@ def settings(options: dict[str, Any]) -> Settings:
         raise click.UsageError(f"{chosen[0]} and {chosen[1]} exclude each other")
     cost_share, step_ratio = options.get("cost_share"), options.get("step_ratio")
     if step_ratio is not None and cost_share is None:
-        raise click.UsageError("--step-ratio needs --cost-share too: together they tell the run time")
+        raise click.UsageError("--step-ratio needs --cost-share too: the run time needs both")
     if window and not window[0] < window[1]:
-        raise click.UsageError(f"--fit-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
+        raise click.UsageError(f"--fit-window {window[0]:g} {window[1]:g} is empty; give the lower time first")
     return Settings(
         after=options["after"],
         margin=options["margin"],

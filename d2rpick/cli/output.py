@@ -38,7 +38,7 @@ class Output(NamedTuple):
 
             figures.format_of(plot)
         if options.get("report") == "-":
-            raise D2RPickError("-: --report writes a file; name one")
+            raise D2RPickError("-: --report writes a file; give its name")
         names = {"--output-file": options["output_file"], "--plot": plot, "--report": options.get("report")}
         claimed: dict[str, str] = {}
         for option, name in names.items():
@@ -46,7 +46,7 @@ class Output(NamedTuple):
                 output.claim(name)
                 other = claimed.setdefault(os.path.realpath(name), option)
                 if other != option:
-                    raise D2RPickError(f"{name}: {option} and {other} name the same file; name two")
+                    raise D2RPickError(f"{name}: {option} and {other} are the same file; give two")
         return output
 
     def spare(self, inputs: Iterable[str]) -> None:
@@ -60,15 +60,15 @@ class Output(NamedTuple):
 
         path = Path(name)
         if path.is_dir():
-            raise D2RPickError(f"{name or repr(name)}: this is a folder; name a file in it")
+            raise D2RPickError(f"{name or repr(name)}: this is a folder; give a file in it")
         if not path.parent.is_dir():
-            raise D2RPickError(f"{name}: there is no folder {str(path.parent)!r}; create it or name another one")
+            raise D2RPickError(f"{name}: no such folder: {str(path.parent)!r}; create it or give another one")
         if not path.exists():
             return
         if any(Path(source).exists() and path.samefile(source) for source in self.inputs):
-            raise D2RPickError(f"{name}: this is an input; name another file for the output")
+            raise D2RPickError(f"{name}: this is an input; give another file for the output")
         if path.is_file() and not self.overwrite:
-            raise D2RPickError(f"{name}: the file exists; name another one or give --overwrite")
+            raise D2RPickError(f"{name}: the file exists; give another one or --overwrite")
 
     def result(self, text: str) -> None:
         """Give out the result; on a terminal the line of the recommended candidate stands out."""
@@ -93,7 +93,7 @@ class Output(NamedTuple):
         if self.quiet:
             return
         for note in notes:
-            click.echo(f"note: {printable(note)}", err=True)
+            click.echo(f"note: {printable(with_options(note))}", err=True)
         for caution in cautions:
             click.echo(f"warning: {caution.code}: {printable(with_options(caution.message))}", err=True)
 
@@ -113,7 +113,7 @@ class Output(NamedTuple):
         except BrokenPipeError:
             raise
         except OSError as error:
-            raise D2RPickError(f"{name}: cannot be written ({error.strerror}); name another file") from error
+            raise D2RPickError(f"{name}: cannot be written ({error.strerror}); give another file") from error
 
 
 def text_bytes(text: str) -> bytes:

@@ -1,4 +1,4 @@
-"""A sign of life while files are read: on a terminal, from the first second on, gone when it is over."""
+"""Progress on a terminal: shown after one second, erased at the end."""
 
 from __future__ import annotations
 

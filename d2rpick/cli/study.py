@@ -14,6 +14,7 @@ import click
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import counting
+from d2rpick.cli.wording import in_words, with_options
 from d2rpick.errors import D2RPickError, FormatError
 from d2rpick.report.formats import FORMATS, Shown, write
 
@@ -54,16 +55,16 @@ class Work:
 @click.option("--td", type=shared.TIME, required=True, metavar="T", help="Switch back to deformable at this time.")
 @click.option(
     "--from", "listed", envvar="D2RPICK_STUDY_FROM", metavar="LIST", type=shared.FILE,
-    help="Names of runs too, one a line, from a file or stdin (-).",
+    help="File with more names of runs, one per line; - is stdin.",
 )  # fmt: skip
 @click.option(
     "--resume", metavar="FILE", type=shared.FILE,
-    help="Keep finished runs in FILE; those that are in it already and unchanged are not computed again.",
+    help="Keep finished runs in FILE, and skip those that are in it and unchanged.",
 )  # fmt: skip
 @click.option(
-    "--jobs", type=click.IntRange(min=1), metavar="N", help="Processes at work.  [default: one for each core]",
+    "--jobs", type=click.IntRange(min=1), metavar="N", help="Number of processes.  [default: one per core]",
 )  # fmt: skip
-@click.option("--scheduler", metavar="ADDRESS", help="Let a running Dask cluster do the work; it sees the same files.")
+@click.option("--scheduler", metavar="ADDRESS", help="Use a running Dask cluster, which must see the same files.")
 @shared.reading_options
 @shared.judging_options
 @click.option("--plot", metavar="FILE", type=shared.FILE, help="Draw the energies of all runs to FILE (png, svg, pdf).")
@@ -73,10 +74,10 @@ class Work:
 @shared.output_options(*FORMATS["study"])
 @click.pass_context
 def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exit_zero: bool, **options: Any) -> None:
-    """Ask for tr in many runs: how far they agree, and one tr for all of them.
+    """Choose tr for many runs: how far they agree, and one tr for all of them.
 
     Each RUN is a file, a folder with the files of one run, or a pattern whose matches are runs.  One that cannot be
-    read is told in its row and does not stop the others.
+    read is listed in its row and does not stop the others.
     """
     from d2rpick.studies.resume_file import fingerprint, line
     from d2rpick.studies.study import Question, summarise
@@ -99,9 +100,10 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
     output.notes((), answer.cautions)
     _write_files(answer, plot, report, output._replace(inputs=_files_of(rows)))
     before = [] if streaming else [line(row, asked) for row in rows]
-    output.result(write("study", output_format, answer, Shown(ctx.meta["d2rpick.command"], lines=before)))
+    text = write("study", output_format, answer, Shown(ctx.meta["d2rpick.command"], lines=before))
+    output.result(in_words(text, output_format))
     if not answer.judged:
-        click.echo(f"d2rpick: no run could be judged; the first: {rows[0].message}", err=True)
+        click.echo(f"d2rpick: no run could be judged; the first: {with_options(rows[0].message or '')}", err=True)
         ctx.exit(2)
     finish(ctx, objection=answer.objection, exit_zero=exit_zero)
 
@@ -113,9 +115,9 @@ def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
     sources = find_runs([*names, *(_listed(listed) if listed is not None else ())])
     if not sources:
         where = "" if listed is None else f"{'standard input' if listed == '-' else listed} names none; "
-        raise click.UsageError(f"no runs; {where}name them, or a list of them with --from")
+        raise click.UsageError(f"no runs; {where}give their names, or a list with --from")
     if "-" in sources:
-        raise click.UsageError("- is no run: a history from standard input cannot be handed to other processes")
+        raise click.UsageError("- cannot be a run: standard input cannot be passed to other processes")
     return sources
 
 
@@ -124,11 +126,11 @@ def _listed(name: str) -> Iterator[str]:
     from pathlib import Path
 
     if name == "-" and sys.stdin is None:
-        raise FormatError("-: standard input is closed; name a file with one run a line")
+        raise FormatError("-: standard input is closed; give a file with one run per line")
     try:
         content = sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
     except OSError as error:
-        raise FormatError(f"{name}: cannot be read ({error.strerror}); name a file with one run a line") from None
+        raise FormatError(f"{name}: cannot be read ({error.strerror}); give a file with one run per line") from None
     for text in os.fsdecode(content).removeprefix("\ufeff").splitlines():
         if (text := text.strip()) and not text.startswith("#"):
             yield text
@@ -140,7 +142,7 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
         return
     for option, file in written.items():
         if file is not None and os.path.realpath(file) == os.path.realpath(name):
-            raise D2RPickError(f"{name}: --resume and --{option} name the same file; name two")
+            raise D2RPickError(f"{name}: --resume and --{option} are the same file; give two files")
     if os.path.exists(name) and os.path.samestat(os.stat(name), os.fstat(1)):  # noqa: PTH110, PTH116
         raise D2RPickError(f"{name}: --resume and standard output are the same file; send one elsewhere")
 
@@ -165,7 +167,7 @@ def _write_files(answer: Study, plot: str | None, report: str | None, output: Ou
         from d2rpick.report.study_page import as_page
 
         drawing = figures.both_widths(figures.draw_study, answer, "runs")
-        output.write(report, text_bytes(as_page(answer, shared.repeat(), drawing)))
+        output.write(report, text_bytes(with_options(as_page(answer, shared.repeat(), drawing))))
 
 
 def _rows(question: Question, sources: Sequence[str], work: Work, *, quiet: bool) -> Iterator[Row]:

@@ -10,6 +10,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
+from d2rpick.cli.wording import in_words, with_options
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
@@ -32,14 +33,17 @@ Examples:
 @click.command("suggest", epilog=EXAMPLES)
 @click.option("--td", type=shared.TIME, metavar="T", help="Switch back to deformable at this time.")
 @click.option(
-    "--td-window", type=(shared.TIME, shared.TIME), metavar="LO HI", help="Choose the time to switch back in here."
+    "--td-window",
+    type=(shared.TIME, shared.TIME),
+    metavar="LO HI",
+    help="Choose the time to switch back within this window.",
 )
 @click.option(
     "--limit",
     type=click.IntRange(min=1),
     default=10,
     show_default=True,
-    help="Rows of the table; json and csv hold all.",
+    help="Number of rows in the table; json and csv have all.",
 )
 @shared.history_options
 @shared.choosing_options
@@ -82,10 +86,11 @@ def command(
 
         output.write(extras.plot, figures.render(figures.draw_suggestion(answer), extras.plot))
     if extras.report:
-        output.write(extras.report, text_bytes(_page(answer, run, options)))
+        output.write(extras.report, text_bytes(with_options(_page(answer, run, options))))
     if output_format == "card":
         return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
-    output.result(write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit)))
+    text = write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit))
+    output.result(in_words(text, output_format))
     return finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
 
 
@@ -100,9 +105,9 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
     if td is not None and window:
         raise click.UsageError("--td and --td-window exclude each other")
     if window and not window[0] < window[1]:
-        raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty, the lower time comes first")
+        raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty; give the lower time first")
     if card and not ids:
-        raise click.UsageError("-f card needs --part, the parts that are switched (Radioss: --node, their main nodes)")
+        raise click.UsageError("-f card needs --part, the parts to switch (Radioss: --node, their main nodes)")
 
 
 def _answer(reference: Reference, td: float | tuple[float, float] | None, settings: Settings) -> Suggestion:

@@ -11,6 +11,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
+from d2rpick.cli.wording import in_words, with_options
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class _Verify(click.Command):
     metavar="FILE",
     multiple=True,
     type=shared.FILE,
-    help="Compare a finished switched run with the reference: all files, folders and globs up to the next option.",
+    help="Compare a finished switched run with the reference; takes all names up to the next option.",
 )
 @shared.history_options
 @shared.choosing_options
@@ -80,8 +81,9 @@ def command(
 
         output.write(extras.plot, figures.render(figures.draw_verdict(answer), extras.plot))
     if extras.report:
-        output.write(extras.report, text_bytes(_page(answer, run, other, options)))
-    output.result(write("verdict", output_format, answer, Shown(ctx.meta["d2rpick.command"])))
+        output.write(extras.report, text_bytes(with_options(_page(answer, run, other, options))))
+    text = write("verdict", output_format, answer, Shown(ctx.meta["d2rpick.command"]))
+    output.result(in_words(text, output_format))
     finish(ctx, objection=not answer.verified, exit_zero=exit_zero)
 
 

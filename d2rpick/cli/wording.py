@@ -8,8 +8,13 @@ from typing import Final
 # Argument of the library: option that sets it.
 OPTIONS: Final = {
     "after": "--after",
+    "energy": "--energy",
     "fit_window": "--fit-window",
+    "parts": "--part",
+    "time": "--time",
+    "write_as": "--write-as",
 }
+_READ_BY_PEOPLE: Final = {"table", "markdown", "github", "junit"}
 
 
 def with_options(message: str) -> str:
@@ -21,3 +26,14 @@ def with_options(message: str) -> str:
     'give it as --after where it is known'
     """
     return re.sub(r"`(\w+)`", lambda found: OPTIONS.get(found[1], found[0]), message)
+
+
+def in_words(text: str, form: str) -> str:
+    """Name the options in a result that people read; other programs get the arguments.
+
+    Examples
+    --------
+    >>> in_words("choose with `energy`", "table"), in_words("choose with `energy`", "json")
+    ('choose with --energy', 'choose with `energy`')
+    """
+    return with_options(text) if form in _READ_BY_PEOPLE else text

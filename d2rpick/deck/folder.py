@@ -39,7 +39,7 @@ def main_decks(folder: str) -> list[str]:
     found = [path for path in decks if os.path.realpath(path) not in included]
     if not found:
         what = "every one is included by another" if decks else "no file with *KEYWORD or /BEGIN"
-        raise DeckError(f"{folder}: no main deck in this folder ({what}); name the deck itself")
+        raise DeckError(f"{folder}: no main deck in this folder ({what}); give the deck itself")
     return found
 
 

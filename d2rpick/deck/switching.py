@@ -173,7 +173,7 @@ def _automatic(card: Card) -> SwitchSet:
         lost = "; is the second line (NRBF to OFFSET) missing?" if short else ""
         problem = f"D2R and R2D are 0, so the card switches nothing{lost}"
     elif any(row.blank for row in lines):
-        problem = "an empty line stands where a part was expected"
+        problem = "a line is empty where a part was expected"
     rigid, deformable = max(rigid, 0), max(deformable, 0)
     switched = [_line(card, row, to_rigid=True, ptype=True) for row in lines[:rigid] if not row.blank]
     back = lines[rigid : rigid + deformable]
@@ -250,7 +250,7 @@ def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
     by_set = kind.value == "PSET"
     part = _moved(card.integer(row, 0), card.transform.set_ if by_set else card.transform.part)
     if not part.problem and part.value <= 0:
-        part = Value(0, part.field, f"{part.field.text!r} is no part id, a positive number was expected")
+        part = Value(0, part.field, f"{part.field.text!r} is not a part id; a positive number was expected")
     lead = _moved(card.integer(row, 1), card.transform.part) if to_rigid else None
     return Switched(part, by_set, to_rigid, lead), kind
 

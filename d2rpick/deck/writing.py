@@ -61,10 +61,10 @@ def write_deck(main: str, card: PrintedCard, folder: str, *, overwrite: bool = F
     try:
         place.mkdir(parents=True, exist_ok=True)
         if place.samefile(Path(main).parent):
-            raise DeckError(f"{folder}: this is the folder of the deck; name another one")
+            raise DeckError(f"{folder}: this is the folder of the deck; choose another one")
         for name in files:
             if (place / name).exists() and not overwrite:
-                raise DeckError(f"{place / name}: the file exists; name another folder, or let it be replaced")
+                raise DeckError(f"{place / name}: the file exists; choose another folder, or let it be replaced")
         for name, content in files.items():
             _put(place / name, content)
     except OSError as error:
@@ -86,7 +86,7 @@ def _put(path: Path, content: bytes) -> None:
 def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     deck, printed = read_deck(main), read_deck("the card", card.text.encode())
     if len(card.files) != 1 or not read_switching(printed):
-        raise DeckError(f"{main}: an LS-DYNA deck, but the card is one for another solver")
+        raise DeckError(f"{main}: an LS-DYNA deck, but the cards are for another solver")
     _refuse_switched(deck, printed)
     ((name, text),) = card.files.items()
     if deck.long:
@@ -132,9 +132,7 @@ def _copies(files: Sequence[str], main: str, taken: set[str]) -> Iterator[tuple[
         relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100
         if not relative.startswith(os.pardir):
             if relative in taken:
-                raise DeckError(
-                    f"{file}: the deck includes a file of the name {relative!r}, that of the cards; rename it"
-                )
+                raise DeckError(f"{file}: the deck includes a file with the name of the cards, {relative!r}; rename it")
             yield relative, Path(file).read_bytes()
         elif os.path.normpath(file) != file or not Path(file).is_absolute():
             raise DeckError(f"{file}: included from outside the folder of the deck by a relative path; copy it there")
@@ -144,7 +142,7 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     run = radioss.read_run(main)
     printed = [leg for text in card.files.values() for leg in read_legs(SourceFile("the card", text.encode()))]
     if not printed:
-        raise DeckError(f"{main}: a Radioss run, but the card is one for another solver")
+        raise DeckError(f"{main}: a Radioss run, but the cards are for another solver")
     if run.starter is None or len(run.legs) != 1:
         found = "no starter deck" if run.starter is None else f"{len(run.legs)} engine files"
         raise DeckError(f"{main}: the run has {found}; its starter deck and one engine file were expected")
@@ -161,9 +159,7 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 def _refuse_other_run(leg: Leg, printed: Sequence[Leg]) -> None:
     if printed[0].name != leg.name:
-        raise DeckError(
-            f"the card is one for run {printed[0].name!r}, the run is {leg.name!r}; print it with that name"
-        )
+        raise DeckError(f"the cards are for run {printed[0].name!r}, the run is {leg.name!r}; print it with that name")
     nodes = {node.value for one in printed for _, _, ids in one.switched for node in ids}
     for card, rigid, ids in leg.switched:
         if rigid and (known := nodes & {node.value for node in ids}):

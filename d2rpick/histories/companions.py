@@ -52,7 +52,7 @@ def check_legs(legs: Sequence[Database]) -> None:
             if values and not _alike(*values):
                 raise FormatError(
                     f"{one.source} and {other.source} have different energies at the same times, legs of one run were "
-                    "expected; name the files of one run"
+                    "expected; give the files of one run"
                 )
 
 
@@ -68,7 +68,7 @@ def doubts(databases: Sequence[Legs]) -> Iterator[str]:
         if shared < _FEWEST * coarse.size:
             yield (
                 f"{one.source} and {other.source} have only {shared} of {coarse.size} states at the same times; "
-                "are they of one run?"
+                "are they from the same run?"
             )
 
 

@@ -204,7 +204,7 @@ class OnDisk(Content):
             return
         if now.size < self._size or not self._is_as_before():
             raise FormatError(
-                f"{self._name}: the file was written anew while it was read; read it again when it is whole"
+                f"{self._name}: the file was rewritten while it was read; read it again when it is complete"
             )
         self._seen = now
 
@@ -238,7 +238,7 @@ def stored(name: str) -> bytes | OnDisk:
             file.seek(0)
             if file.read(len(data)) == data:
                 return data
-    raise FormatError(f"{name}: the file changes all the time while it is read; read it again when it is whole")
+    raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
 
 
 class _State(NamedTuple):

@@ -179,7 +179,7 @@ class Legs:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and what was left out between them."""
-        notes = [f"{name}: the packed data ends early; what it holds up to there was read" for name in self._cut]
+        notes = [f"{name}: the packed data ends early; it was read up to there" for name in self._cut]
         notes += [note for leg in self._files for note in leg.notes]
         if self._passing:
             notes.append(f"{self.source}: only some legs have part {listing(self._passing)}, which was left out")
@@ -243,7 +243,7 @@ class Legs:
             if back > 1 and back > _MOST_BACK * steps:
                 raise FormatError(
                     f"{leg.source}: time steps back at {back} of {steps} states, increasing times were expected; "
-                    "check that this is the time (--time) and the file is not damaged"
+                    "check that this is the time (`time`) and the file is not damaged"
                 )
         keep, notes = newest_states(np.concatenate(times))
         behind = np.cumsum([time.size for time in times])

@@ -73,7 +73,7 @@ class Part:
 class Momenta:
     """Momentum of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); None for parts: the whole model.
 
-    ``precision`` is that of the printed numbers; ``chosen`` are the indices of the parts to be switched, ``flying``
+    ``precision`` is that of the printed numbers; ``chosen`` are the indices of the parts to switch, ``flying``
     those of the set that is known to fly together, if it is.
     """
 
@@ -152,7 +152,7 @@ NO_EVIDENCE = Given()
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Internal energy of the parts to be switched, over time, in the run's own consistent units.
+    """Internal energy of the parts to switch, over time, in the run's own consistent units.
 
     ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.
     Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
@@ -300,12 +300,13 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     keep = np.append(time[:-1] < later[1:], np.ones(min(1, time.size), dtype=bool))
     notes = []
     if equal:
-        notes.append(f"{equal} states have the same printed time as the next one; of equal times the last counts")
+        notes.append(f"{equal} states have the same printed time as the next one; the last of equal times counts")
     if back:
         steps = "once" if back == 1 else f"{back} times"
         lost = int(np.count_nonzero(~keep)) - equal
         notes.append(
-            f"time steps back {steps} (restart); where legs overlap the newer one counts, {lost} older states gave way"
+            f"time steps back {steps} (restart); where legs overlap the newer one counts, "
+            f"{lost} older states were dropped"
         )
     return keep, tuple(notes)
 

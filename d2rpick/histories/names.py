@@ -51,9 +51,11 @@ QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
     "contact_energy": frozenset(
         {"contactenergy", "slidinginterfaceenergy", "slidingenergy", "slidinginterface", "sliding", "contacte"}
     ),
+    "frictional_contact_energy": frozenset({"frictionalcontactenergy"}),
     "hourglass_energy": frozenset({"hourglassenergy", "hourglasse", "hourglass", "hgeng", "allae"}),
     "damping_energy": frozenset({"dampingenergy", "systemdampingenergy", "systemdamping"}),
     "eroded_internal_energy": frozenset({"erodedinternalenergy", "erodedinternal"}),
+    "energy_ratio": frozenset({"totalenergyinitialenergy", "energyratio"}),
     "x_momentum": frozenset({"xmomentum", "momentumx", "xmom", "px"}),
     "y_momentum": frozenset({"ymomentum", "momentumy", "ymom", "py"}),
     "z_momentum": frozenset({"zmomentum", "momentumz", "zmom", "pz"}),
@@ -158,7 +160,7 @@ def quantity_note(channel: str) -> tuple[str, ...]:
     word = _OTHER.search(channel)
     if not word:
         return ()
-    return (f"{channel!r} is no internal energy by its name ({word[0]}); it was taken as it is",)
+    return (f"{channel!r} is not an internal energy by its name ({word[0]}); it was used as it is",)
 
 
 def refuse_other_quantity(channel: str, where: str) -> None:
@@ -166,8 +168,8 @@ def refuse_other_quantity(channel: str, where: str) -> None:
     word = _OTHER.search(channel)
     if word:
         raise FormatError(
-            f"{where}: the only values are {channel!r}, by this name no internal energy ({word[0]}); "
-            "choose with --energy what to take for it"
+            f"{where}: the only values are {channel!r}, by its name not an internal energy ({word[0]}); "
+            "choose with `energy` what to take for it"
         )
 
 

@@ -114,7 +114,7 @@ def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) ->
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
     """Refuse ``--time`` where it would be passed over: solvers have one time and call it so."""
     if time is not None and time.strip().casefold() != "time" and not {"csv", "hdf5"} & {*kinds}:
-        raise FormatError(f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave --time out")
+        raise FormatError(f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave `time` out")
 
 
 def _format(source: Source) -> str:

@@ -67,7 +67,7 @@ class Run:
     def momenta(self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> tuple[Momenta, ...]:
         """Give the momentum of the parts and that of the whole model, as far as they are written.
 
-        ``chosen`` are the parts to be switched (None: all), ``flying`` those known to fly together, if they are.
+        ``chosen`` are the parts to switch (None: all), ``flying`` those known to fly together, if they are.
         """
         of_parts, of_whole = self._part_momenta, self._whole_momentum
         if of_parts and of_parts.parts:
@@ -136,9 +136,7 @@ class Run:
 
     def _energy(self, selection: Selection) -> History:
         if all(database.span is None for database in self.databases):
-            raise FormatError(
-                f"{self.name}: no states, a history has at least one; did the run get to its first output?"
-            )
+            raise FormatError(f"{self.name}: no states; did the run reach its first output?")
         if selection.parts:
             return self._of_parts(select_parts(selection.parts, self._holder().parts, self.name))
         if selection.energy:
@@ -163,7 +161,7 @@ class Run:
         holder = self._holder()
         energies = self.part_energies(chosen)
         idle = [part for part, energy in zip(chosen, energies.T, strict=True) if not energy.any()]
-        notes = (f"never any internal energy: part {menu(idle)}; rigid, or without elements?",) if idle else ()
+        notes = (f"without any internal energy: part {menu(idle)}; rigid, or without elements?",) if idle else ()
         channel = "internal energy of " + ", ".join(part.title or f"part {part.id}" for part in chosen)
         names = [part.title or f"part {part.id}" for part in chosen]
         history = self._made(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
@@ -172,15 +170,17 @@ class Run:
     def _of_all_parts(self) -> History:
         if not self.parts:
             there = listing([name for database in self.databases for name in database.channels])
-            raise FormatError(f"{self.name}: no internal energy; choose with --energy: {there or 'there is nothing'}")
+            raise FormatError(
+                f"{self.name}: no internal energy; choose with `energy`: {there or 'there are no channels'}"
+            )
         every = self._of_parts(self.parts)
-        note = "the energies of all parts were added, those that stay deformable among them; choose with --part"
+        note = "the energies of all parts were added, those that stay deformable among them; choose with `parts`"
         return replace(every, channel="internal energy of all parts", parts=None, notes=(*every.notes, note))
 
     def _of_channels(self, wanted: Sequence[str]) -> History:
         database, names = self._holding(wanted)
         if len(set(names)) < len(names):
-            raise FormatError(f"{self.name}: an energy is asked for twice; name each once")
+            raise FormatError(f"{self.name}: an energy is given twice; name each once")
         columns = [database.channel(name) for name in names]
         channel = " + ".join(names)
         notes = quantity_note(channel)

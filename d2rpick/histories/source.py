@@ -72,7 +72,7 @@ def open_source(name: str) -> Source:
     data = _read_stdin() if name == STDIN else _read_file(name)
     source = _unpacked(name, data) if data[:2] == _GZIP else Source(name, data)
     if not source.data:
-        raise FormatError(f"{name}: the file is empty, an energy history was expected; was the run started?")
+        raise FormatError(f"{name}: the file is empty; has the run been started?")
     return source
 
 
@@ -92,7 +92,7 @@ def _files(name: str) -> Sequence[str]:
     if any(sign in name for sign in "*?["):
         found = sorted(str(file) for file in Path(path.anchor).glob(name.removeprefix(path.anchor)) if file.is_file())
         if not found:
-            raise FormatError(f"{name}: no file has such a name; check the folder")
+            raise FormatError(f"{name}: no file matches; check the name and the folder")
         return found
     return [name]
 
@@ -101,7 +101,7 @@ def _databases(folder: Path) -> list[str]:
     matches = {file: _DATABASE.fullmatch(file.name) for file in sorted(folder.iterdir()) if file.is_file()}
     found = {file: match["root"] for file, match in matches.items() if match}
     if not found:
-        raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; name the file")
+        raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; give the file")
     runs = sorted({"one of LS-DYNA" if root is None else f"{root}T01" for root in found.values()})
     if len(runs) > 1:
         raise FormatError(
@@ -113,11 +113,11 @@ def _databases(folder: Path) -> list[str]:
 
 def _read_stdin() -> bytes:
     if sys.stdin is None:
-        raise FormatError(f"{STDIN}: standard input is closed; name a file")
+        raise FormatError(f"{STDIN}: standard input is closed; give a file")
     try:
         return sys.stdin.buffer.read()
     except OSError as error:
-        raise FormatError(f"{STDIN}: standard input cannot be read ({error.strerror}); name a file") from None
+        raise FormatError(f"{STDIN}: standard input cannot be read ({error.strerror}); give a file") from None
 
 
 def _read_file(name: str) -> bytes | OnDisk:
@@ -142,7 +142,7 @@ def _unpacked(name: str, packed: bytes | OnDisk) -> Source:
             cut, rest = not unpacker.eof, unpacker.unused_data
         data = found[0] if len(found) == 1 else b"".join(found)
     except zlib.error as error:
-        raise FormatError(f"{name}: gzip data that cannot be unpacked ({error}); copy the file again") from None
+        raise FormatError(f"{name}: damaged gzip data ({error}); copy the file again") from None
     except MemoryError:
-        raise FormatError(f"{name}: what is packed in it does not fit into memory; unpack it with gunzip") from None
+        raise FormatError(f"{name}: its unpacked data do not fit into memory; unpack it with gunzip") from None
     return Source(name, data, cut, packed)

@@ -37,5 +37,5 @@ def format_of(name: str | None, formats: Sequence[str]) -> str:
     by_name = next((form for form in ("glstat", "matsum") if form in path.name), None)
     asked = _SUFFIXES.get(path.suffix[1:], by_name)
     if asked not in formats:
-        raise FormatError(f"{printable(name)}: the name tells no format; give --write-as {', '.join(formats)}")
+        raise FormatError(f"{printable(name)}: the suffix names no format; give `write_as`: {', '.join(formats)}")
     return str(asked)

@@ -216,7 +216,7 @@ def suggest(
         What flies together with them.
     **choosing
         How to choose, see `Choosing`: ``after``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``,
-        ``oscillator`` with ``v0``, ``fit_window``, ``replay``, ``cost_share``, ``step_ratio``.
+        ``oscillator`` with ``v0``, ``fit_window``, ``replay``, ``strict``, ``cost_share``, ``step_ratio``.
 
     Returns
     -------

@@ -25,8 +25,9 @@ class Choosing(TypedDict, total=False):
     the next contact (0).  ``tolerance``: on the lock-in error, on the level error where no oscillator is known (0.2).
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: given instead of
     identified, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the oscillator
-    is identified there only.  ``replay`` False: judge by the energy level alone.  ``cost_share``, ``step_ratio``: of
-    the switched parts in the cost of a step, and of the step while rigid to that while deformable.
+    is identified there only.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr where the
+    energy alone shows when the load is over.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a
+    step, and of the step while rigid to that while deformable.
     """
 
     after: float | None
@@ -38,6 +39,7 @@ class Choosing(TypedDict, total=False):
     v0: float | None
     fit_window: tuple[float, float] | None
     replay: bool
+    strict: bool
     cost_share: float | None
     step_ratio: float
 
@@ -46,7 +48,7 @@ class Choosing(TypedDict, total=False):
 _LIMITS = {
     "after": (-math.inf, math.inf),
     "margin": (0.0, math.inf),
-    "tolerance": (0.0, math.inf),
+    "tolerance": (0.0, 1.0),
     "max_kinetic_share": (0.0, math.inf),
     "max_residual": (0.0, math.inf),
     "v0": (-math.inf, math.inf),
@@ -110,7 +112,7 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
         if isinstance(one, bool) or not (isinstance(one, str) or hasattr(one, "__index__")):
             raise TypeError(f"{name} holds {one!r}; numbers and titles of parts were expected")
     if not listed:
-        raise ValueError(f"{name} is empty; name a part, or leave {name} out")
+        raise ValueError(f"{name} is empty; give a part, or leave {name} out")
     return tuple(str(one) for one in listed)
 
 
@@ -127,7 +129,7 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
         if not isinstance(one, str | os.PathLike):
             raise TypeError(f"{name} holds {one!r}; paths were expected")
     if not listed:
-        raise ValueError(f"{name} is empty; name a file or folder")
+        raise ValueError(f"{name} is empty; give a file or folder")
     return tuple(os.fsdecode(one) for one in listed)
 
 
@@ -153,7 +155,7 @@ def settings(choosing: Choosing) -> Settings:
     if len(chosen) > 1:
         raise ValueError(f"{chosen[0]} and {chosen[1]} exclude each other")
     if "step_ratio" in given and given.get("cost_share") is None:
-        raise ValueError("step_ratio needs cost_share too: together they tell the run time")
+        raise ValueError("step_ratio needs cost_share too: the run time needs both")
     return Settings(**given, oscillator=to_mode(oscillator, v0) if oscillator else None)
 
 

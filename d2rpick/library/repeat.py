@@ -37,6 +37,8 @@ def _options(choosing: Choosing) -> Iterator[str]:
     for name, value in choosing.items():
         if name == "replay":
             yield from ("--no-verify",) * (not value)
+        elif name == "strict":
+            yield from ("--strict",) * bool(value)
         elif name == "oscillator" and value is not None:
             yield from _oscillator(value)  # type: ignore[arg-type]  # the values of a TypedDict are objects
         elif name == "fit_window" and value is not None:

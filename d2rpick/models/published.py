@@ -110,7 +110,7 @@ def _rows() -> Iterator[Row]:
     td, better = PUBLISHED[1], better_pair()
     yield Row(
         "tr with the energy of td = 64 ms", "ms", 13.0, None, 1e3 * _matching(td), 0.5,
-        "the paper, read off its plot to a millisecond",
+        "the paper, read from its plot to a millisecond",
     )  # fmt: skip
     yield _exact("the same, sign matched", "ms", 12.8852793630525, 1e3 * _matching(td))
     yield _exact("omega_2", "rad/s", 249.86461302226118, OSCILLATOR.omega_2)

@@ -151,12 +151,21 @@ def _level() -> Exhibit:
     panels = (
         (
             Panel("crossings of the level", "energy [J]", curve, None, levels, points=points, span=(0.0, 70.0)),
-            Panel("tr read off and computed", "energy [J]", curve, None, levels, marks, points, span=(12.0, 13.6)),
+            Panel(
+                "tr as read and as computed",
+                "energy [J]",
+                curve,
+                None,
+                levels,
+                marks,
+                points,
+                span=(12.0, 13.6),
+            ),
         ),
     )
     return Exhibit(
         "level", "Energy level at td and its crossings", 4, "7a",
-        "The level of the internal energy at td = 64 ms, and tr = 13 ms read off.",
+        "The level of the internal energy at td = 64 ms, and tr = 13 ms read from it.",
         f"The level, {level:.4g} J, is crossed {len(crossings)} times before td. The crossing with the sign of the "
         f"deformation at td lies at {1e3 * exact:.3f} ms; at 13 ms the energy is already "
         f"{float(MODE.energy(0.013)):.4g} J.",

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
-from d2rpick import __version__
 from d2rpick.deck.source import STDIN
 from d2rpick.rules import RULES, Severity
 from d2rpick.rules.base import name_units
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick import __version__
 from d2rpick.choice.health import cautions_of_health
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.health import HEAD as HEALTH_HEAD
 from d2rpick.report.health import measures_of
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

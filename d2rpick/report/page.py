@@ -91,32 +91,32 @@ def evidence(situation: Situation, health: Health | None, record: Record) -> Ite
 
 def solver_input(situation: Situation, times: tuple[float, float], record: Record) -> Markup:
     """Give the solver's card where it is known whom it switches, else the command that prints it."""
-    history, title = situation.history, "For the solver's input"
+    history, title = situation.history, "Solver input"
     try:
         found = judged_card([times], history, lambda tr, td: verify_at(situation.at(td), tr), record.request)
     except D2RPickError as error:
-        return section(title, tag("p", f"There is no card for these times: {error}"))
+        return section(title, tag("p", f"No card can be printed for these times: {error}"))
     if found:
         return section(title, tag("pre", found[0].text))
     solver, _ = record.request.of(history)
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += [] if solver == DEFAULT else ["--solver", solver]
     line = tag("pre", shlex.join([*command, f"--{SOLVERS[solver].SWITCHES}", "IDS", *record.judging]), class_="wrap")
-    return section(title, tag("p", "Printed, and judged once more as printed, by"), line)
+    return section(title, tag("p", "Printed, and judged again as printed, by"), line)
 
 
 def _read(situation: Situation, run: Run) -> Markup:
     listed = [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in heading(situation)]
     listed += digests(run.files)
     listed += [(f"{database.format} by", database.version) for database in run.databases if database.version]
-    whole = "the files end behind a whole state" if situation.history.complete else "only whole states were used"
+    whole = "the files end after a complete state" if situation.history.complete else "only complete states were used"
     listed += [("complete", whole)]
     return pairs(listed + [("note", note) for note in situation.history.notes])
 
 
 def _health(health: Health | None) -> Iterator[Markup]:
     if health is None or not any(one.value for one in measures_of(health)):
-        yield tag("p", "The files hold no energies that tell it.")
+        yield tag("p", "The files do not hold the energies this needs.")
         return
     verdicts = {True: tag("span", "kept", class_="good"), False: tag("span", "exceeded", class_="bad"), None: "-"}
     listed = [(one.what, one.value or "not written", one.limit, verdicts[one.good]) for one in measures_of(health)]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from d2rpick import __version__
 from d2rpick.models.published import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, better_pair, residual
 from d2rpick.report import tables
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,7 +40,7 @@ def as_markdown(rows: Sequence[Row], exhibits: Sequence[Exhibit], *, pictures: b
             f"Here: {one.found}",
             f"Agrees: {verdict(one)}.",
         ]
-    blocks += ["## Published and here", tables.as_markdown(HEAD, [cells(row) for row in rows]), *pairs_of()]
+    blocks += ["## Published and computed values", tables.as_markdown(HEAD, [cells(row) for row in rows]), *pairs_of()]
     blocks += ["## Misprints in the paper", "\n".join(f"* {misprint}" for misprint in MISPRINTS)]
     return "\n\n".join(blocks)
 

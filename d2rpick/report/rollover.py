@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING
 
-from d2rpick import __version__
 from d2rpick.models.rollover.record import BOX
 from d2rpick.models.rollover.scan import Outcome
 from d2rpick.report import tables
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

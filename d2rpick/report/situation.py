@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from d2rpick import __version__
 from d2rpick.errors import printable
 from d2rpick.report import keys
 from d2rpick.report.tables import measure
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -31,7 +31,7 @@ def heading(situation: Situation) -> list[str]:
     if flight.start is None:
         lines.append("flight   unknown")
     else:
-        end = "no next contact seen" if flight.end is None else f"to {flight.end:.6g}"
+        end = "no next contact found" if flight.end is None else f"to {flight.end:.6g}"
         who = f" of {', '.join(part.title or str(part.id) for part in flight.parts)}" if flight.parts else ""
         lines.append(f"flight   from {flight.start:.6g} ({_source(flight)}{who}), {end}")
     return [printable(line) for line in lines]
@@ -46,7 +46,7 @@ def _basis(situation: Situation) -> str:
     fit, vibration = situation.evidence.fit, situation.vibration
     mode, parts = vibration.mode, f"parts, signs of {', '.join(vibration.signed)}" if vibration.signed else ""
     if not (mode and fit):
-        return f"{parts}; vibration energy estimated by the envelope of the energy" if parts else vibration.basis
+        return f"{parts}; vibration energy estimated from the envelope of the energy" if parts else vibration.basis
     rates = ", ".join(f"{one.omega:.6g}" for one in mode.modes)
     facts = [f"omega {rates}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
@@ -56,7 +56,7 @@ def _basis(situation: Situation) -> str:
     count = len(mode.modes)
     oscillator = f"oscillator, {source}" if count == 1 else f"oscillator of {count} modes, {source}"
     front = f"{parts}; " if parts else ""
-    return f"{front}{oscillator}: {', '.join(facts)}; tr and energies are its"
+    return f"{front}{oscillator}: {', '.join(facts)}; tr and energies are refined on it"
 
 
 def frame(situation: Situation, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
@@ -118,7 +118,7 @@ def _oscillator(situation: Situation) -> dict[str, Any] | None:
         "misfit": fit.misfit,
         "source": "given" if situation.settings.oscillator else "identified",
         "describes_record": fit.describes_record and not several,
-        "reason": "the sum of several modes describes the record" if several else fit.reason,
+        "reason": "several modes describe the record" if several else fit.reason,
     }
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from d2rpick import __version__
 from d2rpick.errors import printable
 from d2rpick.report import tables
 from d2rpick.studies.resume_file import PLAIN, plain
 from d2rpick.studies.study import runs_of
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,7 +72,7 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
     found = "none"
     if spread:
         found = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}; "
-        found += "the intervals have a time in common" if answer.agree else "the intervals have no time in common"
+        found += "the intervals overlap" if answer.agree else "the intervals do not overlap"
     shared = f"none: {common.reason}"
     if common.tr is not None and common.window:
         low, high = common.window

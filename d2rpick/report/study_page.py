@@ -33,7 +33,7 @@ def as_page(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> 
 
 def _sections(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> Iterator[Markup]:
     yield tag("section", _common(answer), remarks(answer.cautions), pairs(outcome(answer)))
-    yield drawings({"Internal energies over each other, with the tr of each run, the common one and td": drawing})
+    yield drawings({"Internal energies of all runs, with the tr of each, the common one and td": drawing})
     yield section("Runs", table("Runs", [name.replace("+-", "\u00b1") for name in HEAD], rows(answer)))
     yield section("Files", tag("pre", _files(answer), class_="wrap"))
     yield section("Method and limits", resource("method.html"))
@@ -43,11 +43,11 @@ def _sections(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -
 def _common(answer: Study) -> Markup:
     tr = answer.common.tr
     if tr is None:
-        text = tag("p", "There is none: ", answer.common.reason or "")
+        text = tag("p", "None: ", answer.common.reason or "")
         return tag("div", tag("div", tag("h2", "One tr for all runs"), text, class_="card"), class_="choice")
     times = (tag("span", tag("i", name), f"{time:.6g}") for name, time in (("tr", tr), ("td", answer.td)))
     exact = f"in full: tr = {tr!r}, td = {answer.td!r}"
-    rule = "Acceptable in every run that was judged, by the rule of d2rpick verify."
+    rule = "Acceptable by the rules of d2rpick verify in every run that was judged."
     lines = (tag("div", *times, class_="times"), tag("p", rule), tag("p", exact, class_="soft"))
     return tag("div", tag("div", tag("h2", "One tr for all runs"), *lines, class_="card chosen"), class_="choice")
 

@@ -64,7 +64,7 @@ def _pair(answer: Suggestion, title: str, pair: Pair, class_: str) -> Markup:
 
 def _candidates(answer: Suggestion) -> Iterator[Markup]:
     if not answer.candidates:
-        yield tag("p", "There are none.")
+        yield tag("p", "None.")
         return
     shown = answer.candidates[:_MOST_ROWS]
     marked = next((i for i, candidate in enumerate(shown) if candidate.recommended), None)
@@ -72,4 +72,4 @@ def _candidates(answer: Suggestion) -> Iterator[Markup]:
     yield table("Candidates", head, [row[1:] for row in rows(answer, _MOST_ROWS)], marked)
     left = len(answer.candidates) - len(shown)
     if left:
-        yield tag("p", f"{left} more in the results as csv or json.", class_="soft")
+        yield tag("p", f"{left} more in the csv and json results.", class_="soft")

@@ -78,8 +78,8 @@ def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
 def deviations(switched: Comparison) -> list[tuple[str, str]]:
     """How far the switched run moves off the reference after td."""
     error, displacement = switched.momentum_error, switched.displacement
-    off = "not in both runs" if error is None else f"{error:.2g} of its largest"
-    moved = "not in both runs" if displacement is None else f"{displacement:.3g}"
+    off = "not available in both runs" if error is None else f"{error:.2g} of its maximum"
+    moved = "not available in both runs" if displacement is None else f"{displacement:.3g}"
     return [("largest error of the momentum after td", off), ("largest displacement after td", moved)]
 
 

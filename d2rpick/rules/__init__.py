@@ -151,4 +151,4 @@ def _remarks(deck: Deck) -> Iterator[str]:
         for name in card.block.silenced:
             if not (name.startswith("D2R") and any(rule.startswith(name) for rule in RULES)):
                 where = f"{card.file}: the comment before line {card.line}"
-                yield f"{where} ignores no rule: {name!r} was found, {expected_instead(name, RULES)}"
+                yield f"{where} does not name a rule to ignore: {name!r} was found, {expected_instead(name, RULES)}"

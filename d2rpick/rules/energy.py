@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.rules.base import BOTH, Example, Rule, Severity, name_units
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, automatic
-from d2rpick.rules.formats import factor_of, told
+from d2rpick.rules.formats import factor_of, mistaken
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -60,7 +60,7 @@ def _thousand(case: Case) -> Iterator[Objection]:
     factor = factor_of(times, case.judge.end)
     if factor != 1:
         found = f"the switching times reach {max(times):g} but the history ends at {case.judge.end:g}"
-        yield windows[0].opened.by.time_field, f"{found}, {told(factor)} give both in the same unit"
+        yield windows[0].opened.by.time_field, f"{found}, {mistaken(factor)} give both in the same unit"
 
 
 _HISTORY: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
@@ -79,7 +79,7 @@ RULES: Final = (
         "D2R201",
         Severity.ERROR,
         "the error of the locked-in energy is above --tolerance",
-        "While a part is rigid it keeps the deformation it had at tr, and releases it at td. The deformation "
+        "While a part is rigid it keeps the deformation it had at tr; it springs back at td. The deformation "
         "should be the one it would have had at td: same energy, same sign. Judged as d2rpick verify does, "
         "for the parts that share a window together, else by the energy of the whole model: by the lock-in "
         "error where an oscillator describes the record, else by the level error.",
@@ -116,8 +116,8 @@ RULES: Final = (
         Severity.ERROR,
         "tr before the load is over, or td after the next contact",
         "Before the load is over equal energy is an accident and the motion comes out wrong; after the next "
-        "contact the part should have deformed. When the flight begins and ends is read off the momentum or "
-        "the energy of the history, or given with --after. A history that does not tell is an objection too.",
+        "contact the part should have deformed. When the flight begins and ends is found from the momentum or "
+        "the energy of the history, or given with --after. A history that does not show it is an objection too.",
         partial(_faults, "D2R204"),
         _PASSING,
         (_pair(*_GOOD_PAIR, "--after 0.03"),),
@@ -127,7 +127,7 @@ RULES: Final = (
         "D2R205",
         Severity.ERROR,
         "tr or td outside the reference history",
-        "Nothing is known of the energy at such a time; nor for a part that the history does not have.",
+        "The energy at such a time is unknown, and so is that of a part that the history does not have.",
         partial(_faults, "D2R205"),
         _PASSING,
         (_pair(".0135867", "0.16"),),

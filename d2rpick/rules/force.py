@@ -40,7 +40,7 @@ def _there(case: Case) -> Iterator[Objection]:
             if entities.named(header.entno.value) is None:
                 there = f"has {_listed(entities)}" if entities.found else "has none"
                 found = f"ENTNO is {header.entno.value}, but no {what} has this number: the deck {there}"
-                yield header.entno.field, f"{found}; the switch never comes: name one of them"
+                yield header.entno.field, f"{found}; the switch never comes: give the number of one of them"
 
 
 def _able(case: Case) -> Iterator[Objection]:
@@ -52,7 +52,7 @@ def _able(case: Case) -> Iterator[Objection]:
             others = [one for one in entities.found if _triggers(one)]
             able = f" (here: {_listed(entities._replace(found=tuple(others)))})" if others else ""
             found = f"ENTNO {header.entno.value} is *{named.keyword}, whose force triggers no switch"
-            yield header.entno.field, f"{found}; name a surface-to-surface or nodes-to-surface contact{able}"
+            yield header.entno.field, f"{found}; choose a surface-to-surface or nodes-to-surface contact{able}"
 
 
 def _triggers(contact: Entity) -> bool:
@@ -73,7 +73,7 @@ def _delay(case: Case) -> Iterator[Objection]:
             yield (
                 header.time3.field,
                 (
-                    f"TIME3 is 0 with CODE {header.code.value}: the parts may switch to and fro in every contact; "
+                    f"TIME3 is 0 with CODE {header.code.value}: the parts may switch back and forth in every contact; "
                     "set it to a time in which the contact settles"
                 ),
             )
@@ -85,7 +85,7 @@ def _unnamed(case: Case) -> Iterator[Objection]:
             what = "a contact" if header.code.value in _OF_CONTACT else "a rigid wall"
             yield (
                 header.entno.field,
-                f"ENTNO is 0 with CODE {header.code.value}, which waits for the force of {what}; name it",
+                f"ENTNO is 0 with CODE {header.code.value}, which waits for the force of {what}; give its number",
             )
 
 

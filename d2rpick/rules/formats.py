@@ -51,7 +51,7 @@ def factor_of(times: list[float], end: float) -> float:
     return 1 / THOUSAND if latest > 0 and end / 50 <= THOUSAND * latest < end else 1.0
 
 
-def told(factor: float) -> str:
+def mistaken(factor: float) -> str:
     """Say which units seem to be mixed."""
     way = ("later", "milliseconds for seconds") if factor > 1 else ("earlier", "seconds for milliseconds")
     return f"about 1000 times {way[0]}: {way[1]}?"
@@ -64,7 +64,7 @@ def _thousand(case: Case) -> Iterator[Objection]:
     factor = factor_of([time for time in times if time > 0], case.end)
     if factor != 1:
         found = f"the switching times reach {max(times):g} but the run ends at {case.end:g} (ENDTIM)"
-        yield _timed(case)[0][1].time1.field, f"{found}, {told(factor)} give both in the same unit"
+        yield _timed(case)[0][1].time1.field, f"{found}, {mistaken(factor)} give both in the same unit"
 
 
 def _pair(tr: str, td: str, more: str = "") -> Example:
@@ -79,7 +79,7 @@ RULES: Final = (
         Severity.ERROR,
         "all switching times are equal (decimals lost in writing)",
         "Writers with one decimal make 0.0 of every time below 0.05, and 0.1 of 0.07 and 0.13. Cards that make parts "
-        "rigid and cards that make them deformable, all at one time, are the trace of it. Source: a public drop tool "
+        "rigid and cards that make them deformable, all at one time, are a sign of it. Source: a public drop tool "
         "wrote such decks.",
         _equal,
         (Example(GOOD), Example(HEAD + PARTS + THERE + automatic(3, "0.02", rigid=["2"]) + END)),
@@ -93,7 +93,7 @@ RULES: Final = (
         Severity.WARNING,
         "the switching times are about 1000 times the termination time, or a thousandth of it",
         "Seconds and milliseconds are mixed: the times would lie in the run if they were divided, or multiplied, by "
-        "1000, and do not, or only in its first 1/1000. D2R101 tells of times after the end too. Files name no "
+        "1000, and do not, or only in its first 1/1000. D2R101 reports times after the end too. Files name no "
         "units, so this is a guess by size.",
         _thousand,
         (Example(GOOD), Example(THERE + BACK)),

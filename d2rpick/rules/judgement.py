@@ -84,15 +84,15 @@ class HistoryJudge:
         td = window.td if window.td is not None and window.td > window.tr else None
         known = self._known
         if known and window.part is not None and window.part not in known:
-            there = name_units(known)
-            return (Fault("D2R205", False, f"not in the history, which has {there}; renumbered, or not written?"),)
+            what = f"not in the history, which has {name_units(known)}; was it renumbered, or not written?"
+            return (Fault("D2R205", False, what),)
         parts = () if window.part is None else tuple(part for part in known if part in {*together})
         key = parts, window.tr, td
         if key not in self._faults:
             if known and not parts:
                 which = "members" if window.unit.is_set else "parts"
                 who = f"the {which} of {window.unit.kind} {window.unit.id}"
-                what = f"{who} are not known, it is judged by the whole model"
+                what = f"{who} are not known, so it is judged by the whole model"
                 self._cautions[Caution("judged-by-whole", what)] = []
             self._faults[key] = tuple(self._judged(parts, window.tr, td))
         return self._faults[key]
@@ -139,7 +139,7 @@ def faults_of(verdict: Verdict) -> Iterator[Fault]:
         better = find_better_pair(situation)
         way_out = f"better: td = {better.td:.6g} with tr = {better.tr:.6g}" if better else "no better td was found"
         what = f"{situation.kinetic_share:.0%} of the vibration energy is kinetic at td = {situation.td:.6g}"
-        yield Fault("D2R203", True, f"{what} and cannot be kept by any tr; {way_out}")
+        yield Fault("D2R203", True, f"{what} and no tr can keep it; {way_out}")
 
 
 def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]:

@@ -31,7 +31,7 @@ def _counts(case: Case) -> Iterator[Objection]:
 def _fields(case: Case) -> Iterator[Objection]:
     for unknown, near in misspelt(case.deck):
         head = unknown.block.head.strip()
-        yield unknown.here, f"{head!r} is no keyword that switches, so its lines were not read; did you mean {near}?"
+        yield unknown.here, f"{head!r} is not a switching keyword, so its lines were not read; did you mean {near}?"
     for card in case.sets:
         for field, problem in card.problems:
             yield field, f"{problem}; check its columns and its parameters"
@@ -52,7 +52,7 @@ def _unreadable_members(case: Case) -> Iterator[Problem]:
 
 _CURES: Final = {
     "no such file": "add the file or its *INCLUDE_PATH",
-    UNKNOWN_KIND: "check its file by itself",
+    UNKNOWN_KIND: "check that file separately",
 }
 
 
@@ -91,7 +91,7 @@ def _scaled(case: Case) -> Iterator[Objection]:
             yield (
                 card.card.here,
                 (
-                    f"the card stands in an include whose times are multiplied by {factor:g} (FCTTIM); that "
+                    f"the card is in an include whose times are multiplied by {factor:g} (FCTTIM); that "
                     "this holds for switching times is not confirmed: move the card to the main deck"
                 ),
             )
@@ -143,8 +143,8 @@ RULES: Final = (
         Severity.ERROR,
         "a switching keyword, number or &parameter that cannot be read",
         "Fields are 10 columns wide (20 in long format) unless the line has commas. A text in a number's "
-        "columns, or a parameter nobody defines, stops the run or, worse, is read as something else. "
-        "So is a keyword that begins like a switching card but is none. "
+        "columns, or an undefined parameter, stops the run or, worse, is read as something else. "
+        "So is a keyword that begins like a switching card but is not one. "
         "ENDTIM and the DT of *DATABASE_GLSTAT and _MATSUM are looked at too: the switching times are "
         "judged by them.",
         _fields,
@@ -170,7 +170,7 @@ RULES: Final = (
         "Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's "
         "folder. A file that includes itself or cannot be read is reported too; one that a Radioss starter deck "
         "asks for, only where a main node that is switched was not found without it. Switching cards, parts or "
-        "parameters may be in it, so the other findings are not the whole truth.",
+        "parameters may be in it, so the other findings may be incomplete.",
         _includes,
         (Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}),),
         (Example(HEAD + "*INCLUDE\nnowhere.k\n" + END), Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END)),
@@ -189,9 +189,9 @@ RULES: Final = (
     Rule(
         "D2R110",
         Severity.WARNING,
-        "the card stands in a transformed include whose FCTTIM is not 1",
+        "the card is in a transformed include whose FCTTIM is not 1",
         "*INCLUDE_TRANSFORM multiplies the times of a file by FCTTIM (0 means 1). d2rpick applies it to the "
-        "switching times too, but whether the solver does is not confirmed by any source at hand.",
+        "switching times too, but whether the solver does is not confirmed by any source that was available.",
         _scaled,
         (_transformed("1.0"), _transformed("0.0")),
         (_transformed("0.5"),),

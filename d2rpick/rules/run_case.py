@@ -82,7 +82,7 @@ class RunCase(Case):
         starter = self.run.starter
         bodies = starter.bodies if starter else []
         return tuple(
-            (body.node.field, f"rigid body {body.id} is switched by sensor {body.sensor}, which is no time sensor")
+            (body.node.field, f"rigid body {body.id} is switched by sensor {body.sensor}, which is not a time sensor")
             for body in bodies
             if starter and body.sensor and body.sensor not in starter.timed
         )

@@ -28,7 +28,7 @@ def _order(case: Case) -> Iterator[Objection]:
     legs = _switching_legs(case)
     for expected, leg in enumerate(legs, start=1):
         if leg.number != expected:
-            yield leg.run.here, f"leg {leg.number} of the run, leg {expected} was expected; name or write the others"
+            yield leg.run.here, f"leg {leg.number} of the run, leg {expected} was expected; add or write the others"
             break
     for before, leg in pairwise(legs):
         if not leg.stop.problem and not before.stop.problem and leg.stop.value < before.stop.value:
@@ -52,7 +52,7 @@ def _main_nodes(case: Case) -> Iterator[Objection]:
                 mixed = by_id.get(node.value)
                 hint = f"it is the id of rigid body {mixed.id}, whose main node is {mixed.node.value}" if mixed else ""
                 there = ", ".join(map(str, sorted(bodies)[:_MOST_LISTED])) or "none"
-                found = f"{node.value} is not the main node of a rigid body, so it is skipped without a word"
+                found = f"{node.value} is not the main node of a rigid body, so it is skipped without a message"
                 yield node.field, f"{found}; {hint or f'main nodes here: {there}'}"
 
 

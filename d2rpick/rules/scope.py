@@ -47,7 +47,7 @@ def _unread(case: Case) -> Iterator[Objection]:
     for card in unread_elements(case.deck):
         first.setdefault(card.name, card)
     for card in first.values():
-        yield card.here, f"nodes that parts share were not looked for in *{card.name}, whose lines are not followed"
+        yield card.here, f"nodes that parts share were not searched in *{card.name}, whose lines are not followed"
 
 
 def _inertias(case: Case) -> Iterator[Objection]:

@@ -201,7 +201,7 @@ RULES: Final = (
         "D2R103",
         Severity.ERROR,
         "a part switched back that nothing made rigid",
-        "An R2D line for a part that no D2R line made rigid before has nothing to do; usually an id is "
+        "An R2D line for a part that no D2R line made rigid before has no effect; usually an id is "
         "wrong on one of the two cards.",
         _never_rigid,
         (Example(GOOD),),
@@ -250,7 +250,7 @@ RULES: Final = (
         "D2R107",
         Severity.WARNING,
         "a *MAT_RIGID part switched to deformable",
-        "A part with *MAT_RIGID is rigid from the start and has nothing to become. It must be modelled "
+        "A part with *MAT_RIGID is rigid from the start and cannot become deformable. It must be modelled "
         "with its deformable material and made rigid by the card.",
         _always_rigid,
         (Example(GOOD),),

@@ -107,7 +107,7 @@ def _sampling(case: Case) -> Iterator[Objection]:
                 value.field,
                 (
                     f"DT of *{keyword} is {interval:g}, at most {limit:g} was expected ({_INTERVALS} intervals "
-                    "in the shortest rigid window) for its energies to support a switching time; write it "
+                    "in the shortest rigid window) to choose a switching time from its energies; write it "
                     "more often"
                 ),
             )
@@ -157,7 +157,7 @@ RULES: Final = (
         Severity.ERROR,
         "both times of a window are 0 (decimals lost in writing)",
         "Writers that print times with one decimal turn everything below 0.05 into 0.0. Two sets that "
-        "both switch at 0 are the trace of it.",
+        "both switch at 0 are a sign of it.",
         _zero,
         (Example(GOOD), _window("0.0", "0.09")),
         (_window("0.0", "0.0"),),
@@ -167,7 +167,7 @@ RULES: Final = (
         Severity.WARNING,
         "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200",
         "Switching times are chosen by the internal energy of a reference run: glstat holds it for the "
-        "whole run, matsum for every part. Written too seldom, the energy at tr and td is not known well "
+        "whole run, matsum for every part. Written too rarely, the energy at tr and td is not known well "
         "enough. Decks that are only switching cards, and runs with --history, are not judged.",
         _sampling,
         (Example(GOOD), Example(THERE + BACK)),

@@ -89,15 +89,15 @@ class Ledger:
         self._rows: dict[tuple[Stamp, ...], Row] = {}
         self._known: set[tuple[str, ...]] = set()
         if Path(name).exists() and not Path(name).is_file():
-            raise FormatError(f"{name}: cannot be written (not a regular file); name another file")
+            raise FormatError(f"{name}: cannot be written (not a regular file); give another file")
         try:
             with Path(name).open("a+b") as file:  # created, and sure to be writable before the work begins
                 file.seek(0)
                 content = file.read()
         except OSError as error:
-            raise FormatError(f"{name}: cannot be written ({error.strerror or error}); name another file") from None
+            raise FormatError(f"{name}: cannot be written ({error.strerror or error}); give another file") from None
         if content[: len(_FIRST)] != _FIRST[: len(content)]:
-            raise FormatError(f'{name}:1: not a run of a study, which begins with {{"source": ; name another file')
+            raise FormatError(f'{name}:1: not a run of a study, which begins with {{"source": ; give another file')
         for text in content.split(b"\n"):
             if record := _record(text):
                 self._remember(record)
@@ -130,9 +130,9 @@ class Ledger:
 
     def told(self, runs: int) -> str:
         """Say how many of so many runs were taken, and why others that the file holds were not."""
-        outdated = f"; {self.outdated} have changed or were asked for with other options" if self.outdated else ""
-        damaged = f"; lines passed over, damaged or without a checksum: {self.damaged}" if self.damaged else ""
-        return f"{self.taken} of {runs} runs taken from {self.name}{outdated}{damaged}"
+        outdated = f"; {self.outdated} have changed, or were computed with other options" if self.outdated else ""
+        damaged = f"; lines skipped, damaged or without a checksum: {self.damaged}" if self.damaged else ""
+        return f"{self.taken} of {runs} runs reused from {self.name}{outdated}{damaged}"
 
     def add(self, row: Row) -> None:
         """Append the row of a run that was judged; it is in the file when this returns."""

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick import __version__
 from d2rpick.choice.acceptable_windows import acceptable_windows, common_windows, coverage
 from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.warnings import Caution
@@ -19,6 +18,7 @@ from d2rpick.errors import D2RPickError, RangeError
 from d2rpick.histories.names import listing
 from d2rpick.histories.selection import Selection
 from d2rpick.histories.source import expand
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -156,7 +156,9 @@ def ask(question: Question, source: str) -> Row:
         If another version of this program asks.
     """
     if question.tool_version != __version__:
-        raise D2RPickError(f"d2rpick {question.tool_version} asks d2rpick {__version__}; install the same everywhere")
+        raise D2RPickError(
+            f"d2rpick {question.tool_version} asks d2rpick {__version__}; install the same version everywhere"
+        )
     files = stamps(source)
     try:
         reference = read([source], question.selection, question.input_format)
@@ -188,7 +190,7 @@ def failed(source: str, error: BaseException) -> Row:
     """Row of a run whose process did not come back with one."""
     text = " ".join(str(error).split())
     if not isinstance(error, D2RPickError):
-        text = f"a fault of this program, please report it ({type(error).__name__}: {text})"
+        text = f"internal error, please report it ({type(error).__name__}: {text})"
     return Row(source, FAILED, f"{source}: {text}")
 
 
@@ -282,10 +284,14 @@ def _cautions(rows: Sequence[Row]) -> Iterator[Caution]:
     left = [row.source for row in rows if not row.judged]
     if left and judged:
         found = f"{len(left)} of {runs_of(len(rows))} could not be judged"
-        yield Caution("runs-left-out", f"{found}, these are left out: {listing(left, most=_NAMED)}")
+        yield Caution("runs-left-out", f"{found} and are left out: {listing(left, most=_NAMED)}")
     for code, what, kinds in (
-        ("mixed-units", "times are in different units, td in only one of them", [row.time_unit for row in judged]),
-        ("mixed-bases", "what a choice rests on differs", [row.basis for row in judged]),
+        (
+            "mixed-units",
+            "the times of the runs have different units, td has only one",
+            [row.time_unit for row in judged],
+        ),
+        ("mixed-bases", "the basis of the choice differs between the runs", [row.basis for row in judged]),
     ):
         counted = Counter(kind or "not named" for kind in kinds)
         if len(counted) > 1:

@@ -94,10 +94,10 @@ def _error(future: Future[Any]) -> BaseException | None:
 
 def _answer(number: int, future: Future[Any]) -> Answer:
     if future.cancelled():
-        return Answer(number, None, D2RPickError("given up by the cluster; is its scheduler still there?"))
+        return Answer(number, None, D2RPickError("cancelled by the cluster; is its scheduler still running?"))
     error = future.exception()
     if isinstance(error, BrokenProcessPool):
-        error = D2RPickError("its process ended without an answer; was there enough memory?")
+        error = D2RPickError("its process ended without a result; was there enough memory?")
     return Answer(number, None if error else future.result(), error)
 
 
@@ -199,7 +199,7 @@ class Cluster:
             self._client = Client(address, timeout=_PATIENCE, set_as_default=False)
         except (OSError, ValueError) as error:
             what = " ".join(str(error).split())
-            raise D2RPickError(f"{address}: no Dask scheduler answers ({what}); check the address") from None
+            raise D2RPickError(f"{address}: no answer from a Dask scheduler ({what}); check the address") from None
         self._executor = self._client.get_executor(pure=False)
         self.threads = sum(self._client.nthreads().values())
         self.room = max(_LEAST_ON_CLUSTER, (1 + _WAITING) * self.threads)

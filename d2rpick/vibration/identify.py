@@ -313,15 +313,15 @@ def _judged(
 def _loose(name: str, misfit: float, structure: float, local_structure: float) -> str | None:
     """Say how the fit fails to follow the samples."""
     if misfit > MAX_MISFIT:
-        return f"{name} misses the energy by {misfit:.2g} of its standard deviation, more than {MAX_MISFIT}"
+        return f"{name} misses the energy by {misfit:.0%} of its standard deviation, more than {MAX_MISFIT:.0%}"
     if structure > MAX_STRUCTURE:
         return (
-            f"{name} leaves a systematic rest of {structure:.2g} of the energy's standard deviation, "
+            f"{name} deviates systematically by {structure:.2g} of the standard deviation of the energy, "
             f"more than {MAX_STRUCTURE}"
         )
     if local_structure > MAX_LOCAL_STRUCTURE:
         return (
-            f"{name} leaves a systematic rest of {local_structure:.2g} of the vibration energy "
+            f"{name} deviates systematically by {local_structure:.2g} of the vibration energy "
             f"at the time, more than {MAX_LOCAL_STRUCTURE}"
         )
     return None
@@ -341,15 +341,15 @@ def _implausible(
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
         return (
-            f"the record shows {periods:.3g} vibration periods, fewer than the {least_periods} that tell a "
+            f"the record shows {periods:.3g} vibration periods, fewer than the {least_periods} needed to tell a "
             "vibration from a drift"
         )
     if mode.apart < _APART:
-        return "two of the modes have almost the same rate: their difference would not show within the record"
+        return "two of the modes have almost the same rate: the record is too short to separate them"
     if mode.alpha < -MAX_GROWTH:
         return (
             f"the vibration grows, alpha times the record's length is {mode.alpha:.2g}, below {-MAX_GROWTH}: "
-            "something feeds it"
+            "something drives it"
         )
     if mode.energy_plastic < MIN_PLASTIC:
         share = mode.energy_plastic
@@ -359,7 +359,7 @@ def _implausible(
         finer = np.pi * span / mode.fastest / (1.1 * least_density)
         return (
             f"the energy has {density:.2f} samples per period, fewer than {least_density}, and "
-            f"aliasing may fake this mode: ask for an output interval of {finer:.2g} or less"
+            f"this mode may be aliased: write the output at intervals of {finer:.2g} or less"
         )
     return None
 

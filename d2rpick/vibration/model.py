@@ -132,8 +132,8 @@ def energy_at(history: History, td: float, evidence: Evidence) -> OfModes | OfEn
     """Give the model of the whole energy to be relied on at ``td``: an oscillator, else the samples."""
     fit = evidence.fit
     if fit is None:
-        return OfEnergy(history, td, "no oscillator was looked for")
-    prescribed = ("the prescribed oscillator does not describe the record at td",) * evidence.prescribed
+        return OfEnergy(history, td, "identification was switched off")
+    prescribed = ("the oscillator that was asked for does not describe the record at td",) * evidence.prescribed
     if fit.reason:
         what = "the given oscillator does not describe" if evidence.given else "no single oscillator describes"
         return OfEnergy(history, td, f"{what} the record: {fit.reason}", (*prescribed, *_aliased(history, fit)))

@@ -29,4 +29,4 @@ class Measured(NamedTuple):
 
 
 # Why no tr can be trusted where the vibration is known but cannot be made out at td.
-SUNK = "the level at td has sunk into the scatter of the record"
+SUNK = "the level at td is below the noise of the record"

@@ -37,7 +37,7 @@ class OfEnergy:
     def without_parts(self, parts: SignedParts | None, *, sunk: bool) -> OfEnergy:
         """Say too why single parts do not tell the deformation: without a sign, or ``sunk`` at td."""
         reasons = [self.unknown]
-        reasons += ["at td the parts vibrate no more than a solver errs"] * sunk
+        reasons += ["at td the vibration of the parts is below the error of a solver"] * sunk
         reasons += [f"{part.name}: {part.reason}" for part in (parts.unsigned if parts else ())]
         doubts = (SUNK, *(doubt for doubt in self.doubts if doubt != SUNK)) if sunk else self.doubts
         return replace(self, unknown="; ".join(reasons), doubts=doubts)

@@ -63,8 +63,8 @@ class OfModes:
         if scatter <= _DROWNED * vibration:
             return None
         return (
-            f"at td the vibration energy {vibration:.3g} has sunk into the scatter of the record, {scatter:.3g}: "
-            "the sign of the deformation cannot be told"
+            f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}: "
+            "the sign of the deformation is unknown"
         )
 
     @property

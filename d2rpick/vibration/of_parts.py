@@ -33,7 +33,7 @@ class OfParts:
 
     basis = "parts"
     unknown = None
-    undescribed = "the signs of the parts cannot be followed from here to td"
+    undescribed = "the signs of the parts' deformations cannot be followed from here to td"
 
     @property
     def td(self) -> float:

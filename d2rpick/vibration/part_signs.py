@@ -136,11 +136,11 @@ def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Signed
 def _no_sign(time: Samples, deformation: Samples, zeros: Samples) -> str | None:
     """Say why a deformation is none that swings about zero."""
     if zeros.size < 2:
-        return "its energy does not come back to zero: it is preloaded, has yielded or vibrates in many modes"
+        return "its energy does not return to zero: it is preloaded, has yielded or vibrates in many modes"
     lasting = np.gradient(time)
     off, size = abs(float(lasting @ deformation)), float(lasting @ np.abs(deformation))
     if off > _MOST_OFF_CENTRE * size:
-        return f"its deformation would swing about {off / size:.2g} of its mean size: it is preloaded or has yielded"
+        return f"its deformation would vibrate about {off / size:.2g} of its mean size: it is preloaded or has yielded"
     return None
 
 

@@ -32,7 +32,7 @@ class Replay:
     def __post_init__(self) -> None:
         if not self.origin <= self.tr <= self.td:
             raise RangeError(
-                f"tr {self.tr:g} and td {self.td:g} must follow each other after the start at {self.origin:g}"
+                f"tr {self.tr:g} and td {self.td:g} must be in this order after the start at {self.origin:g}"
             )
 
     def reference(self, time: Samples | float) -> State:
@@ -101,7 +101,7 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
     omega = oscillator.omega_2
     if not omega > 0:
         raise RangeError(
-            f"alpha {oscillator.alpha:g} damps the oscillator beyond its rate {oscillator.omega_0:g}, "
+            f"alpha {oscillator.alpha:g} overdamps the oscillator, whose rate is {oscillator.omega_0:g}, "
             f"less than {2 * oscillator.omega_0:g} was expected"
         )
     sine = -v0 * np.sqrt(oscillator.stiffness / 2) / omega
@@ -131,5 +131,5 @@ def trajectory(
         state = oscillator.free_on_grid(start, dt, count) if switched is None else switched.motion(time)
         motion = Trajectory(time, state, oscillator.internal_energy(state), oscillator.kinetic_energy(state))
     if not all(np.isfinite(column).all() for column in (time, *state, motion.internal_energy, motion.kinetic_energy)):
-        raise RangeError("the motion exceeds the range of numbers; choose units in which it is of moderate size")
+        raise RangeError("the motion exceeds the range of numbers; choose units that give moderate numbers")
     return motion

@@ -148,7 +148,7 @@ def _grow(
         grown = span_of(history, min(td, window.end), fit, bounds)
         least = max(_LEAST_PERIODS * 2 * np.pi / fit.mode.omega, _MOST * (window.end - window.start))
         if grown is None or grown.end - grown.start < least:
-            reason = "the record soon leaves the oscillator that fits a part of it"
+            reason = "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
             return _cleared(history, grown, fit, bounds, fitter)

@@ -187,7 +187,7 @@ def test_another_motion_of_the_switched_run_is_an_objection(replayed: Callable[.
     found = verified(reference, slower)
     assert not found["verified"]
     assert found["tr_ok"]
-    assert any("its motion is another one" in reason for reason in found["reasons"])
+    assert any("its motion differs from the reference" in reason for reason in found["reasons"])
     assert "not verified" in run(*args).stdout
 
 

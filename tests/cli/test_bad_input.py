@@ -162,10 +162,10 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         (f"{ONE_COMMAND} --tr 0.006 --td 0.005", ["--tr 0.006 is not before --td 0.005"]),
         (f"{ONE_COMMAND} -o motion.txt", ["motion.txt", "--write-as csv, hdf5, glstat, matsum"]),
         # files to be written; all of them are known to be wrong before anything is computed
-        (f"suggest --td 0.064 -o absent/result.txt {ENERGY}", ["absent/result.txt: there is no folder 'absent'"]),
+        (f"suggest --td 0.064 -o absent/result.txt {ENERGY}", ["absent/result.txt: no such folder: 'absent'"]),
         (f"suggest --td 0.064 -o . {ENERGY}", [".: this is a folder"]),
         (f"suggest --td 0.064 -o '' {ENERGY}", ["this is a folder"]),
-        (f"suggest --td 0.064 --plot absent/plot.png {ENERGY}", ["absent/plot.png: there is no folder 'absent'"]),
+        (f"suggest --td 0.064 --plot absent/plot.png {ENERGY}", ["absent/plot.png: no such folder: 'absent'"]),
         (f"suggest --td 0.064 --plot plot.gif {ENERGY}", ["plot.gif", "png, svg, pdf"]),
         (f"suggest --td 0.064 --plot plot {ENERGY}", ["plot: ", "png, svg, pdf"]),
         (f"suggest --td 0.064 -o x.svg --plot ./x.svg {ENERGY}", ["--plot and --output-file name the same file"]),

@@ -313,7 +313,7 @@ def test_a_comment_that_names_no_rule_is_told() -> None:
     deck = place("main.k", HEAD + PARTS + "$ d2rpick: ignore D2R1O4\n" + THERE + END)
     assert [w["code"] for w in answer("check", deck)["warnings"]] == ["unknown-rule"]
     assert (
-        "warning: unknown-rule: main.k: the comment before line 15 ignores no rule: 'D2R1O4'"
+        "warning: unknown-rule: main.k: the comment before line 15 does not name a rule to ignore: 'D2R1O4'"
         in run("check", deck).stderr
     )
 
@@ -410,7 +410,7 @@ def test_a_history_that_tells_no_flight_is_an_objection() -> None:
     place("main.k", deck_of(0.5, 0.55))
     found = answer("check", "main.k", "--history", "rising.csv")
     (message,) = (f["message"] for f in found["findings"] if f["rule"] == "D2R204")
-    assert "nothing in the history shows when the load is over; give that time as --after" in message
+    assert "nothing in the history shows when the load is over; give that time as `after`" in message
     assert "D2R204" not in rules(answer("check", "main.k", "--history", "rising.csv", "--after", "0.2"))
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.histories.writing import TABLE_WRITERS, format_of
-from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, run
 from tests.reading import read_history
 from tests.shared import shared
 
@@ -126,6 +126,16 @@ def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
     assert found["recommended"]["tr"] == pytest.approx(expected["recommended"]["tr"], rel=1e-5)
 
 
+@pytest.mark.parametrize("name", ["rollover_box.binout", "rollover_box.glstat"])
+def test_what_is_extracted_is_as_healthy_as_its_file(name: str, tmp_path: Path) -> None:
+    """Friction that is told apart stays apart, and the energy ratio is the one that the solver wrote."""
+    source, file = str(ROOT / "sample_data" / name), str(tmp_path / "extracted.csv")
+    assert run("extract", *(("--part", "box") if "binout" in name else ()), source, "-o", file).exit_code == 0
+    found, expected = answer("info", file)["health"], answer("info", source)["health"]
+    for key in ("energy_ratio_min", "energy_ratio_max", "sliding_share"):
+        assert found[key] == pytest.approx(expected[key], rel=1e-5, abs=1e-12)
+
+
 def test_the_box_has_one_flight_in_every_format_that_tells_its_momentum(box: dict[str, str]) -> None:
     answers = [answer("suggest", "--td", "0.37", *BOX[form], box[form]) for form in ("csv", "h5", "matsum")]
     assert {one["flight"]["source"] for one in answers} == {"momentum"}
@@ -197,7 +207,7 @@ def test_the_format_asked_for_comes_before_that_of_the_name(tmp_path: Path) -> N
 def test_a_name_that_tells_no_format_is_refused_before_anything_is_read(name: str, tmp_path: Path) -> None:
     result = run("extract", "absent.csv", "-o", str(tmp_path / name))
     assert (result.exit_code, result.stdout) == (2, "")
-    assert result.stderr.endswith("the name tells no format; give --write-as csv, hdf5\n")
+    assert result.stderr.endswith("the suffix names no format; give --write-as: csv, hdf5\n")
     assert not (tmp_path / name).exists()
 
 
@@ -213,7 +223,7 @@ def test_an_existing_file_and_an_input_are_kept(tmp_path: Path) -> None:
 
 def test_format_of_takes_only_what_can_be_written() -> None:
     assert format_of("run.H5", ["csv", "hdf5"]) == "hdf5"
-    with pytest.raises(FormatError, match=r"run\.h5: the name tells no format; give --write-as csv"):
+    with pytest.raises(FormatError, match=r"run\.h5: the suffix names no format; give `write_as`: csv"):
         format_of("run.h5", ["csv"])
 
 

@@ -67,7 +67,7 @@ def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> No
     packed = tmp_path / "zeros.gz"
     packed.write_bytes(50 * gzip.compress(bytes(1 << 24)))
     message = one_line(child('ulimit -v 700000; d2rpick info "$1"', packed))
-    assert "zeros.gz: what is packed in it does not fit into memory" in message
+    assert "zeros.gz: its unpacked data do not fit into memory" in message
 
 
 def test_an_interrupted_scan_shows_no_tracebacks() -> None:

@@ -181,7 +181,7 @@ def test_the_runs_of_a_scan_are_counted(quiet: bool, monkeypatch: pytest.MonkeyP
         (("--tr", "0.2", "--td", "0.5"), "after the end of the run"),
         (("--tr", "-1", "--td", "0.1"), "at least 0"),
         (("--scan", "--td", "0", "--mesh", "4"), "no time for tr"),
-        (("--stiffness", "1e15"), "take softer bars"),
+        (("--stiffness", "1e15"), "choose softer bars"),
         (("--mesh", "100000"), "200"),
         (("--scan", "--tr", "0.1"), "exclude each other"),
         (("--scan", "--write-as", "csv"), "exclude each other"),

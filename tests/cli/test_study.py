@@ -267,7 +267,7 @@ def test_runs_are_computed_again_after_a_change(runs: list[str], tmp_path: Path)
     args = (*STUDY, *runs, "--resume", ledger)
     assert taken(args) == ""
     assert taken(args) == f"note: 3 of 3 runs taken from {ledger}"
-    changed = "have changed or were asked for with other options"
+    changed = "have changed, or were computed with other options"
     assert taken((*args, "--tolerance", "0.19")) == f"note: 0 of 3 runs taken from {ledger}; 3 {changed}"
     os.utime(runs[1])
     assert taken(args) == f"note: 2 of 3 runs taken from {ledger}; 1 {changed}"
@@ -364,4 +364,4 @@ def test_the_report_is_one_page_with_all_of_it(runs: list[str], tmp_path: Path) 
     assert all(name in text for name in (*runs, "absent.csv: no such file", "runs-left-out", "d2rpick study --td"))
     assert "http://" not in text.replace("http://www.w3.org", "")
     assert run(*STUDY, "absent.csv", "--report", str(page), "--overwrite").exit_code == 2
-    assert "There is none: no run could be judged" in page.read_text()
+    assert "None: no run could be judged" in page.read_text()

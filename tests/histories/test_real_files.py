@@ -161,7 +161,7 @@ READABLE = {
     ),
     "PILLARS-LSDyna__Bolt_B_Explicit-matsum": Readable(
         "internal energy of all parts", 1001, ((0.0, 0.0), (2.4998, 52.19226), (4.9999, 56.2733)),
-        ("never any internal energy: part 101", "the energies of all parts were added",),
+        ("without any internal energy: part 101", "the energies of all parts were added",),
     ),
     "PILLARS-LSDyna__test_parachute-windflow_v1_thru_v10-glstat": Readable(
         "internal energy", 1501, ((0.0, 2042.35), (0.00749911, 2086.31), (0.0149982, 2085.42)),
@@ -188,11 +188,11 @@ READABLE = {
     ),
     "dyna_pladebuk__Plade_300_150_4-BB-binout.l2a-matsum": Readable(
         "internal energy of all parts", 1, ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)),
-        ("never any internal energy: part 1", "the energies of all parts were added",),
+        ("without any internal energy: part 1", "the energies of all parts were added",),
     ),
     "dyna_pladebuk__Plade_300_150_4-BB-matsum": Readable(
         "internal energy of all parts", 1, ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)),
-        ("never any internal energy: part 1", "the energies of all parts were added",),
+        ("without any internal energy: part 1", "the energies of all parts were added",),
     ),
     "editOpeniGame__Bolt_B_Explicit-glstat.head16000": Readable(
         "internal energy", 17, ((0.0, 1.6e-19), (0.0398316, 0.0208757), (0.079875, 0.242757)),
@@ -207,7 +207,7 @@ READABLE = {
     ),
     "lasso-python__sph_models-R12_2_1-binout.l2a-matsum": Readable(
         "internal energy of all parts", 88, ((0.0, 0.0), (0.017562, 2.2145), (0.034758, 2.214)),
-        ("never any internal energy: part 1", "the energies of all parts were added",),
+        ("without any internal energy: part 1", "the energies of all parts were added",),
     ),
     "lasso-python__sph_models-R7_1_2-binout": Readable(
         "internal_energy", 88,
@@ -218,7 +218,7 @@ READABLE = {
     ),
     "lasso-python__sph_models-R7_1_2-binout.l2a-matsum": Readable(
         "internal energy of all parts", 88, ((0.0, 0.0), (0.017573, 2.3531), (0.03478, 2.3516)),
-        ("never any internal energy: part 1", "the energies of all parts were added",),
+        ("without any internal energy: part 1", "the energies of all parts were added",),
     ),
     "lasso_ansys_glstat.h5": Readable(
         "internal_energy", 251,
@@ -250,7 +250,7 @@ REFUSED = {
 def test_read(file: str) -> None:
     expected = READABLE[file]
     if expected.energy:
-        with pytest.raises(FormatError, match="by this name no internal energy"):
+        with pytest.raises(FormatError, match="by its name not an internal energy"):
             read_history([str(FOLDER / file)])
     history = read_history([str(FOLDER / file)], Selection(energy=expected.energy))
     assert (history.channel, history.time.size) == (expected.channel, expected.states)
@@ -278,10 +278,10 @@ def test_no_file_is_left_out() -> None:
 
 # Tables among the files beside them, and what is said of each.
 MORE = {
-    "FV_crashworthiness__DRI-OLD_LSDYNA-z_many.csv": "'Z-acceleration', by this name no internal energy",
+    "FV_crashworthiness__DRI-OLD_LSDYNA-z_many.csv": "'Z-acceleration', by its name not an internal energy",
     "FV_crashworthiness__F28_validation-plot-data.csv": r":14: time steps back from 12\.011 to 0\.967",
     "FV_crashworthiness__ovalization_study-e=030-AT3_Floor.csv": ":303: a second header, another curve begins here",
-    "Masters-Project__Steel_Implicit-Energy_Ratio.head6": "'Energy Ratio', by this name no internal energy",
+    "Masters-Project__Steel_Implicit-Energy_Ratio.head6": "'Energy Ratio', by its name not an internal energy",
     "luchete80__radioss_tutorials-test-testT01.ascii": "a time history of Radioss as text",
 }
 PAIRS = {

@@ -67,7 +67,7 @@ def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() ->
     assert run.part_energies(run.parts).tolist() == [
         [values("internal_energy", state, id_) for id_ in (7, 3)] for state in range(1, 8)
     ]
-    assert run.notes == ("1 states have the same printed time as the next one; of equal times the last counts",)
+    assert run.notes == ("1 states have the same printed time as the next one; the last of equal times counts",)
 
 
 def test_a_missing_branch_is_named_with_what_there_is() -> None:
@@ -164,7 +164,7 @@ def test_companions_of_other_times_are_doubted() -> None:
     assert opened({"glstat": GLSTAT, "matsum": coarse}).notes == ()
     shifted = matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))
     (note,) = opened({"glstat": GLSTAT, "matsum": shifted}).notes
-    assert note == "glstat and matsum have only 0 of 7 states at the same times; are they of one run?"
+    assert note == "glstat and matsum have only 0 of 7 states at the same times; are they from the same run?"
     with pytest.raises(FormatError, match="glstat and matsum have no time in common, files of one run were expected"):
         opened({"glstat": GLSTAT, "matsum": matsum_text(TIMES + 5, [7], np.ones((8, 1)))})
 
@@ -197,8 +197,8 @@ def test_without_it_all_parts_are_added_with_a_note() -> None:
     assert (history.channel, history.parts) == ("internal energy of all parts", None)
     assert history.energy.tolist() == TIMES.tolist()
     assert history.notes == (
-        "never any internal energy: part 3 'Part 3'; rigid, or without elements?",
-        "the energies of all parts were added, those that stay deformable among them; choose with --part",
+        "without any internal energy: part 3 'Part 3'; rigid, or without elements?",
+        "the energies of all parts were added, those that stay deformable among them; choose with `parts`",
     )
 
 
@@ -208,22 +208,22 @@ def test_chosen_parts_are_added_and_named() -> None:
     assert [part.id for part in history.parts or ()] == [7]
     idle = history_of(matsum, MATSUM, selection=Selection(parts=("3,7",)))
     assert idle.energy.tolist() == TIMES.tolist()
-    assert idle.notes == ("never any internal energy: part 3 'Part 3'; rigid, or without elements?",)
+    assert idle.notes == ("without any internal energy: part 3 'Part 3'; rigid, or without elements?",)
 
 
 @pytest.mark.parametrize(
     ("files", "selection", "reason"),
     [
         ({"glstat": GLSTAT}, Selection(parts=("7",)), "glstat: a glstat has no parts; add the matsum of the run"),
-        ({"matsum": MATSUM}, Selection(energy=("internal energy",)), "a matsum has parts only; choose with --part"),
-        ({"csv": b"time,IE\n0,1\n"}, Selection(parts=("7",)), "a table has no parts; choose its columns with --energy"),
+        ({"matsum": MATSUM}, Selection(energy=("internal energy",)), "a matsum has parts only; choose with `parts`"),
+        ({"csv": b"time,IE\n0,1\n"}, Selection(parts=("7",)), "a table has no parts; choose its columns with `energy`"),
         ({"radioss-th": bytes(t01(2, []).data)}, Selection(parts=("7",)), "no parts with histories of their own"),
         ({"glstat": GLSTAT, "matsum": MATSUM}, Selection(energy=("inernal energy",)), "did you mean 'internal energy'"),
         ({"glstat": GLSTAT}, Selection(energy=("time step", "Time Step")), "an energy is asked for twice"),
         (
             {"glstat": GLSTAT.replace(b" internal energy", b" infernal energy")},
             Selection(),
-            "glstat: no internal energy; choose with --energy: time step",
+            "glstat: no internal energy; choose with `energy`: time step",
         ),
     ],
 )
@@ -246,7 +246,7 @@ def test_a_time_column_is_no_choice_where_there_is_one_only(tmp_path: Path) -> N
     file = tmp_path / "history"
     file.write_bytes(GLSTAT)
     assert open_run([str(file)], Selection(time="Time")).history(Selection()).time.tolist() == TIMES.tolist()
-    with pytest.raises(FormatError, match="no time 'cycle' in glstat, the time is 'time'; leave --time out"):
+    with pytest.raises(FormatError, match="no time 'cycle' in glstat, the time is 'time'; leave `time` out"):
         open_run([str(file)], Selection(time="cycle"))
 
 
@@ -256,9 +256,9 @@ def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
     assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (0, None, None, ())
     curves = survey(run_of(csv_table, "2\n1 'a IE'\n0,1\n1,2\n2 'b IE'\n0,1\n2,3\n3,4\n"), Selection())
     assert (curves.states, curves.channels) == (None, ("a IE", "b IE"))
-    assert "2 curves are named like an internal energy; choose with --energy: 1 'a IE', 2 'b IE'" in curves.notes[0]
+    assert "2 curves are named like an internal energy; choose with `energy`: 1 'a IE', 2 'b IE'" in curves.notes[0]
     doubtful = opened({"glstat": GLSTAT, "matsum": matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))})
-    assert "are they of one run?" in survey(doubtful, Selection()).notes[0]
+    assert "are they from the same run?" in survey(doubtful, Selection()).notes[0]
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.999])

@@ -93,7 +93,7 @@ def test_a_glob_takes_what_has_such_a_name() -> None:
     [
         (("run/aT01", "run/bT01", "run/bT02"), r"run: this folder holds several runs \(aT01, bT01\)"),
         (("run/aT01", "run/binout"), r"several runs \(aT01, one of LS-DYNA\)"),
-        (("run/d3plot",), "run: no glstat, matsum, binout or T01 in this folder; name the file"),
+        (("run/d3plot",), "run: no glstat, matsum, binout or T01 in this folder; give the file"),
     ],
 )
 def test_a_folder_of_several_runs_or_none_is_refused(files: Sequence[str], reason: str) -> None:

@@ -197,7 +197,7 @@ def test_a_time_that_no_card_can_hold_costs_the_card_only(tmp_path: Path) -> Non
     shift = earlier.sub(lambda time: f"{float(time[0]) - 0.02:13.4E}", Path(motion).read_text("ascii"))
     Path(motion).write_text(shift)
     page = page_of(tmp_path, "--td", "0.044", "--part", "3", motion)
-    assert "There is no card for these times: tr is -0.00" in page.text
+    assert "No card can be printed for these times: tr is -0.00" in page.text
 
 
 def test_options_set_by_the_environment_and_standard_input_are_needed_to_repeat_it(tmp_path: Path) -> None:

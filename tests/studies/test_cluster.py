@@ -108,7 +108,7 @@ def test_where_no_scheduler_answers_the_study_ends(monkeypatch: pytest.MonkeyPat
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         result = run(*args, address)
         assert (result.exit_code, result.stdout) == (2, "")
-        assert result.stderr.startswith(f"d2rpick: {address}: no Dask scheduler answers (")
+        assert result.stderr.startswith(f"d2rpick: {address}: no answer from a Dask scheduler (")
 
 
 def test_without_the_package_its_name_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

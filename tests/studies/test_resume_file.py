@@ -68,7 +68,7 @@ def test_a_row_of_another_question_is_not_taken(tmp_path: Path, question: Questi
     name, ledger, _ = kept(tmp_path)
     again = Ledger(ledger, question)
     assert again.find(name) is None
-    assert again.told(1).endswith("; 1 have changed or were asked for with other options")
+    assert again.told(1).endswith("; 1 have changed, or were computed with other options")
 
 
 def test_a_figure_changes_no_answer_but_needs_the_outline(tmp_path: Path) -> None:

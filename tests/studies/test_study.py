@@ -73,7 +73,7 @@ def test_what_is_wrong_with_a_run_is_said_in_its_row(
 def test_a_process_that_did_not_answer_is_a_row() -> None:
     found = failed("run", MemoryError("full"))
     assert (found.source, found.status) == ("run", "failed")
-    assert found.message == "run: a fault of this program, please report it (MemoryError: full)"
+    assert found.message == "run: internal error, please report it (MemoryError: full)"
 
 
 def test_another_version_gives_no_answer() -> None:
@@ -163,8 +163,8 @@ def test_different_bases_and_units_are_told() -> None:
     rows = [row("a", (1, 2)), row("b", (1, 2), basis="energy", warnings=("energy-only",)), row("c", time_unit="ms")]
     told = {caution.code: caution.message for caution in summarise(10.0, rows).cautions}
     assert told == {
-        "mixed-units": "times are in different units, td in only one of them: not named in 2 runs, ms in 1 run",
-        "mixed-bases": "what a choice rests on differs: oscillator in 2 runs, energy in 1 run",
+        "mixed-units": "the times of the runs have different units, td has only one: not named in 2 runs, ms in 1 run",
+        "mixed-bases": "the basis of the choice differs between the runs: oscillator in 2 runs, energy in 1 run",
         "energy-only": "in 1 of 3 runs: b",
     }
 

@@ -171,7 +171,7 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
     assert (situation.basis, situation.kinetic_share, situation.vibration.doubts) == ("energy", None, (SUNK,))
     (candidate,) = judge(situation, [Moment(0.18, "given", None)])
     assert (candidate.acceptable, candidate.residual, candidate.sign_match) == (False, None, None)
-    assert "the level at td has sunk into the scatter of the record" in candidate.notes
+    assert "the level at td is below the noise of the record" in candidate.notes
     assert any("no more than a solver errs" in note for note in candidate.notes)
     earlier = situation.at(chain.TD_PEAK)
     assert earlier.basis == "parts"
@@ -232,7 +232,7 @@ def test_the_rollover_has_no_signs_and_says_why() -> None:
     assert answer.situation.basis == "energy"
     best = answer.candidates[0]
     assert (best.sign_match, best.residual, best.part_mismatch, best.parts) == (None, None, None, ())
-    assert any("box: its energy does not come back to zero" in note for note in best.notes)
+    assert any("box: its energy does not return to zero" in note for note in best.notes)
 
 
 def test_several_energies_are_carried_but_for_those_that_are_always_zero() -> None:

@@ -29,7 +29,7 @@ PHYSICS = (
     "A switch comes at the first step at or after its time.",
     "Stresses of solids without a co-rotating frame do not turn with the rigid",
     "  body: after a large rotation they do not spring back as they should.",
-    "A switched run is no reference to choose switching times by.",
+    "Do not choose switching times from the energy of a switched run.",
 )
 
 
@@ -40,7 +40,7 @@ class Printing:
     Attributes
     ----------
     part : tuple of int
-        Ids of the parts to be switched.
+        Ids of the parts to switch.
     node : tuple of int
         Main nodes of the rigid bodies to be switched, for solvers that switch these.
     merge : int, optional
@@ -107,7 +107,7 @@ def shortest(value: float, width: int = LONGEST) -> str:
         texts.add(f"{mantissa.replace('.', '')}e{int(exponent) - digits}")
     fitting = [text for text in texts if len(text) <= width]
     if not fitting:
-        raise DeckError(f"{value:g} cannot be written in {width} columns, a number of ordinary size was expected")
+        raise DeckError(f"{value:g} cannot be written in {width} columns, a number that fits was expected")
     # exact before near, then with digits around a point, then short
     return min(fitting, key=lambda text: (abs(float(text) - value), not _POINT.search(text), len(text), text))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
-from d2rpick import __version__
 from d2rpick.deck.printing.common import (
     LONGEST,
     PHYSICS,
@@ -16,6 +15,7 @@ from d2rpick.deck.printing.common import (
     shortest,
 )
 from d2rpick.errors import DeckError
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -36,8 +36,8 @@ _SOLVER = (
     "Springs and dampers are not switched.",
 )
 _UNCAPPED = (
-    "DTMAX is 0: with nothing deformable left the step may grow without limit",
-    "  and the second switch comes late; d2rpick card --step-cap cures it.",
+    "DTMAX is 0: with nothing deformable left the time step may grow without",
+    "  limit and the second switch come late; set d2rpick card --step-cap.",
 )
 _UNMERGED = ("Parts that share nodes must be merged into one rigid body (d2rpick card --merge).",)
 

@@ -6,9 +6,9 @@ import math
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick import __version__
 from d2rpick.deck.printing.common import PHYSICS, PrintedCard, check_ids, check_windows, comments
 from d2rpick.errors import DeckError
+from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -155,7 +155,7 @@ class Branch:
                 listed = self._ids(part)
                 if listed.shape[1] != variable.count:
                     counts = f"{variable.count} values of {quantity} for {listed.shape[1]} parts"
-                    raise self._refused(part, f"{counts}; which is whose cannot be told")
+                    raise self._refused(part, f"{counts}; they cannot be told apart")
                 places = [self._places(part, listed, id_) for id_ in ids]
                 columns[part.rows] = part.values(variable, np.stack(places, axis=1)) if places else 0.0
         return columns
@@ -212,7 +212,7 @@ class Branch:
         if own and own.dtype.kind in "iu":
             return group.values(own, np.arange(own.count)[None, :]).astype(np.int64)
         if not self._id_lists:
-            raise FormatError(f"{self.source} has no part ids in its metadata; which value is whose cannot be told")
+            raise FormatError(f"{self.source} has no part ids in its metadata; the values cannot be assigned to parts")
         index = self._files.index(group.file)
         before = sum(1 for file, _, _ in self._id_lists if file < index)
         here = np.array([start for file, start, _ in self._id_lists if file == index], dtype=np.int64)
@@ -232,7 +232,7 @@ class Branch:
         times = found.sum(axis=1)
         if (times != 1).any():
             row = int(np.argmax(times != 1))
-            hint = "it comes and goes" if id_ in self.part_ids else f"there are {listing(self.part_ids)}"
+            hint = "it is there in some states only" if id_ in self.part_ids else f"there are {listing(self.part_ids)}"
             raise self._refused(group, f"part {id_} is listed {times[row]} times, not once; {hint}", row)
         return np.asarray(found.argmax(axis=1))
 

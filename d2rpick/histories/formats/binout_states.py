@@ -82,7 +82,7 @@ class States:
         layouts: list[tuple[Lsda, DirectoryLayout]] = []
         for file in family:
             if file.odd[branch]:
-                self.damage = f"{file.source}: {branch} has {file.odd[branch][0]!r}, which is no state"
+                self.damage = f"{file.source}: {branch} has {file.odd[branch][0]!r}, which is not a state"
         for file, last in zip(files, cut, strict=True):
             visits = file.visits[branch]
             whole = slice(len(visits.numbers) - last)

@@ -43,10 +43,10 @@ def time_column(source: str, layout: Layout, wanted: str | None, energies: Seque
         return internal_energy(source, layout, times) // 2 * 2, []
     if len(times) > 1:
         raise FormatError(
-            f"{source}: {len(times)} columns are named like a time; choose with --time: {_menu(layout, times)}"
+            f"{source}: {len(times)} columns are named like a time; choose with `time`: {_menu(layout, times)}"
         )
     if layout.names and not times:
-        return 0, [f"no column is named like a time; {layout.name(0)!r}, the first, was taken for it"]
+        return 0, [f"no column has the name of a time; {layout.name(0)!r}, the first, was taken as the time"]
     return (times[0] if times else 0), []
 
 
@@ -63,7 +63,7 @@ def internal_energy(source: str, layout: Layout, times: Sequence[int]) -> int:
         return named[0]
     found = f"{len(named)} columns are" if named else "no column is"
     raise FormatError(
-        f"{source}: {found} named like an internal energy; choose with --energy: {_menu(layout, named or beside)}"
+        f"{source}: {found} named like an internal energy; choose with `energy`: {_menu(layout, named or beside)}"
     )
 
 

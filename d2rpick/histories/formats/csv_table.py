@@ -106,7 +106,7 @@ class Table:
             return wanted
         column = named_column(self.source, self._layout, wanted)
         if column == self._time:
-            raise FormatError(f"{self.source}: {wanted!r} is the time column, not to be used twice; name an energy")
+            raise FormatError(f"{self.source}: {wanted!r} is the time column; choose another one as energy")
         return next(label for label, own in self._columns.items() if own == column)
 
     @cached_property
@@ -181,7 +181,7 @@ class Table:
         return self._read[column]
 
     def _no_parts(self) -> FormatError:
-        return FormatError(f"{self.source}: a table has no parts; choose its columns with --energy")
+        return FormatError(f"{self.source}: a table has no parts; choose its columns with `energy`")
 
 
 def _is_whole(line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]) -> bool:

@@ -129,7 +129,7 @@ class Curves:
         self.complete = not found.stops and not cut
         self.notes = tuple(notes)
         if selection.time is not None and not is_time(selection.time):
-            raise FormatError(f"{self.source}: each curve has its own times; leave --time {selection.time!r} out")
+            raise FormatError(f"{self.source}: each curve has its own times; leave `time` {selection.time!r} out")
         self._asked = selection.energy
 
     @property
@@ -139,7 +139,7 @@ class Curves:
         if len(fitting) != 1:
             found = f"{len(fitting)} curves are" if fitting else "no curve is"
             raise FormatError(
-                f"{self.source}: {found} named like an internal energy; choose with --energy: {self._menu()}"
+                f"{self.source}: {found} named like an internal energy; choose with `energy`: {self._menu()}"
             )
         if len(self.channels) == 1:
             refuse_other_quantity(self.channels[0], self.source)
@@ -204,7 +204,7 @@ class Curves:
         return listing([f"{number} {name!r}" for number, name in enumerate(self.channels, 1)])
 
     def _no_parts(self) -> FormatError:
-        return FormatError(f"{self.source}: curves are no parts; choose them with --energy")
+        return FormatError(f"{self.source}: curves are not parts; choose them with `energy`")
 
 
 def _curveplot(found: _Found) -> bool:

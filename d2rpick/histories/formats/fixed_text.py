@@ -167,7 +167,7 @@ class Blocks:
             return
         self._runs.extend(self.rest)
         self.states += 1
-        self.notes = (*self.notes[:-1], "the file stops inside its last state, behind the lines that were needed")
+        self.notes = (*self.notes[:-1], "the file ends within its last state, after the lines that were needed")
 
     def line(self, address: int) -> int:
         """Find the number of the line at ``address``, from 1."""
@@ -230,7 +230,7 @@ class Blocks:
                 previous = layout
             position = None if is_last else following
         if not self.complete and not self.notes:
-            self.notes = ("the file stops inside a line, which was left out",)
+            self.notes = ("the file ends within a line, which was left out",)
 
     def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
         return self._grammar.whole(layout) if previous is None else previous.last in layout.fields

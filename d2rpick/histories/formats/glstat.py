@@ -75,15 +75,15 @@ class Glstat(SolverFile):
             self._blocks.admit_rest(names)
         if not self.version and not self._blocks.states:
             raise FormatError(
-                f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is no glstat; "
+                f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a glstat; "
                 "choose another input format"
             )
         self.complete, self.notes = self._blocks.complete, self._blocks.notes
         if self.complete and _CONTROL in data[self._blocks.tail :]:
             self.complete = False
-            self.notes += ("the file stops before the time of its next state",)
+            self.notes += ("the file ends before the time of its next state",)
         if not self.version:
-            self.notes += ("the file has no head; what stands before its first time line was left out",)
+            self.notes += ("the file has no header; everything before its first time line was left out",)
         self._columns = self._read(names)
         self.time = self._columns[_TIME]
 

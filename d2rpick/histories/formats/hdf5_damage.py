@@ -37,7 +37,7 @@ def check_file(file: Path | BinaryIO, source: str) -> None:
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         raise FormatError(
-            f"{source}: the HDF5 library crashes on it (signal {os.WTERMSIG(status)}); the file is damaged, "
+            f"{source}: the HDF5 library crashed on it (signal {os.WTERMSIG(status)}); the file is damaged, "
             "copy it again"
         )
 
@@ -74,7 +74,7 @@ def _check_size_of_file(file: Path | BinaryIO, source: str) -> None:
     (end,) = struct.unpack_from("<Q", head, place)
     if size not in (end, end + base):
         raise FormatError(
-            f"{source}: the file has {size} bytes, by its own head {end}; it is damaged or cut, copy it again"
+            f"{source}: the file has {size} bytes, {end} by its own header; it is damaged or cut, copy it again"
         )
 
 

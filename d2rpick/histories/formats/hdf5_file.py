@@ -135,7 +135,7 @@ class Columns(SolverFile):
             return column.load(opened, self.source)
 
     def _no_parts(self) -> FormatError:
-        return FormatError(f"{self.source}: its columns are no parts; choose them with --energy")
+        return FormatError(f"{self.source}: its columns are not parts; choose them with `energy`")
 
 
 class SavedBinout(SolverFile):
@@ -294,7 +294,9 @@ def _only(fitting: Sequence[Column], columns: Sequence[Column], what: str, sourc
     if len(fitting) == 1:
         return fitting[0]
     count = "no column" if not fitting else f"{len(fitting)} columns"
-    raise FormatError(f"{source}: {count} for the {what}, one was expected; name it: {_listed(fitting or columns)}")
+    raise FormatError(
+        f"{source}: {count} for the {what}, one was expected; give its path: {_listed(fitting or columns)}"
+    )
 
 
 def _listed(columns: Sequence[Column]) -> str:

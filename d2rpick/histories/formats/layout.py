@@ -173,7 +173,7 @@ def _refuse_odd_rows(source: str, lines: Sequence[str], first: int, table: Layou
         cells = [] if is_skipped(line) else split(line, table.separator)
         if cells and as_number(cells[0], table.decimal) is not None:
             raise FormatError(
-                f"{source}:{number}: {_short(line)} is unlike the rows below, "
+                f"{source}:{number}: {_short(line)} differs from the rows below, "
                 f"{table.columns} values were expected; repair or delete the line"
             )
 

@@ -215,7 +215,7 @@ class Lsda:
             position = end
         self._leave(path, number, start, records)
         if position < size:
-            self.stop = f"no whole record at byte {position} of {size}"
+            self.stop = f"no complete record at byte {position} of {size}"
         if number >= 0 and (self.stop or command == VARIABLE):
             self.unfinished = path[0]
 

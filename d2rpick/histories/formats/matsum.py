@@ -94,7 +94,7 @@ class Matsum(SolverFile):
         self._blocks = Blocks(data, source, begin, grammar)
         if not self.version and not self._blocks.states:
             raise FormatError(
-                f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is no matsum; "
+                f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a matsum; "
                 "choose another input format"
             )
         self.complete = self._blocks.complete
@@ -133,7 +133,7 @@ class Matsum(SolverFile):
         return self._blocks.numbers(names, anchors=[(id_, _MAT) for id_ in ids])
 
     def _no_channels(self) -> FormatError:
-        return FormatError(f"{self.source}: a matsum has parts only; choose with --part or add the glstat of the run")
+        return FormatError(f"{self.source}: a matsum has parts only; choose with `parts` or add the glstat of the run")
 
     def _present(self) -> Counter[int]:
         """In how many states each part is, in the order in which the parts appear."""

@@ -305,7 +305,7 @@ class _Records:
         found = _INT.unpack(self._data[self._at : begin])[0] if begin <= len(self._data) else -1
         end = begin + found
         if found < 0 or end + _WIDTH > len(self._data) or _INT.unpack(self._data[end : end + _WIDTH])[0] != found:
-            raise self._broken("a whole record")
+            raise self._broken("a complete record")
         if length is not None and found != length:
             raise self._broken(f"a record of {length} bytes")
         self._at = end + _WIDTH

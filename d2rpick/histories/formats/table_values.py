@@ -96,7 +96,7 @@ def _states(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Iter
             continue
         state = [_value(f"{text.name}:{number}", layout, column, cells[column]) for column in used]
         if ended or (gap and before is not None and state[0] <= before):
-            found = "a curve goes on behind empty cells" if ended else "the time starts again behind a gap"
+            found = "a curve continues after empty cells" if ended else "the time starts again after a gap"
             raise FormatError(
                 f"{text.name}:{number}: {found}, one curve was expected; repair it or put each curve into its own file"
             )

@@ -37,7 +37,7 @@ class Text:
         if data.startswith(UTF16):
             data = data.decode("utf-16", errors="replace").encode()
         elif b"\0" in data:
-            raise FormatError(f"{self.name}: binary data, a table in text was expected; export the history as CSV")
+            raise FormatError(f"{self.name}: binary data, a text table was expected; export the history as CSV")
         data = data.removeprefix(_UTF8)
         if b"\r" in data:
             data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")

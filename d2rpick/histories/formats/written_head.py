@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from d2rpick import __version__
+from d2rpick.version import __version__
 
 
 def written_head(title: str, database: str) -> str:

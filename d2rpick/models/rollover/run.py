@@ -29,7 +29,7 @@ class Window:
 
     def __post_init__(self) -> None:
         if not 0 <= self.tr <= self.td:
-            raise RangeError(f"tr {self.tr:g} and td {self.td:g} must follow each other after the start at 0")
+            raise RangeError(f"tr {self.tr:g} and td {self.td:g} must be in this order after the start at 0")
 
 
 def simulate(parameters: Parameters, t_end: float, *windows: Window, interval: float = INTERVAL) -> Record:
@@ -46,7 +46,7 @@ def simulate(parameters: Parameters, t_end: float, *windows: Window, interval: f
     """
     motion = Motion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
-        raise RangeError(f"steps of {motion.dt:.3g} s make more than {MOST_STEPS} until {t_end:g}; take softer bars")
+        raise RangeError(f"steps of {motion.dt:.3g} s make more than {MOST_STEPS} until {t_end:g}; choose softer bars")
     for one, following in pairwise(windows):
         if not one.td < following.tr:
             raise RangeError(f"the window from tr {following.tr:g} begins before the one up to td {one.td:g} is over")

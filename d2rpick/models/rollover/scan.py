@@ -51,7 +51,7 @@ def scan_times(released: float, td: float) -> list[float]:
     """
     dense = min(1.5 * released, td - _LAST)
     if not dense > _FINE:
-        raise RangeError(f"td {td:g} leaves no time for tr; the earliest that does is {_FINE + _LAST:g}")
+        raise RangeError(f"td {td:g} leaves no time for tr; the earliest possible td is {_FINE + _LAST:g}")
     return [*np.arange(_FINE, dense, _FINE).tolist(), *np.arange(dense, td - _LAST, _COARSE).tolist()]
 
 

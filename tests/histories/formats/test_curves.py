@@ -128,7 +128,7 @@ def test_refused(text: str, energy: list[str], reason: str) -> None:
 
 def test_a_curve_has_its_own_times_and_no_others() -> None:
     assert states_of(read(CURVEPLOT, "1", time="Time")) == FIRST
-    with pytest.raises(FormatError, match="each curve has its own times; leave --time '2' out"):
+    with pytest.raises(FormatError, match="each curve has its own times; leave `time` '2' out"):
         read(CURVEPLOT, "1", time="2")
 
 

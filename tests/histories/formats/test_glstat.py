@@ -176,7 +176,7 @@ REFUSED = {
     ),
     "no such line at all": (
         HEAD + block(0.0, None) + block(1.0, None),
-        "no internal energy; choose with --energy: time",
+        "no internal energy; choose with `energy`: time",
     ),
     "time at random": (
         HEAD + "".join(block(float(t), 1.0) for t in (5, 1, 4, 2, 3)),
@@ -248,7 +248,7 @@ def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
 def test_a_last_state_counts_for_the_lines_that_are_there() -> None:
     cut = WHOLE[: WHOLE.rindex(" hourglass") + 40]
     assert states_of(read(cut)) == list(STATES)
-    assert read(cut).notes[-1] == "the file stops inside its last state, behind the lines that were needed"
+    assert read(cut).notes[-1] == "the file ends within its last state, after the lines that were needed"
     assert read(cut, "stonewall energy wall# 2").time.size == 3
     assert read(cut, "hourglass energy").time.size == 2
     assert not read(cut).complete

@@ -206,7 +206,7 @@ def test_a_crash_of_the_library_is_survived(monkeypatch: pytest.MonkeyPatch) -> 
         os.kill(os.getpid(), signal.SIGSEGV)
 
     monkeypatch.setattr(hdf5_damage, "_read", crash)
-    with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library crashes on it \(signal 11\)"):
+    with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library crashed on it \(signal 11\)"):
         read(written(plain))
 
 
@@ -225,6 +225,6 @@ def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:
     def other(file: h5py.File) -> None:
         file["time"], file["kinetic_energy"] = TIME, KINETIC
 
-    with pytest.raises(FormatError, match="by this name no internal energy"):
+    with pytest.raises(FormatError, match="by its name not an internal energy"):
         read(written(other))
     assert read(written(other), "kinetic_energy").energy.tolist() == KINETIC.tolist()
