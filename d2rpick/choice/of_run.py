@@ -43,14 +43,18 @@ def read(names: Sequence[str], selection: Selection = _DEFAULT, input_format: st
     return Reference.of(open_run(names, selection, input_format), selection)
 
 
-def suggest_of(reference: Reference, td: float | tuple[float, float], settings: Settings) -> Suggestion:
-    """Choose tr for ``td``, or both times with td in a window (low, high) [time].
+def suggest_of(reference: Reference, td: float | tuple[float, float] | None, settings: Settings) -> Suggestion:
+    """Choose tr for ``td``, or both times with td in a window (low, high) or, for None, in the longest flight [time].
 
     Raises
     ------
     RangeError
-        If td or the window lies outside the record.
+        If td or the window lies outside the record, or no flight is seen.
     """
+    if td is None:
+        from d2rpick.choice.suggest_td import suggest_in_longest_flight
+
+        return _with_health(suggest_in_longest_flight(reference.history, settings), reference.run)
     if isinstance(td, tuple):
         from d2rpick.choice.suggest_td import suggest_in_window
 

@@ -26,6 +26,11 @@ class Pair(NamedTuple):
     td: float
     residual: float | None
 
+    @property
+    def rigid_time(self) -> float:
+        """Length of the rigid window [time]."""
+        return self.td - self.tr
+
 
 class AcceptableWindow(NamedTuple):
     """From ``start`` to ``end`` [time] every tr is acceptable; ``share`` is its share of the flight up to td [-]."""
@@ -39,7 +44,8 @@ class Suggestion(NamedTuple):
     """Answer of ``suggest``: ranked candidates, the recommended pair, a better td, and what to be aware of.
 
     ``windows`` are those of acceptable tr, on basis "energy", ``td_window`` is where td was chosen, if it was;
-    ``expected`` what the energy alone tells of the time after td.
+    ``expected`` what the energy alone tells of the time after td.  ``longer`` is the longest acceptable pair in that
+    window, where much saving was given up for quality.
     """
 
     situation: Situation
@@ -51,6 +57,7 @@ class Suggestion(NamedTuple):
     td_window: tuple[float, float] | None = None
     expected: Expectation | None = None
     windows: tuple[AcceptableWindow, ...] | None = None
+    longer: Pair | None = None
 
 
 def suggest(history: History, td: float, settings: Settings) -> Suggestion:

@@ -93,8 +93,8 @@ def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated
 
 _AFTER = click.option("--after", type=TIME, metavar="T", help="The load ends here.  [default: found from the record]")
 _MARGIN = click.option(
-    "--margin", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="T",
-    help="Time kept clear after the load and before the next contact.",
+    "--margin", type=NOT_NEGATIVE, metavar="T",
+    help="Time kept clear after the load and before the next contact.  [default: 0; where td is chosen, derived]",
 )  # fmt: skip
 _TOLERANCE = click.option(
     "--tolerance", type=NOT_NEGATIVE, default=0.2, show_default=True, metavar="L",

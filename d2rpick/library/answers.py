@@ -196,7 +196,7 @@ def suggest(
     flying: Parts | None = None,
     **choosing: Unpack[Choosing],
 ) -> Suggestion:
-    """Choose tr for ``td``, or both times with td in ``td_window``, as ``d2rpick suggest`` does.
+    """Choose tr for ``td``, or both times with td in ``td_window`` or the longest flight, as ``d2rpick suggest`` does.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def suggest(
     td : float
         When the parts are switched back [time].
     td_window : (float, float)
-        Instead of ``td``: where to choose it [time].
+        Instead of ``td``: where to choose it [time]; without both, in the longest flight.
     parts : number, title or several, optional
         The parts to be switched; ``"10-19"`` is a range.
     flying : number, title or several, optional
@@ -235,13 +235,14 @@ def suggest(
     """
     from d2rpick.choice.of_run import Reference, suggest_of
 
-    if (td is None) == (td_window is None):
+    if td is not None and td_window is not None:
         raise TypeError("td or td_window was expected, and not both")
-    asked = arguments.number("td", td) if td is not None else arguments.window("td_window", td_window)
+    window = None if td_window is None else arguments.window("td_window", td_window)
+    asked = window if td is None else arguments.number("td", td)
     settings = arguments.settings(choosing)
     selection = _selection(run, parts, flying)
     core = suggest_of(Reference.of(run.files, selection), asked, settings)
-    times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked))
+    times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked)) if asked else ()
     return Suggestion(
         run=run,
         situation=core.situation,
