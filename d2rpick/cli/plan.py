@@ -1,0 +1,162 @@
+"""The command ``plan``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from d2rpick.cli import options as shared
+from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
+from d2rpick.cli.output import Output, finish, text_bytes
+from d2rpick.cli.progress import reading
+
+if TYPE_CHECKING:
+    from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.plan import Plan
+    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.verify import Verdict
+    from d2rpick.deck.printing.common import PrintedCard
+
+EXAMPLES = """\b
+Examples:
+  d2rpick plan --part box sample_data/rollover_box.matsum
+  d2rpick plan --part box -f value sample_data/rollover_box.matsum
+  d2rpick plan --part box -f card sample_data/rollover_box.matsum
+  d2rpick plan --part box --plot plan.png --report plan.html sample_data/rollover_box.matsum
+"""
+
+
+@click.command("plan", epilog=EXAMPLES)
+@click.option(
+    "--min-rigid", type=shared.NOT_NEGATIVE, metavar="T", help="Leave shorter windows out.  [default: 5% of the record]"
+)
+@click.option("--all", "every", is_flag=True, help="With -f value and card: all windows, not only the supported ones.")
+@click.option(
+    "--done", metavar="FILE", type=shared.FILE,
+    help="Windows in which HISTORY was switched, a line 'tr td' for each as -f value prints them: plan those after.",
+)  # fmt: skip
+@click.option(
+    "--before", metavar="HISTORY", multiple=True, type=shared.FILE,
+    help="The run that the windows of --done were planned from: its landings are compared; repeatable.",
+)  # fmt: skip
+@shared.history_options
+@shared.choosing_options
+@card_options
+@shared.output_options("table", "json", "csv", "markdown", "value", "card")
+@click.pass_context
+def command(
+    ctx: click.Context,
+    /,
+    min_rigid: float | None,
+    every: bool,
+    done: str | None,
+    before: tuple[str, ...],
+    output_format: str,
+    exit_zero: bool,
+    **options: Any,
+) -> None:
+    """Plan the rigid windows of a run: each of its flights with tr, td, and whether HISTORY supports it.
+
+    Windows are supported up to and with the first that locks in energy: it moves the landings after it.  Run with
+    these, then plan the next from the switched run, with --done.
+    """
+    from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.plan import plan_of
+    from d2rpick.report import plan as report
+
+    _check_usage(output_format, options, every=every, done=done, before=before)
+    prints = prints_card(options, output_format)
+    with reading(options["history"], quiet=options["quiet"]):
+        run = shared.open_run({**options, "part": ()})
+        output = Output.of(options, *run.sources, *([done] if done else []), *before)
+        reference = Reference(run, energy_of(run, options, prints=prints))
+        earlier = _earlier(before, options, prints=prints)
+    windows = _windows(done) if done else ()
+    plan = plan_of(reference, shared.settings(options), min_rigid=min_rigid, done=windows, before=earlier)
+    output.notes(reference.history.notes, plan.cautions)
+    _beside(plan, reference, options, output)
+    if output_format == "card":
+        return finish(ctx, objection=not _card(plan, reference, options, output, every=every), exit_zero=exit_zero)
+    texts = {
+        "table": lambda: report.as_table(plan),
+        "markdown": lambda: report.as_markdown(plan),
+        "csv": lambda: report.as_csv(plan),
+        "json": lambda: report.as_json(plan, ctx.meta["d2rpick.command"]),
+        "value": lambda: report.as_value(plan, every=every),
+    }
+    output.result(texts[output_format]())
+    return finish(ctx, objection=not plan.supported, exit_zero=exit_zero)
+
+
+def _check_usage(form: str, options: dict[str, Any], *, every: bool, done: str | None, before: tuple[str, ...]) -> None:
+    """Raise UsageError where options make no sense together, before a file is opened."""
+    if every and form not in ("value", "card"):
+        raise click.UsageError("--all belongs to -f value and -f card; other forms hold every window")
+    if before and done is None:
+        raise click.UsageError("--before compares the landings of a switched run; name its windows with --done")
+    if form == "card" and not (options["part"] or options["node"]):
+        raise click.UsageError("-f card needs --part, the parts that are switched (Radioss: --node, their main nodes)")
+
+
+def _windows(file: str) -> tuple[Times, ...]:
+    """Read the windows of a file, which must follow each other."""
+    from d2rpick.deck.printing.common import check_windows, read_windows
+
+    with click.open_file(file, encoding="utf-8", errors="replace") as stream:
+        return check_windows(read_windows(stream.read(), file))
+
+
+def _beside(plan: Plan, reference: Reference, options: dict[str, Any], output: Output) -> None:
+    """Write the figure and the page, as far as they are asked for."""
+    if options["plot"]:
+        from d2rpick.report import figures
+        from d2rpick.report.figures_plan import draw_plan
+
+        output.write(options["plot"], figures.render(draw_plan(plan), options["plot"]))
+    if options["report"]:
+        from d2rpick.report.plan_page import as_page
+
+        found = _judged(plan, reference, options, every=False)
+        card = found[0].text if found else None
+        output.write(options["report"], text_bytes(as_page(plan, reference.run, shared.repeat(), card)))
+
+
+def _earlier(names: tuple[str, ...], options: dict[str, Any], *, prints: bool) -> Reference | None:
+    """Open the run that came before, and read it in the same way."""
+    if not names:
+        return None
+    from d2rpick.choice.of_run import Reference
+
+    run = shared.open_run({**options, "history": names, "part": ()})
+    return Reference(run, energy_of(run, options, prints=prints))
+
+
+def _card(plan: Plan, reference: Reference, options: dict[str, Any], output: Output, *, every: bool) -> bool:
+    """Print the cards of the windows, judged as they are printed; False where there are none or one fails."""
+    if not plan.windows(every=every):
+        output.content(b"")
+        return False
+    found = _judged(plan, reference, options, every=every)
+    if found is None:
+        raise click.UsageError(need_ids(card_request(reference.run, options, plan.history), plan.history))
+    card, verdicts = found
+    output.notes(card.notes, dict.fromkeys(c for one in verdicts for c in all_cautions(one) if not one.verified))
+    output.content(card.text.encode())
+    return all(verdict.verified for verdict in verdicts)
+
+
+def _judged(
+    plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool
+) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
+    """Write the cards and judge them as printed; None without a window, or where nobody says whom to switch."""
+    from functools import partial
+
+    from d2rpick.choice.judged_card import judged_card
+    from d2rpick.choice.of_run import verify_of
+
+    windows = plan.windows(every=every)
+    if not windows:
+        return None
+    judge = partial(verify_of, reference._replace(history=plan.history), settings=plan.settings)
+    return judged_card(windows, plan.history, judge, card_request(reference.run, options, plan.history))
