@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from d2rpick.choice.suggest import Suggestion, suggest
 from d2rpick.choice.verify import Verdict, verify, with_comparison
+from d2rpick.flight.flying_parts import with_parts_by_number
 from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.opening import Selection, open_run
 
@@ -32,7 +33,12 @@ class Reference(NamedTuple):
     @classmethod
     def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read what is selected of a run that is open; FormatError when it is not there."""
-        return cls(run, run.history(selection))
+        return cls(run, run.history(with_parts_by_number(run, selection) if selection.parts else selection))
+
+    def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:
+        """Read of another run of the model the parts that this one has, whatever words they were asked for by."""
+        ids = tuple(str(part.id) for part in self.history.parts or ())
+        return Reference.of(run, selection._replace(parts=ids) if ids else selection)
 
 
 _Answer = TypeVar("_Answer", Suggestion, Verdict)

@@ -35,13 +35,14 @@ def command(write_as: str | None, **options: Any) -> None:
     model: kinetic energy, total energy, external work, contact energy, momentum, ... Where the files have the momenta
     of parts, those that fly together with the chosen ones count.
     """
+    from d2rpick.choice.of_run import Reference
     from d2rpick.histories.writing import TABLE_WRITERS, format_of
 
     form = write_as or format_of(options["output_file"], list(TABLE_WRITERS))
     with reading(options["history"], quiet=options["quiet"]):
         run = shared.open_run(options)
         output = Output.of(options, *run.sources)
-        history = run.history(shared.selection(options))
+        history = Reference.of(run, shared.selection(options)).history
         table = {"time": history.time, "internal_energy": history.energy}
         if history.parts and len(history.parts) > 1:
             energies = run.part_energies(history.parts)

@@ -71,7 +71,7 @@ def command(
         run = shared.open_run({**options, "part": ()})
         output = Output.of(options, *run.sources, *([done] if done else []), *before)
         reference = Reference(run, energy_of(run, options, prints=prints))
-        earlier = _earlier(before, options, prints=prints)
+        earlier = _earlier(before, reference, options)
     windows = _windows(done) if done else ()
     plan = plan_of(reference, shared.settings(options), min_rigid=min_rigid, done=windows, before=earlier)
     output.notes(reference.history.notes, plan.cautions)
@@ -122,14 +122,12 @@ def _beside(plan: Plan, reference: Reference, options: dict[str, Any], output: O
         output.write(options["report"], text_bytes(as_page(plan, reference.run, shared.repeat(), card)))
 
 
-def _earlier(names: tuple[str, ...], options: dict[str, Any], *, prints: bool) -> Reference | None:
+def _earlier(names: tuple[str, ...], reference: Reference, options: dict[str, Any]) -> Reference | None:
     """Open the run that came before, and read it in the same way."""
     if not names:
         return None
-    from d2rpick.choice.of_run import Reference
-
     run = shared.open_run({**options, "history": names, "part": ()})
-    return Reference(run, energy_of(run, options, prints=prints))
+    return reference.like(run, shared.selection(options))
 
 
 def _card(plan: Plan, reference: Reference, options: dict[str, Any], output: Output, *, every: bool) -> bool:

@@ -67,7 +67,7 @@ def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exi
     answer = verify_of(reference, tr, td, shared.settings(options))
     if switched:
         with reading(options["switched"], quiet=options["quiet"]):
-            answer = compare_with(answer, reference, Reference.of(switched, shared.selection(options)))
+            answer = compare_with(answer, reference, reference.like(switched, shared.selection(options)))
     output.notes(reference.history.notes, answer.cautions)
     if options["plot"]:
         from d2rpick.report import figures

@@ -207,7 +207,8 @@ def suggest(
     td_window : (float, float)
         Instead of ``td``: where to choose it [time]; without both, in the longest flight.
     parts : number, title or several, optional
-        The parts to be switched; ``"10-19"`` is a range.
+        The parts to be switched; ``"10-19"`` is a range, ``"flying"`` all deformable parts that fly together,
+        ``"all"`` all that have energy.
     flying : number, title or several, optional
         What flies together with them.
     **choosing
@@ -306,7 +307,7 @@ def verify(
     core = verify_of(reference, *pair, settings)
     times = ["--tr", repr(pair[0]), "--td", repr(pair[1])]
     if switched is not None:
-        core = compare_with(core, reference, Reference.of(switched.files, selection))
+        core = compare_with(core, reference, reference.like(switched.files, selection))
         times += [text for name in switched.sources for text in ("--switched", name)]
     return Verdict(
         run=run,
