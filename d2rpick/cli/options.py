@@ -133,7 +133,7 @@ def reading_options(function: Decorated) -> Decorated:
         _FORMAT, _TIME, _ENERGY,
         click.option(
             "--part", metavar="IDS", multiple=True, type=NAMES,
-            help="Parts to be switched: number (3,7), range (10-19), title, `flying` or `all`; their energies are added.",
+            help="Parts to be switched: number (3,7), range (10-19), title, `flying` or `all`; energies are added.",
         ),
         _FLYING, _CHANNEL,
     )(function)  # fmt: skip

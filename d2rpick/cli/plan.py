@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli import plan_deck
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
@@ -31,7 +32,12 @@ Examples:
 @click.option(
     "--min-rigid", type=shared.NOT_NEGATIVE, metavar="T", help="Leave shorter windows out.  [default: 5% of the record]"
 )
-@click.option("--all", "every", is_flag=True, help="With -f value and card: all windows, not only the supported ones.")
+@click.option(
+    "--all",
+    "every",
+    is_flag=True,
+    help="With -f value, -f card and --write-deck: all windows, not only the supported ones.",
+)
 @click.option(
     "--done", metavar="FILE", type=shared.FILE,
     help="Windows in which HISTORY was switched, a line 'tr td' for each as -f value prints them: plan those after.",
@@ -40,6 +46,7 @@ Examples:
     "--before", metavar="HISTORY", multiple=True, type=shared.FILE,
     help="The run that the windows of --done were planned from: its landings are compared; repeatable.",
 )  # fmt: skip
+@plan_deck.deck_options
 @shared.history_options
 @shared.choosing_options
 @card_options
@@ -66,7 +73,8 @@ def command(
     from d2rpick.report import plan as report
 
     _check_usage(output_format, options, every=every, done=done, before=before)
-    prints = prints_card(options, output_format)
+    options = plan_deck.for_deck(options)
+    prints = prints_card(options, "card" if options["deck"] else output_format)
     with reading(options["history"], quiet=options["quiet"]):
         run = shared.open_run({**options, "part": ()})
         output = Output.of(options, *run.sources, *([done] if done else []), *before)
@@ -76,27 +84,33 @@ def command(
     plan = plan_of(reference, shared.settings(options), min_rigid=min_rigid, done=windows, before=earlier)
     output.notes(reference.history.notes, plan.cautions)
     _beside(plan, reference, options, output)
+    checked, passed = _deck(plan, reference, options, every=every) if options["deck"] else ("", True)
+    if checked and (output_format != "table" or output.file):
+        click.echo(checked, err=True)
     if output_format == "card":
-        return finish(ctx, objection=not _card(plan, reference, options, output, every=every), exit_zero=exit_zero)
+        passed = _card(plan, reference, options, output, every=every) and passed
+        return finish(ctx, objection=not passed, exit_zero=exit_zero)
     texts = {
-        "table": lambda: report.as_table(plan),
+        "table": lambda: "\n\n".join(filter(None, (report.as_table(plan), "" if output.file else checked))),
         "markdown": lambda: report.as_markdown(plan),
         "csv": lambda: report.as_csv(plan),
         "json": lambda: report.as_json(plan, ctx.meta["d2rpick.command"]),
         "value": lambda: report.as_value(plan, every=every),
     }
     output.result(texts[output_format]())
-    return finish(ctx, objection=not plan.supported, exit_zero=exit_zero)
+    return finish(ctx, objection=not (plan.supported and passed), exit_zero=exit_zero)
 
 
 def _check_usage(form: str, options: dict[str, Any], *, every: bool, done: str | None, before: tuple[str, ...]) -> None:
     """Raise UsageError where options make no sense together, before a file is opened."""
-    if every and form not in ("value", "card"):
-        raise click.UsageError("--all belongs to -f value and -f card; other forms hold every window")
+    if every and form not in ("value", "card") and not options["deck"]:
+        raise click.UsageError("--all belongs to -f value, -f card and --write-deck; other forms hold every window")
+    plan_deck.check_usage(options["deck"], options["write_deck"])
     if before and done is None:
         raise click.UsageError("--before compares the landings of a switched run; name its windows with --done")
-    if form == "card" and not (options["part"] or options["node"]):
-        raise click.UsageError("-f card needs --part, the parts that are switched (Radioss: --node, their main nodes)")
+    if (form == "card" or options["deck"]) and not (options["part"] or options["node"]):
+        what = "-f card" if form == "card" else "--write-deck"
+        raise click.UsageError(f"{what} needs --part, the parts that are switched (Radioss: --node, their main nodes)")
 
 
 def _windows(file: str) -> tuple[Times, ...]:
@@ -128,6 +142,16 @@ def _earlier(names: tuple[str, ...], reference: Reference, options: dict[str, An
         return None
     run = shared.open_run({**options, "history": names, "part": ()})
     return reference.like(run, shared.selection(options))
+
+
+def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool) -> tuple[str, bool]:
+    """Write the copy of the deck with the cards, and check it; nothing without a window."""
+    if not plan.windows(every=every):
+        return "", True
+    found = _judged(plan, reference, options, every=every)
+    if found is None:
+        raise click.UsageError(need_ids(card_request(reference.run, options, plan.history), plan.history))
+    return plan_deck.write_and_check(found[0], reference.run, plan.settings, options)
 
 
 def _card(plan: Plan, reference: Reference, options: dict[str, Any], output: Output, *, every: bool) -> bool:
