@@ -137,7 +137,7 @@ def _residual_left(situation: Situation) -> float:
 
 def _windows_below(situation: Situation, grid: Samples, levels: Samples) -> list[Samples]:
     """Windows in which the error stays at or below each level, each of shape (n, 2)."""
-    inside = np.pad(situation.vibration.errors(grid) <= levels[:, np.newaxis], ((0, 0), (1, 1)))
+    inside = np.pad(situation.errors(grid) <= levels[:, np.newaxis], ((0, 0), (1, 1)))
     inner = inside[:, 1:-1]
     level, first = np.nonzero(inner & ~inside[:, :-2])
     last = np.nonzero(inner & ~inside[:, 2:])[1]
@@ -146,7 +146,7 @@ def _windows_below(situation: Situation, grid: Samples, levels: Samples) -> list
     limits = levels[level, np.newaxis]
     if level.size:
         within, *_ = narrow(
-            lambda t: situation.vibration.errors(t.ravel()).reshape(t.shape) <= limits, within, beyond, steps=_HALVINGS
+            lambda t: situation.errors(t.ravel()).reshape(t.shape) <= limits, within, beyond, steps=_HALVINGS
         )
     return [within[level == i] for i in range(levels.size)]
 

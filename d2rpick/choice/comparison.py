@@ -62,7 +62,7 @@ class Comparison:
     notes: tuple[str, ...]
 
 
-def compare(
+def compare_runs(
     reference: History,
     switched: History,
     pair: tuple[float, float],

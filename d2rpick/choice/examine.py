@@ -10,15 +10,15 @@ import numpy as np
 from d2rpick.choice.situation import Situation
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import find_flight, seen_flight
-from d2rpick.histories.history import window
-from d2rpick.vibration.identify import Identification, assess, identify, identify_several
+from d2rpick.histories.samples import window
+from d2rpick.vibration.identify import Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, energy_at
 from d2rpick.vibration.second_mode import resolved
 from d2rpick.vibration.span import Span, described_span, identify_within, span_of
 
 if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
-    from d2rpick.flight.window import FreeFlight
+    from d2rpick.flight.flight import Seen
     from d2rpick.histories.history import History
 
 # Beyond, squares of energies are no numbers any more; no unit system comes near.
@@ -28,7 +28,7 @@ _LARGEST = 1e150
 def examine(history: History, td: float, settings: Settings) -> Situation:
     """Find the flight around ``td`` and the oscillator in it.
 
-    RangeError when td, --after or the fit window lie outside the record, or it has fewer than 3 states.
+    RangeError when td, ``after`` or the fit window lie outside the record, or it has fewer than 3 states.
     """
     if history.time.size < 3:
         found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
@@ -38,10 +38,12 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
     if largest > _LARGEST:
         raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
     if settings.after is not None:
-        _inside(history, settings.after, "--after")
+        _inside(history, settings.after, "`after`")
     seen = seen_flight(history, td)
     flying = None if seen.refusal else seen.flight
-    fit, span = _oscillator(history, td, settings, flying)
+    # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
+    at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
+    fit, span = _oscillator(history, at, settings, seen)
     flight = find_flight(history, td, settings.after, seen, span)
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
@@ -54,25 +56,26 @@ def examine(history: History, td: float, settings: Settings) -> Situation:
 
 
 def _oscillator(
-    history: History, td: float, settings: Settings, seen: FreeFlight | None
+    history: History, td: float, settings: Settings, seen: Seen
 ) -> tuple[Identification | None, Span | None]:
     """Find the oscillator, given or identified, and the window around td that it describes."""
     if not settings.replay:
         return None, None
-    bounds = Span(seen.start, seen.end) if seen else Span(float(history.time[0]), float(history.time[-1]))
+    whole = bool(seen.flight or seen.refusal)
+    bounds = Span(*seen.flight[:2]) if seen.flight else Span(float(history.time[0]), float(history.time[-1]))
     if settings.after is not None:
         bounds = bounds._replace(start=min(settings.after, td))
     if settings.fit_window:
         for bound in settings.fit_window:
-            _inside(history, bound, "--fit-window")
+            _inside(history, bound, "`fit_window`")
         fit = identify_within(history, Span(*settings.fit_window))
         return _resolved(history, fit), span_of(history, td, fit, bounds) if fit.describes_record else None
     if settings.oscillator:
-        span, fit = described_span(history, td, bounds, partial(assess, settings.oscillator), whole=seen is not None)
+        span, fit = described_span(history, td, bounds, partial(judge_given, settings.oscillator), whole=whole)
         return fit, span
-    span, fit = described_span(history, td, bounds, identify, whole=seen is not None)
+    span, fit = described_span(history, td, bounds, identify, whole=whole)
     if span is None:
-        span, several = described_span(history, td, bounds, identify_several, whole=seen is not None)
+        span, several = described_span(history, td, bounds, identify_several, whole=whole)
         fit = several if span else fit
     return _resolved(history, fit), span
 
@@ -96,9 +99,9 @@ def _with_parts(evidence: Evidence, history: History, td: float, within: Span) -
     return evidence._replace(parts=parts, signed=PartVibration(parts, whole) if parts.signed and whole else None)
 
 
-def _inside(history: History, time: float, option: str) -> None:
+def _inside(history: History, time: float, argument: str) -> None:
     if not history.time[0] <= time <= history.time[-1]:
         raise RangeError(
-            f"{', '.join(history.source)}: {option} {time:g} lies outside the record, "
+            f"{', '.join(history.source)}: {argument} {time:g} lies outside the record, "
             f"{history.time[0]:g} to {history.time[-1]:g}"
         )

@@ -13,7 +13,8 @@ import numpy as np
 
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.flight import MOST_WORK
-from d2rpick.flight.work import work_beyond_gravity
+from d2rpick.flight.work import FEWEST_STATES, work_beyond_gravity
+from d2rpick.histories.samples import window as within
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,7 +51,7 @@ class Health:
     chosen); the ratio is the total energy over the initial energy and the external work.  The last three are over
     ``window`` [time]: how much the energy of the contacts changes, what the external work holds beyond gravity and
     damping, how much the eroded energy grows, as shares of the mean energy of the chosen parts there.  ``reason`` says
-    why shares are None although there are energies.
+    why shares are None although there are energies, ``window_reason`` why the work in the window is.
     """
 
     hourglass_share: float | None = None
@@ -66,6 +67,7 @@ class Health:
     window_work: float | None = None
     window_eroded: float | None = None
     reason: str | None = None
+    window_reason: str | None = None
 
 
 def assess(balance: Balance, window: tuple[float, float] | None = None, locked: float | None = None) -> Health:
@@ -92,7 +94,16 @@ def assess(balance: Balance, window: tuple[float, float] | None = None, locked: 
         eroded_share=_share(balance.eroded, peak),
         window=window,
         **(_in_window(balance, *window, locked) if window else {}),
+        window_reason=_too_short(balance, window) if window else None,
     )
+
+
+def _too_short(balance: Balance, window: tuple[float, float]) -> str | None:
+    """Say so when the work in the window is written, but in too few states to tell a load from gravity."""
+    states = int(np.count_nonzero((balance.time >= window[0]) & (balance.time <= window[1])))
+    if balance.external_work is None or states >= FEWEST_STATES:
+        return None
+    return f"the window holds {states} states: at least {FEWEST_STATES} tell a load that works there from gravity"
 
 
 def cautions_of_health(health: Health) -> Iterator[Caution]:
@@ -125,6 +136,8 @@ def _of_window(health: Health) -> Iterator[Caution]:
     if not health.window:
         return
     where = "from {:.6g} to {:.6g}".format(*health.window)
+    if health.window_reason:
+        yield Caution("window-not-judged", health.window_reason)
     if _above(health.window_sliding, MOST_WORK):
         found = f"contact energy of the model changes by {health.window_sliding:.0%} of the energy {where}"
         yield Caution("contact-in-window", f"{found}: where the parts touch something, they do not fly freely")
@@ -190,7 +203,7 @@ def _ratio(balance: Balance) -> dict[str, Any]:
 
 def _in_window(balance: Balance, start: float, end: float, locked: float | None) -> dict[str, Any]:
     """What should not happen in free flight, as shares of the energy there."""
-    inside = slice(*np.searchsorted(balance.time, [start, np.nextafter(end, np.inf)]))
+    inside = within(balance.time, start, end)
     if locked is None and balance.internal is not None:
         locked = float(np.mean(balance.internal[inside])) if balance.time[inside].size else None
     if locked is None or locked <= _FLOOR:

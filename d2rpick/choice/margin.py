@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.histories.history import window
+from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from d2rpick.choice.suggest import Suggestion, suggest
+from d2rpick.choice.examine import examine
+from d2rpick.choice.suggest import Suggestion, suggest_at
 from d2rpick.choice.verify import Verdict, verify, with_comparison
 from d2rpick.flight.flying_parts import with_parts_by_number
 from d2rpick.histories.balance_terms import balance_of
@@ -49,8 +50,12 @@ def read(names: Sequence[str], selection: Selection = _DEFAULT, input_format: st
     return Reference.of(open_run(names, selection, input_format), selection)
 
 
-def suggest_of(reference: Reference, td: float | tuple[float, float] | None, settings: Settings) -> Suggestion:
+def suggest_of(
+    reference: Reference, td: float | tuple[float, float] | None, settings: Settings, *, with_better: bool = True
+) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window (low, high) or, for None, in the longest flight [time].
+
+    ``with_better`` False: for a given td no better one is looked for.
 
     Raises
     ------
@@ -65,7 +70,8 @@ def suggest_of(reference: Reference, td: float | tuple[float, float] | None, set
         from d2rpick.choice.suggest_td import suggest_in_window
 
         return _with_health(suggest_in_window(reference.history, td, settings), reference.run)
-    return _with_health(suggest(reference.history, td, settings), reference.run)
+    answer = suggest_at(examine(reference.history, td, settings), with_better=with_better)
+    return _with_health(answer, reference.run)
 
 
 def verify_of(reference: Reference, tr: float, td: float, settings: Settings) -> Verdict:
@@ -112,12 +118,12 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
 
 
 def _comparison(verdict: Verdict, run: Run, switched: Reference) -> Comparison:
-    from d2rpick.choice.comparison import compare
+    from d2rpick.choice.comparison import compare_runs
 
     situation = verdict.situation
     flight, parts = situation.flight, situation.history.parts
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
-    return compare(
+    return compare_runs(
         situation.history,
         switched.history,
         (verdict.candidate.tr, situation.td),

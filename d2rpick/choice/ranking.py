@@ -47,6 +47,11 @@ def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
     )  # fmt: skip
 
 
+def keeps(situation: Situation, candidate: Candidate) -> bool:
+    """Whether a candidate is acceptable and keeps the limits asked for: the rule of ``verify``."""
+    return candidate.acceptable and not over_limits(situation, candidate)
+
+
 def best_of(situation: Situation, ranked: Iterable[Candidate]) -> Candidate | None:
-    """Give the first acceptable candidate that keeps the limits asked for."""
-    return next((c for c in ranked if c.acceptable and not over_limits(situation, c)), None)
+    """Give the first candidate that is acceptable and keeps the limits asked for."""
+    return next((c for c in ranked if keeps(situation, c)), None)

@@ -9,27 +9,25 @@ import numpy as np
 from d2rpick.flight.energy_alone import round_off
 
 if TYPE_CHECKING:
-    from d2rpick.choice.situation import Situation
+    from d2rpick.histories.history import History
 
 # Level errors up to here count as equal: no tr is better than another one.
 _ONE_LEVEL: Final = 0.02
 
 
-def nothing_vibrates(situation: Situation) -> bool:
-    """Whether nothing vibrates from the start of the flight to td.
+def nothing_vibrates(history: History, start: float, td: float, tolerance: float, *, deformed: bool) -> bool:
+    """Whether the energy is round-off from ``start`` to ``td`` [time] or, by the level error, stays on that of td.
 
-    The energy is round-off there or, where no vibration is known, stays on one level, that of td.
+    ``tolerance`` is that on the level error [-].  Where a vibration is known (``deformed``), a constant level is none
+    of rest.
     """
-    start = situation.earliest_tr
-    if start is None or not situation.in_flight:
-        return False
-    history, td = situation.history, situation.td
     _, inside = history.between(start, td)
     if not inside.size:
         return False
-    if float(np.abs(inside).max()) <= round_off(history):
+    least = round_off(history)  # 0 where no energy is written at all: that tells nothing
+    if least > 0 and float(np.abs(inside).max()) <= least:
         return True
     level = history.energy_at(td)
-    if situation.vibration.unknown is None or level <= 0 or inside.min() < 0:
+    if deformed or level <= 0 or inside.min() < 0:
         return False
-    return float(np.abs(np.sqrt(inside / level) - 1).max()) <= min(_ONE_LEVEL, situation.settings.tolerance)
+    return float(np.abs(np.sqrt(inside / level) - 1).max()) <= min(_ONE_LEVEL, tolerance)

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from d2rpick.vibration.one_mode import Mode
+
+# What an argument may be.  A tolerance of 1 accepts a tr that locks in nothing at all.
+_RANGES = (
+    ("margin", 0.0, inf),
+    ("tolerance", 0.0, 1.0),
+    ("max_kinetic_share", 0.0, inf),
+    ("max_residual", 0.0, inf),
+    ("cost_share", 0.0, 1.0),
+    ("step_ratio", 0.0, inf),
+)
 
 
 @dataclass(frozen=True)
@@ -34,3 +45,12 @@ class Settings:
     strict: bool = False
     cost_share: float | None = None
     step_ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Raise ValueError with the name of an argument that is out of its range."""
+        for name, low, high in _RANGES:
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise ValueError(f"{name} is {value:g}, a number from {low:g} to {high:g} was expected")
+        if self.fit_window and not self.fit_window[0] < self.fit_window[1]:
+            raise ValueError("fit_window {:g} to {:g} is empty, the lower time comes first".format(*self.fit_window))

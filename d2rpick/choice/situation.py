@@ -63,7 +63,15 @@ class Situation:
     @cached_property
     def at_rest(self) -> bool:
         """Whether nothing vibrates from the start of the flight to td."""
-        return nothing_vibrates(self)
+        start = self.earliest_tr
+        if start is None or not self.in_flight:
+            return False
+        deformed = self.vibration.unknown is None
+        return nothing_vibrates(self.history, start, self.td, self.settings.tolerance, deformed=deformed)
+
+    def errors(self, times: Samples) -> Samples:
+        """What a tolerance is held against, of the shape of ``times`` [-]: at rest nothing, else the vibration's."""
+        return np.zeros(times.shape) if self.at_rest else self.vibration.errors(times)
 
     @property
     def in_flight(self) -> bool:

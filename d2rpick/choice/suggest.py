@@ -10,13 +10,21 @@ from d2rpick.choice.candidates import Candidate, find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import Expectation, expectation
 from d2rpick.choice.ranking import best_of, over_limits, rank
+from d2rpick.choice.verify import verify_at
 from d2rpick.choice.warnings import Caution, cautions_of
+from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
     from d2rpick.choice.health import Health
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
+
+
+# Pairs at other peaks that may turn out not to verify when the record is examined there, before it is given up.
+_MOST_REFUSED = 3
+# Decimals of a residual that people read.
+_READ = 3
 
 
 class Pair(NamedTuple):
@@ -41,7 +49,7 @@ class AcceptableWindow(NamedTuple):
 
 
 class Suggestion(NamedTuple):
-    """Answer of ``suggest``: ranked candidates, the recommended pair, a better td, and what to be aware of.
+    """Answer of ``suggest``: ranked candidates, the recommended pair, a better one at another td, warnings.
 
     ``windows`` are those of acceptable tr, on basis "energy", ``td_window`` is where td was chosen, if it was;
     ``expected`` what the energy alone tells of the time after td.  ``longer`` is the longest acceptable pair in that
@@ -51,7 +59,7 @@ class Suggestion(NamedTuple):
     situation: Situation
     candidates: tuple[Candidate, ...]
     recommended: Pair | None
-    better_td: Pair | None
+    better_pair: Pair | None
     cautions: tuple[Caution, ...]
     health: Health | None = None
     td_window: tuple[float, float] | None = None
@@ -59,23 +67,38 @@ class Suggestion(NamedTuple):
     windows: tuple[AcceptableWindow, ...] | None = None
     longer: Pair | None = None
 
+    @property
+    def chosen(self) -> Candidate | None:
+        """The candidate that is recommended."""
+        return next((candidate for candidate in self.candidates if candidate.recommended), None)
+
+    @property
+    def clearly_better(self) -> Pair | None:
+        """The better pair where it is another one and better than that recommended, to the digits people read."""
+        better, own = self.better_pair, self.recommended
+        if better is None or own is None:
+            return better
+        if better.residual is not None and own.residual is not None:
+            return better if round(better.residual, _READ) < round(own.residual, _READ) else None
+        return better if f"{better.td:.6g}" != f"{own.td:.6g}" else None
+
 
 def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     """Rank the candidates for tr at ``td`` and recommend one; RangeError when td lies outside the record."""
     return suggest_at(examine(history, td, settings))
 
 
-def suggest_at(situation: Situation) -> Suggestion:
-    """Rank the candidates for tr in a situation that is known, and recommend one."""
+def suggest_at(situation: Situation, *, with_better: bool = True) -> Suggestion:
+    """Rank the candidates for tr in a situation that is known, and recommend one; look for a better td too."""
     candidates = rank(find_candidates(situation))
     best = best_of(situation, candidates)
     if best:
         candidates = tuple(replace(c, recommended=c is best) for c in candidates)
-    better = better_pair(situation)
+    better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
     if not best:
         cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
-    if not better:
+    if with_better and not better:
         cautions.append(Caution("no-better-td", "no peak of the energy in the flight has an acceptable tr"))
     recommended = Pair(best.tr, situation.td, best.residual) if best else None
     expected = expectation(situation, best.energy if best else None)
@@ -83,20 +106,28 @@ def suggest_at(situation: Situation) -> Suggestion:
     return Suggestion(situation, candidates, recommended, better, tuple(cautions), expected=expected, windows=windows)
 
 
-def better_pair(situation: Situation) -> Pair | None:
-    """Give the nearest peak of the energy in the flight that has an acceptable tr, and the best one there."""
+def find_better_pair(situation: Situation) -> Pair | None:
+    """Give the nearest peak of the energy in the flight that has an acceptable tr, and the best one there.
+
+    The pair is verified as a user would do it: the record is examined anew at that td.
+    """
     start = situation.earliest_tr
     if start is None:
         return None
     # where nothing tells the end of the flight, it is not sought beyond td
     end = situation.td if situation.flight.end is None and not situation.evidence.span else situation.latest_td
+    refused = 0
     for td in sorted(situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)):
         there = situation.at(td)
         if there.vibration.doubts:
             continue
         best = best_of(there, rank(find_candidates(there)))
         if best and not best.same_swing:
-            return Pair(best.tr, td, best.residual)
+            if _verifies(situation, best.tr, td):
+                return Pair(best.tr, td, best.residual)
+            refused += 1
+            if refused == _MOST_REFUSED:
+                return None
     return None
 
 
@@ -111,6 +142,16 @@ def _windows(
         return ()
     found = acceptable_windows(situation, candidates, best.tr if best else None)[0].tolist()
     return tuple(AcceptableWindow(low, high, (high - low) / (situation.td - start)) for low, high in found)
+
+
+def _verifies(situation: Situation, tr: float, td: float) -> bool:
+    """Whether ``verify`` would verify a pair, in full and in the six digits that people read."""
+    anew = examine(situation.history, td, situation.settings)
+    printed = float(f"{tr:.6g}"), float(f"{td:.6g}")
+    try:
+        return all(verify_at(anew.at(late), early).verified for early, late in ((tr, td), printed))
+    except RangeError:  # rounded beyond an end of the record, or onto each other
+        return False
 
 
 def _why_none(situation: Situation, ranked: tuple[Candidate, ...]) -> str:

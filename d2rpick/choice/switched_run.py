@@ -10,7 +10,8 @@ import numpy as np
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import FormatError, RangeError
 from d2rpick.flight.energy_alone import round_off
-from d2rpick.histories.history import Given, window
+from d2rpick.histories.history import Given
+from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

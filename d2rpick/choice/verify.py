@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.candidates import Candidate, judge
 from d2rpick.choice.examine import examine
-from d2rpick.choice.ranking import over_limits
+from d2rpick.choice.ranking import keeps, over_limits
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of
 from d2rpick.errors import RangeError
 from d2rpick.vibration.moments import Moment
@@ -62,7 +62,7 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
         candidate=candidate,
         tr_ok=candidate.acceptable if known else None,
         td_ok=td_ok,
-        verified=candidate.acceptable and not over,
+        verified=keeps(situation, candidate),
         reasons=reasons,
         cautions=tuple(cautions_of(situation)),
     )
@@ -76,7 +76,7 @@ def _in_order(tr: float, td: float) -> None:
 def approve(situation: Situation, times: Iterable[float]) -> list[bool]:
     """Tell for each of ``times`` before td whether ``verify`` would verify it as tr."""
     judged = judge(situation, [Moment(tr, "given", None) for tr in times])
-    return [candidate.acceptable and not over_limits(situation, candidate) for candidate in judged]
+    return [keeps(situation, candidate) for candidate in judged]
 
 
 def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:

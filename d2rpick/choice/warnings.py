@@ -70,9 +70,9 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
         found = f"the end of the load, {flight.start:.6g}, was read off the energy alone, which is not certain"
         if flight.settled is not None and flight.start is not None and flight.settled < flight.start:
             found += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are given up for safety"
-        yield Caution("flight-from-energy", f"{found}; give it with --after where it is known")
+        yield Caution("flight-from-energy", f"{found}; give it as `after` where it is known")
     if earliest is None:
-        yield Caution("no-flight", "nothing in the record shows when the load is over; give that time with --after")
+        yield Caution("no-flight", "nothing in the record shows when the load is over; give that time as `after`")
     elif td <= earliest:
         yield Caution("td-in-load", f"td = {td:.6g} lies before {end_of_load(situation)}")
     if td > situation.latest_td:

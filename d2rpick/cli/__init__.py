@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import click
 
 from d2rpick import __version__
+from d2rpick.cli.wording import with_options
 from d2rpick.errors import D2RPickError, printable
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ class _Group(click.Group):
                 import traceback
 
                 click.echo(traceback.format_exc(), err=True, nl=False)
-            raise click.ClickException(_one_line(error)) from error
+            raise click.ClickException(with_options(_one_line(error))) from error
         except MemoryError as error:
             raise click.ClickException("there is not enough memory; give it more, or name fewer files") from error
         except (

@@ -10,6 +10,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
+from d2rpick.cli.wording import with_options
 from d2rpick.errors import ConfigurationError, DeckError
 
 if TYPE_CHECKING:
@@ -103,11 +104,18 @@ def _checked(
             configuration = configuration_for(name, asked)
             inputs.append(configuration.source)
             content = sys.stdin.buffer.read() if name == STDIN else None
-            results.append(check_deck(name, configuration, judge, content))
+            results.append(_with_options(check_deck(name, configuration, judge, content)))
             inputs += results[-1].files
         except (ConfigurationError, DeckError) as error:
             failed.append(Unreadable(name, str(error)))
     return results, failed, inputs
+
+
+def _with_options(result: Checked) -> Checked:
+    """Let findings name the options that cure, not the arguments of the library."""
+    from dataclasses import replace
+
+    return replace(result, findings=tuple(replace(f, message=with_options(f.message)) for f in result.findings))
 
 
 def _main_decks(named: Sequence[str]) -> tuple[list[str], list[Unreadable]]:

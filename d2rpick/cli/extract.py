@@ -39,10 +39,11 @@ def command(write_as: str | None, **options: Any) -> None:
     from d2rpick.histories.writing import TABLE_WRITERS, format_of
 
     form = write_as or format_of(options["output_file"], list(TABLE_WRITERS))
-    with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run(options)
+    asked = shared.Reading.of(options)
+    with reading(asked.names, quiet=asked.quiet):
+        run = asked.open()
         output = Output.of(options, *run.sources)
-        history = Reference.of(run, shared.selection(options)).history
+        history = Reference.of(run, asked.selection).history
         table = {"time": history.time, "internal_energy": history.energy}
         if history.parts and len(history.parts) > 1:
             energies = run.part_energies(history.parts)

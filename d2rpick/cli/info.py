@@ -9,6 +9,7 @@ import click
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output
 from d2rpick.cli.progress import reading
+from d2rpick.report.formats import FORMATS, Shown, write
 
 EXAMPLES = """\b
 Examples:
@@ -19,22 +20,17 @@ Examples:
 
 @click.command("info", epilog=EXAMPLES)
 @shared.history_options
-@shared.output_options("table", "json", "csv", "markdown")
+@shared.output_options(*FORMATS["overview"])
 @click.pass_context
 def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **options: Any) -> None:  # noqa: ARG001
     """Show what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health."""
     from d2rpick.choice.overview import survey
     from d2rpick.report import overview as report
 
-    with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run(options)
+    asked = shared.Reading.of(options)
+    with reading(asked.names, quiet=asked.quiet):
+        run = asked.open()
         output = Output.of(options, *run.sources)
-        overview = survey(run, shared.selection(options))
+        overview = survey(run, asked.selection)
     output.notes((), report.cautions(overview))
-    texts = {
-        "table": lambda: report.as_table(overview),
-        "markdown": lambda: report.as_markdown(overview),
-        "csv": lambda: report.as_csv(overview),
-        "json": lambda: report.as_json(overview, ctx.meta["d2rpick.command"]),
-    }
-    output.result(texts[output_format]())
+    output.result(write("overview", output_format, overview, Shown(ctx.meta["d2rpick.command"])))

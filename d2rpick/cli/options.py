@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -97,7 +98,7 @@ _MARGIN = click.option(
     help="Time kept clear after the load and before the next contact.  [default: 0; where td is chosen, derived]",
 )  # fmt: skip
 _TOLERANCE = click.option(
-    "--tolerance", type=NOT_NEGATIVE, default=0.2, show_default=True, metavar="L",
+    "--tolerance", type=FRACTION, default=0.2, show_default=True, metavar="L",
     help="On the lock-in error, or on the level error where no oscillator is known.",
 )  # fmt: skip
 EXIT_ZERO = click.option("--exit-zero", is_flag=True, help="Exit with 0 where the answer is an objection (1).")
@@ -260,11 +261,39 @@ def _channels(given: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
     return tuple(pairs)
 
 
-def open_run(options: dict[str, Any]) -> Run:
-    """Open the run that the options of ``history_options`` name."""
-    from d2rpick.histories.opening import open_run
+@dataclass(frozen=True)
+class Reading:
+    """What is read, and how: the options of ``history_options``."""
 
-    return open_run(options["history"], selection(options), options["input_format"])
+    names: tuple[str, ...]
+    selection: Selection
+    input_format: str
+    quiet: bool
+
+    @classmethod
+    def of(cls, options: dict[str, Any]) -> Reading:
+        """Take the options as they were given; UsageError when energies are asked for in two ways."""
+        return cls(options["history"], selection(options), options["input_format"], options["quiet"])
+
+    def open(self) -> Run:
+        """Open the run."""
+        from d2rpick.histories.opening import open_run
+
+        return open_run(self.names, self.selection, self.input_format)
+
+
+@dataclass(frozen=True)
+class Extras:
+    """What is written beside the result: a figure, and a page with the options that judge by the same history."""
+
+    plot: str | None
+    report: str | None
+    judging: tuple[str, ...]
+
+    @classmethod
+    def of(cls, options: dict[str, Any]) -> Extras:
+        """Take the options as they were given."""
+        return cls(options["plot"], options["report"], tuple(judging(options)))
 
 
 def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
@@ -278,7 +307,7 @@ def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
     from d2rpick.choice.settings import Settings
 
     judging = Settings(after=options["after"], margin=options["margin"], tolerance=options["tolerance"])
-    return open_run({**options, "part": ()}), judging
+    return Reading.of({**options, "part": ()}).open(), judging
 
 
 def judging(options: dict[str, Any]) -> list[str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from d2rpick.cli.wording import with_options
 from d2rpick.errors import D2RPickError, printable
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ class Output(NamedTuple):
         for note in notes:
             click.echo(f"note: {printable(note)}", err=True)
         for caution in cautions:
-            click.echo(f"warning: {caution.code}: {printable(caution.message)}", err=True)
+            click.echo(f"warning: {caution.code}: {printable(with_options(caution.message))}", err=True)
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file whole or not at all: into a temporary file beside it, which then takes its name.

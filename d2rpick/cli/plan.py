@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -11,6 +12,7 @@ from d2rpick.cli import plan_deck
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
+from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
     from d2rpick.choice.of_run import Reference
@@ -50,7 +52,7 @@ Examples:
 @shared.history_options
 @shared.choosing_options
 @card_options
-@shared.output_options("table", "json", "csv", "markdown", "value", "card")
+@shared.output_options(*FORMATS["plan"], "card")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -70,34 +72,28 @@ def command(
     """
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.plan import plan_of
-    from d2rpick.report import plan as report
 
     _check_usage(output_format, options, every=every, done=done, before=before)
     options = plan_deck.for_deck(options)
     prints = prints_card(options, "card" if options["deck"] else output_format)
-    with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run({**options, "part": ()})
+    asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
+    with reading(asked.names, quiet=asked.quiet):
+        run = asked.open()
         output = Output.of(options, *run.sources, *([done] if done else []), *before)
         reference = Reference(run, energy_of(run, options, prints=prints))
-        earlier = _earlier(before, reference, options)
+        earlier = reference.like(replace(asked, names=before).open(), asked.selection) if before else None
     windows = _windows(done) if done else ()
-    plan = plan_of(reference, shared.settings(options), min_rigid=min_rigid, done=windows, before=earlier)
+    plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
     output.notes(reference.history.notes, plan.cautions)
     _beside(plan, reference, options, output)
     checked, passed = _deck(plan, reference, options, every=every) if options["deck"] else ("", True)
-    if checked and (output_format != "table" or output.file):
+    if checked and output_format != "table":
         click.echo(checked, err=True)
     if output_format == "card":
         passed = _card(plan, reference, options, output, every=every) and passed
         return finish(ctx, objection=not passed, exit_zero=exit_zero)
-    texts = {
-        "table": lambda: "\n\n".join(filter(None, (report.as_table(plan), "" if output.file else checked))),
-        "markdown": lambda: report.as_markdown(plan),
-        "csv": lambda: report.as_csv(plan),
-        "json": lambda: report.as_json(plan, ctx.meta["d2rpick.command"]),
-        "value": lambda: report.as_value(plan, every=every),
-    }
-    output.result(texts[output_format]())
+    text = write("plan", output_format, plan, Shown(ctx.meta["d2rpick.command"], every=every))
+    output.result(f"{text}\n\n{checked}" if checked and output_format == "table" else text)
     return finish(ctx, objection=not (plan.supported and passed), exit_zero=exit_zero)
 
 
@@ -134,14 +130,6 @@ def _beside(plan: Plan, reference: Reference, options: dict[str, Any], output: O
         found = _judged(plan, reference, options, every=False)
         card = found[0].text if found else None
         output.write(options["report"], text_bytes(as_page(plan, reference.run, shared.repeat(), card)))
-
-
-def _earlier(names: tuple[str, ...], reference: Reference, options: dict[str, Any]) -> Reference | None:
-    """Open the run that came before, and read it in the same way."""
-    if not names:
-        return None
-    run = shared.open_run({**options, "history": names, "part": ()})
-    return reference.like(run, shared.selection(options))
 
 
 def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool) -> tuple[str, bool]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -15,9 +15,10 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import counting
 from d2rpick.errors import D2RPickError, FormatError
+from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.studies.study import Question, Row, Study
     from d2rpick.studies.workers import Farm
@@ -29,6 +30,23 @@ Examples:
   d2rpick study --td 0.37 --part box --resume runs.ndjson -f json sample_data/rolloverT01.gz
   d2rpick study --td 0.064 --tolerance 0.1 -f ndjson sample_data/energy.csv sample_data/energy.glstat
 """
+
+
+@dataclass(frozen=True)
+class Work:
+    """Where runs are computed, and where finished ones are kept."""
+
+    resume: str | None
+    jobs: int | None
+    scheduler: str | None
+    quiet: bool
+
+    @classmethod
+    def of(cls, options: dict[str, Any]) -> Work:
+        """Take the options as they were given; UsageError where they contradict each other."""
+        if options["scheduler"] and options["jobs"]:
+            raise click.UsageError("--scheduler and --jobs exclude each other: the cluster has its own processes")
+        return cls(options["resume"], options["jobs"], options["scheduler"], options["quiet"])
 
 
 @click.command("study", epilog=EXAMPLES)
@@ -52,7 +70,7 @@ Examples:
 @click.option(
     "--report", metavar="FILE", type=shared.FILE, help="Write all of it to one HTML page to read, print and sign."
 )
-@shared.output_options("table", "json", "csv", "markdown", "ndjson")
+@shared.output_options(*FORMATS["study"])
 @click.pass_context
 def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exit_zero: bool, **options: Any) -> None:
     """Ask for tr in many runs: how far they agree, and one tr for all of them.
@@ -63,44 +81,29 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
     from d2rpick.studies.resume_file import fingerprint, line
     from d2rpick.studies.study import Question, summarise
 
-    if options["scheduler"] and options["jobs"]:
-        raise click.UsageError("--scheduler and --jobs exclude each other: the cluster has its own processes")
+    work, plot, report = Work.of(options), options["plot"], options["report"]
     sources = _sources(run, options["listed"])
     output = Output.of(options, *sources)
-    _check_ledger(options)
+    _check_ledger(work.resume, {"output-file": output.file, "plot": plot, "report": report})
     question = Question(
         options["td"], shared.settings(options), shared.selection(options), options["input_format"],
-        curve=bool(options["plot"] or options["report"]),
+        curve=bool(plot or report),
     )  # fmt: skip
     asked, rows = fingerprint(question), []
     streaming = output_format == "ndjson" and output.file is None
-    for row in _rows(question, sources, options, quiet=output.quiet or (streaming and sys.stdout.isatty())):
+    for row in _rows(question, sources, work, quiet=output.quiet or (streaming and sys.stdout.isatty())):
         rows.append(row)
         if streaming:
             output.result(line(row, asked))
     answer = summarise(question.td, rows)
     output.notes((), answer.cautions)
-    _write_files(answer, options, output._replace(inputs=_files_of(rows)))
+    _write_files(answer, plot, report, output._replace(inputs=_files_of(rows)))
     before = [] if streaming else [line(row, asked) for row in rows]
-    output.result(_text(answer, output_format, ctx.meta["d2rpick.command"], before))
+    output.result(write("study", output_format, answer, Shown(ctx.meta["d2rpick.command"], lines=before)))
     if not answer.judged:
         click.echo(f"d2rpick: no run could be judged; the first: {rows[0].message}", err=True)
         ctx.exit(2)
     finish(ctx, objection=answer.objection, exit_zero=exit_zero)
-
-
-def _text(answer: Study, output_format: str, command_line: Sequence[str], lines: Sequence[str]) -> str:
-    """Result in its format; ``lines`` are those of newline-delimited JSON that were not given out yet."""
-    from d2rpick.report import study as report
-
-    texts = {
-        "table": lambda: report.as_table(answer),
-        "markdown": lambda: report.as_markdown(answer),
-        "csv": lambda: report.as_csv(answer),
-        "json": lambda: report.as_json(answer, command_line),
-        "ndjson": lambda: "\n".join([*lines, report.as_last_line(answer, command_line)]),
-    }
-    return texts[output_format]()
 
 
 def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
@@ -131,14 +134,13 @@ def _listed(name: str) -> Iterator[str]:
             yield text
 
 
-def _check_ledger(options: dict[str, Any]) -> None:
-    """Raise D2RPickError when what ``--resume`` keeps would be overwritten by a result."""
-    name = options["resume"]
+def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
+    """Raise D2RPickError when what ``--resume`` keeps would be overwritten by a result, ``written`` by its option."""
     if name is None:
         return
-    for option in ("output_file", "plot", "report"):
-        if options[option] is not None and os.path.realpath(options[option]) == os.path.realpath(name):
-            raise D2RPickError(f"{name}: --resume and --{option.replace('_', '-')} name the same file; name two")
+    for option, file in written.items():
+        if file is not None and os.path.realpath(file) == os.path.realpath(name):
+            raise D2RPickError(f"{name}: --resume and --{option} name the same file; name two")
     if os.path.exists(name) and os.path.samestat(os.stat(name), os.fstat(1)):  # noqa: PTH110, PTH116
         raise D2RPickError(f"{name}: --resume and standard output are the same file; send one elsewhere")
 
@@ -148,39 +150,39 @@ def _files_of(rows: Sequence[Row]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(stamp.name for row in rows for stamp in row.files))
 
 
-def _write_files(answer: Study, options: dict[str, Any], output: Output) -> None:
+def _write_files(answer: Study, plot: str | None, report: str | None, output: Output) -> None:
     """Write figure and page where they are asked for; D2RPickError when one would replace a file that was read."""
-    for name in (output.file, options["plot"], options["report"]):
+    for name in (output.file, plot, report):
         if name is not None:
             output.claim(name)
-    if options["plot"] is None and options["report"] is None:
+    if plot is None and report is None:
         return
     from d2rpick.report import figures
 
-    if options["plot"] is not None:
-        output.write(options["plot"], figures.render(figures.draw_study(answer), options["plot"]))
-    if options["report"] is not None:
+    if plot is not None:
+        output.write(plot, figures.render(figures.draw_study(answer), plot))
+    if report is not None:
         from d2rpick.report.study_page import as_page
 
         drawing = figures.both_widths(figures.draw_study, answer, "runs")
-        output.write(options["report"], text_bytes(as_page(answer, shared.repeat(), drawing)))
+        output.write(report, text_bytes(as_page(answer, shared.repeat(), drawing)))
 
 
-def _rows(question: Question, sources: Sequence[str], options: dict[str, Any], *, quiet: bool) -> Iterator[Row]:
+def _rows(question: Question, sources: Sequence[str], work: Work, *, quiet: bool) -> Iterator[Row]:
     """Rows in the order of the runs, each as soon as those before it are there."""
     from d2rpick.studies.resume_file import Ledger
     from d2rpick.studies.study import ask, failed
     from d2rpick.studies.workers import answers
 
-    ledger = Ledger(options["resume"], question) if options["resume"] is not None else None
+    ledger = Ledger(work.resume, question) if work.resume is not None else None
     known = {number: row for number, source in enumerate(sources) if ledger and (row := ledger.find(source))}
     new = [number for number in range(len(sources)) if number not in known]
-    if ledger and (ledger.taken or ledger.outdated or ledger.damaged) and not options["quiet"]:
+    if ledger and (ledger.taken or ledger.outdated or ledger.damaged) and not work.quiet:
         click.echo(f"note: {ledger.told(len(sources))}", err=True)
     # the processes of a cluster work in other folders
-    names = [os.path.abspath(sources[n]) if options["scheduler"] else sources[n] for n in new]  # noqa: PTH100
+    names = [os.path.abspath(sources[n]) if work.scheduler else sources[n] for n in new]  # noqa: PTH100
     following = 0
-    with _farm(options, len(new)) as farm, counting(len(sources), quiet=quiet) as count:
+    with _farm(work, len(new)) as farm, counting(len(sources), quiet=quiet) as count:
         count.done = count.taken = len(known)
         for answer in chain((None,), answers(farm, partial(ask, question), names)):
             if answer:
@@ -195,13 +197,13 @@ def _rows(question: Question, sources: Sequence[str], options: dict[str, Any], *
                 following += 1
 
 
-def _farm(options: dict[str, Any], calls: int) -> Farm:
+def _farm(work: Work, calls: int) -> Farm:
     """Choose where to compute so many calls; a single one needs no other process."""
     from d2rpick.studies import workers
 
-    if options["scheduler"] and calls:
-        cluster = workers.Cluster(options["scheduler"])
-        if not cluster.threads and not options["quiet"]:
-            click.echo(f"note: {options['scheduler']}: no workers yet, waiting for some", err=True)
+    if work.scheduler and calls:
+        cluster = workers.Cluster(work.scheduler)
+        if not cluster.threads and not work.quiet:
+            click.echo(f"note: {work.scheduler}: no workers yet, waiting for some", err=True)
         return cluster
-    return workers.on_cores(min(options["jobs"] or workers.cores(), calls), "d2rpick.studies.study")
+    return workers.on_cores(min(work.jobs or workers.cores(), calls), "d2rpick.studies.study")

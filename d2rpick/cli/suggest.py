@@ -10,6 +10,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
+from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
     from d2rpick.choice.suggest import Suggestion
@@ -42,7 +43,7 @@ Examples:
 @shared.history_options
 @shared.choosing_options
 @card_options
-@shared.output_options("table", "json", "csv", "markdown", "value", "card")
+@shared.output_options(*FORMATS["suggestion"], "card")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -62,7 +63,6 @@ def command(
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
     from d2rpick.choice.of_run import Reference, suggest_of
-    from d2rpick.report import suggestion as report
 
     if _only_in_environment(ctx, "td", overruled_by="td_window"):
         td = None
@@ -70,28 +70,23 @@ def command(
         td_window = None
     _check_usage(td, td_window, card=output_format == "card", ids=(*options["part"], *options["node"]))
     prints = prints_card(options, output_format)
-    with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run({**options, "part": ()})
+    asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
+    extras = shared.Extras.of(options)
+    with reading(asked.names, quiet=asked.quiet):
+        run = asked.open()
         output = Output.of(options, *run.sources)
         reference = Reference(run, energy_of(run, options, prints=prints))
-    answer = suggest_of(reference, td_window if td is None else td, shared.settings(options))
+    answer = suggest_of(reference, td_window if td is None else td, settings)
     output.notes(reference.history.notes, answer.cautions)
-    if options["plot"]:
+    if extras.plot:
         from d2rpick.report import figures
 
-        output.write(options["plot"], figures.render(figures.draw_suggestion(answer), options["plot"]))
-    if options["report"]:
-        output.write(options["report"], text_bytes(_page(answer, run, options)))
+        output.write(extras.plot, figures.render(figures.draw_suggestion(answer), extras.plot))
+    if extras.report:
+        output.write(extras.report, text_bytes(_page(answer, run, options)))
     if output_format == "card":
         return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
-    texts = {
-        "table": lambda: report.as_table(answer, limit),
-        "markdown": lambda: report.as_markdown(answer, limit),
-        "csv": lambda: report.as_csv(answer),
-        "json": lambda: report.as_json(answer, ctx.meta["d2rpick.command"]),
-        "value": lambda: report.as_value(answer),
-    }
-    output.result(texts[output_format]())
+    output.result(write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit)))
     return finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,6 +11,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
+from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
     from d2rpick.choice.verify import Verdict
@@ -51,37 +53,35 @@ class _Verify(click.Command):
 @shared.history_options
 @shared.choosing_options
 @card_options
-@shared.output_options("table", "json", "csv", "markdown")
+@shared.output_options(*FORMATS["verdict"])
 @click.pass_context
-def command(ctx: click.Context, /, tr: float, td: float, output_format: str, exit_zero: bool, **options: Any) -> None:
+def command(
+    ctx: click.Context, /, tr: float, td: float, switched: tuple[str, ...], output_format: str, exit_zero: bool,
+    **options: Any,
+) -> None:  # fmt: skip
     """Judge one pair of switch times against the HISTORY of a run without switching."""
     from d2rpick.choice.of_run import Reference, compare_with, verify_of
-    from d2rpick.report import verdict as report
 
     prints = prints_card(options, output_format)
-    with reading(options["history"], quiet=options["quiet"]):
-        run = shared.open_run({**options, "part": ()})
-        switched = _switched(options)
-        output = Output.of(options, *run.sources, *(switched.sources if switched else ()))
+    asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
+    extras = shared.Extras.of(options)
+    finished = replace(shared.Reading.of(options), names=switched) if switched else None
+    with reading(asked.names, quiet=asked.quiet):
+        run, other = asked.open(), finished.open() if finished else None
+        output = Output.of(options, *run.sources, *(other.sources if other else ()))
         reference = Reference(run, energy_of(run, options, prints=prints))
-    answer = verify_of(reference, tr, td, shared.settings(options))
-    if switched:
-        with reading(options["switched"], quiet=options["quiet"]):
-            answer = compare_with(answer, reference, reference.like(switched, shared.selection(options)))
+    answer = verify_of(reference, tr, td, settings)
+    if other and finished:
+        with reading(finished.names, quiet=asked.quiet):
+            answer = compare_with(answer, reference, reference.like(other, finished.selection))
     output.notes(reference.history.notes, answer.cautions)
-    if options["plot"]:
+    if extras.plot:
         from d2rpick.report import figures
 
-        output.write(options["plot"], figures.render(figures.draw_verdict(answer), options["plot"]))
-    if options["report"]:
-        output.write(options["report"], text_bytes(_page(answer, run, switched, options)))
-    texts = {
-        "table": lambda: report.as_table(answer),
-        "markdown": lambda: report.as_markdown(answer),
-        "csv": lambda: report.as_csv(answer),
-        "json": lambda: report.as_json(answer, ctx.meta["d2rpick.command"]),
-    }
-    output.result(texts[output_format]())
+        output.write(extras.plot, figures.render(figures.draw_verdict(answer), extras.plot))
+    if extras.report:
+        output.write(extras.report, text_bytes(_page(answer, run, other, options)))
+    output.result(write("verdict", output_format, answer, Shown(ctx.meta["d2rpick.command"])))
     finish(ctx, objection=not answer.verified, exit_zero=exit_zero)
 
 
@@ -92,12 +92,3 @@ def _page(answer: Verdict, run: Run, switched: Run | None, options: dict[str, An
 
     request = card_request(run, options, answer.situation.history)
     return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), request, switched))
-
-
-def _switched(options: dict[str, Any]) -> Run | None:
-    """Open the switched run, as the reference is read; None where none was given."""
-    from d2rpick.histories.opening import open_run
-
-    if not options["switched"]:
-        return None
-    return open_run(options["switched"], shared.selection(options), options["input_format"])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.flight.window import FEWEST, SHORTEST
 from d2rpick.histories.crossings import find_crossings
 
 if TYPE_CHECKING:
@@ -42,10 +43,10 @@ class QuietTime(NamedTuple):
 
 def quiet_time(history: History, td: float) -> QuietTime | None:
     """Find the window around ``td`` [time] in which the energy stays in its band on one level, or None."""
-    start = float(history.time[0])
-    if np.abs(history.energy[history.time <= td]).max() <= round_off(
-        history
-    ):  # a fall from the start: nothing has happened yet
+    start, least = float(history.time[0]), round_off(history)
+    before = np.abs(history.energy[history.time <= td])
+    fallen = least > 0 and before.max() <= least and before.size >= FEWEST
+    if fallen and td - start >= SHORTEST * (history.time[-1] - start):  # nothing has happened since the start
         return QuietTime(start, _burst(history, start, td), start)
     settled = end_of_load(history, td)
     if settled is None:

@@ -120,7 +120,7 @@ def seen_flight(history: History, td: float) -> Seen:
         elif (not found or witness.source in _AGREEING) and witness.counts():
             doubts = _contradicting(found, witness, td)
             return _nearest(witness, td, _no_flight(witness.source, td), doubts)
-    return _confirmed(history, found, td) if found else Seen(None, None)
+    return _confirmed(history, found) if found else Seen(None, None)
 
 
 def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
@@ -134,7 +134,7 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
             if not all(other for _, other in others):
                 continue
             found = [(witness.source, flight), *((source, other) for source, other in others if other)]
-            seen = _confirmed(history, found, middle)
+            seen = _confirmed(history, found)
             if seen.flight and not seen.refusal:
                 kept.append((witness.source, seen.flight))
         if flights or witness.decisive:
@@ -190,10 +190,10 @@ def _contradicting(found: list[tuple[str, FreeFlight]], witness: Witness, td: fl
     return tuple(f"the {source} shows a flight there, but {_no_flight(witness.source, td)}" for source, _ in found)
 
 
-def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]], td: float) -> Seen:
+def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> Seen:
     """Give what is flight by the best source and those that should agree with it, and say where they do not."""
     source, best = found[0]
-    refusal = _driven(history, source, best, td)
+    refusal = _driven(history, source, best)
     if refusal:
         return Seen(None, None, refusal)
     start, end, end_seen = best.start, best.end, best.end_seen
@@ -211,16 +211,15 @@ def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]], td: fl
     return Seen(best._replace(start=start, end=end, end_seen=end_seen), source, doubts=tuple(doubts))
 
 
-def _driven(history: History, source: str, flight: FreeFlight, td: float) -> str | None:
-    """Say so when a load works on the model until ``td``, unless it may work on other parts than those that fly."""
+def _driven(history: History, source: str, flight: FreeFlight) -> str | None:
+    """Say so when a load works on the model in a flight, unless it may work on other parts than those that fly."""
     from d2rpick.flight.work import work_beyond_gravity
 
     balance = history.balance
     if balance is None or (source == "momentum" and _is_subset(history, flight)):
         return None
-    end = min(flight.end, max(td, flight.start))
-    work = work_beyond_gravity(balance, flight.start, end)
-    energy = history.mean_energy(flight.start, end)
+    work = work_beyond_gravity(balance, flight.start, flight.end)
+    energy = history.mean_energy(flight.start, flight.end)
     if work is None or energy is None or work <= MOST_WORK * max(energy, 0.0):
         return None
     return (

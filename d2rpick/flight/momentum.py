@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows, lasting_window
+from d2rpick.histories.samples import integral
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -113,8 +114,7 @@ class FreeFall:
 
     def __init__(self, time: Samples, momentum: Samples) -> None:
         self.time, self.momentum = time, momentum
-        steps = np.diff(time)[:, np.newaxis] * (momentum[1:] + momentum[:-1]) / 2
-        self.integral = np.vstack([np.zeros((1, momentum.shape[1])), np.cumsum(steps, axis=0)])
+        self.integral = integral(time, momentum)
 
     def misfit(self, first: int, last: int) -> float:
         """Largest deviation of the momentum from free flight between two states [momentum]."""

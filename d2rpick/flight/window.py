@@ -138,14 +138,14 @@ def _without_what_is_hidden(law: Law, window: tuple[int, int], room: float) -> t
     """Cut off what of a push the ``room`` still hides at the ends of a window.
 
     A push that fades smoothly leaves a deviation that falls with the square of the time that is left of it: from four
-    times the room to the room takes as long as from there to its end.
+    times the room to the room takes as long as from there to its end.  Less than a state cannot be told.
     """
     first, last = window
     wide = longest_window(law, (first + last) // 2, 4 * room)
     most = round(_ENDS * (last - first))
     return (
-        first + min(most, max(0, first - wide[0])) if wide[0] > 0 else first,
-        last - min(most, max(0, wide[1] - last)) if wide[1] < law.time.size - 1 else last,
+        first + min(most, max(0, first - wide[0] - 1)) if wide[0] > 0 else first,
+        last - min(most, max(0, wide[1] - last - 1)) if wide[1] < law.time.size - 1 else last,
     )
 
 

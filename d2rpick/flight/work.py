@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.flight.window import FEWEST, FreeFlight, lasting_window
+from d2rpick.histories.samples import integral, window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 FEWEST_STATES: Final = 6
 # What sampling and the solver's own sums leave of the work of gravity, as a share of its change: contacts do more.
 _OWN_ERROR: Final = 1e-3
+# Where no velocity is written, damping of the motion bends the parabola of the work of gravity.
+_BENT: Final = 1e-2
 # Mass follows from kinetic energy and velocity where it moves; states slower than this share (squared) are left out.
 _SLOW: Final = 1e-2
 # Mass so found is a bound already; a table may hold the kinetic energy of the chosen parts only, and a load that works
@@ -35,7 +38,7 @@ def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | N
     no velocity is written, the work of gravity is an upward parabola of time.  What printed digits and a solver's own
     sums leave open is not counted.  None where the work is not written, or the window holds too few states.
     """
-    inside = slice(*np.searchsorted(balance.time, [start, np.nextafter(end, np.inf)]))
+    inside = window(balance.time, start, end)
     if balance.external_work is None or balance.time[inside].size < FEWEST_STATES:
         return None
     time, work = balance.time[inside], balance.external_work[inside]
@@ -48,14 +51,15 @@ def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | N
         from d2rpick.flight.momentum import FreeFall
 
         velocity = balance.velocity[inside]
-        gravity = _integral(time, velocity @ FreeFall(time, velocity).gravity())
+        gravity = integral(time, velocity @ FreeFall(time, velocity).gravity())
         if balance.kinetic is not None:
             most = _most_gravity(velocity, balance.kinetic[inside])
     one_sided = [gravity]
     if balance.kinetic is not None:
-        one_sided.append(-_integral(time, balance.kinetic[inside]))
+        one_sided.append(-integral(time, balance.kinetic[inside]))
+    error = _BENT if balance.velocity is None else _OWN_ERROR
     rest = float(np.abs(_rest(work, free, one_sided, most)).max())
-    own = balance.precision.quantum(float(np.abs(work).max())) + _OWN_ERROR * float(np.ptp(work))
+    own = balance.precision.quantum(float(np.abs(work).max())) + error * float(np.ptp(work))
     return max(0.0, rest - own)
 
 
@@ -89,11 +93,6 @@ def _least_squares(values: Samples, free: Sequence[Samples], used: Sequence[Samp
         if factors.min(initial=0.0) >= 0:
             return values - table @ found, factors
         kept = [i for i in kept if factors[i] > 0]
-
-
-def _integral(time: Samples, values: Samples) -> Samples:
-    """Integral from the first time on, by trapezia; shape of ``time``."""
-    return np.append(0.0, np.cumsum(np.diff(time) * (values[1:] + values[:-1]) / 2))
 
 
 def can_tell(balance: Balance) -> bool:
@@ -140,7 +139,7 @@ class _Parabola:
 
     def __init__(self, time: Samples, energies: Samples, kinetic: Samples | None) -> None:
         self.time, self.energies = time, energies
-        self.spent = None if kinetic is None else _integral(time, kinetic)
+        self.spent = None if kinetic is None else integral(time, kinetic)
 
     def misfit(self, first: int, last: int) -> float:
         """Largest deviation between two states [energy]."""

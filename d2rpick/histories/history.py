@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from d2rpick.errors import HistoryError, RangeError
+from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -216,7 +217,11 @@ class History:
         """Energy at ``time``, linear between the states; RangeError outside the record."""
         if not self.time[0] <= time <= self.time[-1]:
             span = f"{self.time[0]:g} to {self.time[-1]:g}"
-            raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}")
+            from d2rpick.histories.legs import later_legs  # not above: pathlib costs start-up
+
+            legs = later_legs(self.source) if time > self.time[-1] else []
+            more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
+            raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}{more}")
         before = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
         cell = slice(before, before + 2)  # of whole arrays that are read-only, numpy would make copies
         return float(np.interp(time, self.time[cell], self.energy[cell]))
@@ -230,18 +235,6 @@ class History:
         """Times and energies of the states from ``start`` to ``end``, both included [time], [energy]."""
         inside = window(self.time, start, end)
         return self.time[inside], self.energy[inside]
-
-
-def window(time: Samples, start: float, end: float) -> slice:
-    """Slice of ascending times from ``start`` to ``end``, both included [time].
-
-    Examples
-    --------
-    >>> window(np.array([0.0, 1.0, 2.0, 3.0]), 1.0, 2.0)
-    slice(1, 3, None)
-    """
-    first, last = np.searchsorted(time, [start, np.nextafter(end, np.inf)]).tolist()
-    return slice(first, last)
 
 
 def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:

@@ -114,10 +114,12 @@ class Suggestion(Answer):
         >>> answer.to_frame().query("recommended")["tr"].round(6).tolist()
         [0.012885]
         """
-        from d2rpick.report.suggestion import CANDIDATE
+        from d2rpick.report.keys import CANDIDATE
 
         source = list(self.situation.history.source)
-        return frame_of(self.to_dict()["candidates"], CANDIDATE, td=self.td, basis=self.basis, source=source)
+        return frame_of(
+            self.to_dict()["candidates"], [*CANDIDATE, "parts"], td=self.td, basis=self.basis, source=source
+        )
 
     def plot(self) -> Figure:
         """Draw the energy with its level at td, and the choice, as a matplotlib Figure."""
@@ -169,9 +171,9 @@ class Verdict(Answer):
         >>> verdict.to_frame()["verified"].tolist()
         [True]
         """
-        from d2rpick.report.verdict import measures
+        from d2rpick.report.keys import of_verdict
 
-        row = measures(self._core)
+        row = of_verdict(self._core)
         return frame_of([row], list(row), basis=self.basis, source=list(self.situation.history.source))
 
     def plot(self) -> Figure:
@@ -252,7 +254,7 @@ def suggest(
         command=command_line("suggest", times, run, selection, choosing),
         candidates=core.candidates,
         recommended=core.recommended,
-        better_pair=core.better_td,
+        better_pair=core.better_pair,
         _core=core,
     )
 

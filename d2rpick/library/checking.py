@@ -45,9 +45,10 @@ class Findings:
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick check``, schema d2rpick/check/1; paths relative to the working folder."""
         from d2rpick.report.findings import as_json
+        from d2rpick.report.keys import of_warnings
 
         history = [text for name in self._history or () for text in ("--history", name)]
-        said = [caution._asdict() for caution in self.warnings]
+        said = of_warnings(self.warnings)
         return as_json(self._checked, Path.cwd(), ("check", *history, *self.decks), said, self._history)
 
     def to_frame(self) -> pd.DataFrame:

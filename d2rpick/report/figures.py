@@ -102,8 +102,8 @@ def draw_suggestion(answer: Suggestion, *, narrow: bool = False) -> Figure:
 
 def draw_better(answer: Suggestion, *, narrow: bool = False) -> Figure:
     """Draw the same for the better pair; there must be one."""
-    assert answer.better_td is not None
-    return _draw(answer.situation.at(answer.better_td.td), (), answer.better_td.tr, narrow=narrow)
+    assert answer.better_pair is not None
+    return _draw(answer.situation.at(answer.better_pair.td), (), answer.better_pair.tr, narrow=narrow)
 
 
 def draw_verdict(answer: Verdict, *, narrow: bool = False) -> Figure:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from d2rpick import __version__
 from d2rpick.choice.health import cautions_of_health
 from d2rpick.errors import printable
-from d2rpick.report import tables
+from d2rpick.report import keys, tables
 from d2rpick.report.health import HEAD as HEALTH_HEAD
 from d2rpick.report.health import measures_of
 
@@ -68,20 +67,40 @@ def as_csv(overview: Overview) -> str:
 
 def as_json(overview: Overview, command: Sequence[str]) -> str:
     """Everything by schema d2rpick/info/1."""
-    facts = asdict(overview)
-    facts["parts"] = [{**asdict(one.part), "energy_max": one.energy_max} for one in overview.parts]
-    facts["flights"] = [
+    sampling = overview.sampling
+    return tables.as_json(
         {
-            "start": f.start,
-            "end": f.end if f.end_seen else None,
-            "parts": [asdict(p) for p in f.parts] if f.parts else None,
-            "source": source,
+            "schema": SCHEMA,
+            "tool_version": __version__,
+            "command": list(command),
+            "warnings": keys.of_warnings(cautions(overview)),
+            "source": overview.source,
+            "format": overview.format,
+            "version": overview.version,
+            "title": overview.title,
+            "states": overview.states,
+            "time_start": overview.time_start,
+            "time_end": overview.time_end,
+            "time_unit": overview.time_unit,
+            "sampling": {"min": sampling.min, "median": sampling.median, "max": sampling.max} if sampling else None,
+            "complete": overview.complete,
+            "channels": overview.channels,
+            "parts": [
+                {"id": one.part.id, "title": one.part.title, "energy_max": one.energy_max} for one in overview.parts
+            ],
+            "flights": [
+                {
+                    "start": f.start,
+                    "end": f.end if f.end_seen else None,
+                    "parts": keys.of_parts(f.parts or None),
+                    "source": source,
+                }
+                for source, f in overview.flights
+            ],
+            "health": keys.of_health(overview.health),
+            "notes": overview.notes,
         }
-        for source, f in overview.flights
-    ]
-    front: dict[str, Any] = {"schema": SCHEMA, "tool_version": __version__, "command": list(command)}
-    front["warnings"] = [caution._asdict() for caution in cautions(overview)]
-    return tables.as_json({**front, **facts})
+    )
 
 
 def _rows(overview: Overview) -> list[tuple[str, tables.Cell]]:

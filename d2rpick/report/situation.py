@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from d2rpick import __version__
 from d2rpick.errors import printable
+from d2rpick.report import keys
 from d2rpick.report.tables import measure
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.warnings import Caution
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History, Part
+    from d2rpick.histories.history import History
 
 
 def heading(situation: Situation) -> list[str]:
@@ -71,13 +71,13 @@ def frame_of(history: History, schema: str, command: Sequence[str], cautions: It
         "schema": schema,
         "tool_version": __version__,
         "command": list(command),
-        "warnings": [caution._asdict() for caution in cautions],
+        "warnings": keys.of_warnings(cautions),
         "history": {
             "source": list(history.source),
             "sha256": [file.sha256() for file in history.files],
             "format": history.format,
             "channel": history.channel,
-            "parts": parts_of(history.parts),
+            "parts": keys.of_parts(history.parts),
             "states": int(history.time.size),
             "time_start": float(history.time[0]),
             "time_end": float(history.time[-1]),
@@ -85,11 +85,6 @@ def frame_of(history: History, schema: str, command: Sequence[str], cautions: It
             "notes": list(history.notes),
         },
     }
-
-
-def parts_of(parts: Sequence[Part] | None) -> list[dict[str, Any]] | None:
-    """Number and title of each part, or null for the whole model."""
-    return None if parts is None else [asdict(part) for part in parts]
 
 
 def mechanics(situation: Situation) -> dict[str, Any]:
@@ -105,11 +100,11 @@ def mechanics(situation: Situation) -> dict[str, Any]:
             "end": flight.end,
             "source": flight.source,
             "certain": flight.certain,
-            "parts": parts_of(flight.parts),
+            "parts": keys.of_parts(flight.parts),
         },
         "oscillator": _oscillator(situation),
         "modes": _modes(situation),
-        "unsigned_parts": [part._asdict() for part in parts.unsigned] if parts else None,
+        "unsigned_parts": keys.of_unsigned(parts.unsigned) if parts else None,
     }
 
 

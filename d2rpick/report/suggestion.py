@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.candidates import Candidate
-from d2rpick.report import tables
+from d2rpick.report import keys, tables
 from d2rpick.report.situation import frame, heading, mechanics
 
 if TYPE_CHECKING:
@@ -19,9 +17,6 @@ SCHEMA = "d2rpick/suggest/1"
 _NAMED = 4
 HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")
 
-# Keys of a candidate in JSON.
-CANDIDATE = tuple(field.name for field in fields(Candidate))
-
 
 def as_table(answer: Suggestion, limit: int) -> str:
     """Heading, the first ``limit`` candidates, the recommended and the better pair; the recommended row has a star."""
@@ -30,7 +25,7 @@ def as_table(answer: Suggestion, limit: int) -> str:
     left = len(answer.candidates) - limit
     if left > 0:
         lines.append(f"... and {left} more (--limit)")
-    lines += ["", f"recommended  {_pair(answer.recommended)}", f"better pair  {_pair(answer.better_td)}"]
+    lines += ["", f"recommended  {_pair(answer.recommended)}", f"better pair  {_pair(answer.better_pair)}"]
     lines += [f"{name.ljust(11)}  {text}" for name, text in outlook(answer)]
     return "\n".join(lines)
 
@@ -38,29 +33,31 @@ def as_table(answer: Suggestion, limit: int) -> str:
 def as_markdown(answer: Suggestion, limit: int) -> str:
     """The candidates as a Markdown table, and the two pairs below it."""
     table = tables.as_markdown(HEAD, rows(answer, limit))
-    lines = [("recommended", _pair(answer.recommended)), ("better pair", _pair(answer.better_td)), *outlook(answer)]
+    lines = [("recommended", _pair(answer.recommended)), ("better pair", _pair(answer.better_pair)), *outlook(answer)]
     return "\n\n".join([table, *(f"{name}: {text}" for name, text in lines)])
 
 
 def as_csv(answer: Suggestion) -> str:
     """All candidates, a column for each key of the JSON output but ``parts``, and the td they belong to."""
-    names = [field.name for field in fields(Candidate) if field.name not in ("parts", "notes")]
-    td = answer.situation.td
-    cells = ([*(getattr(c, n) for n in names), td, "; ".join(c.notes)] for c in answer.candidates)
+    names = [name for name in keys.CANDIDATE if name != "notes"]
+    cells = (
+        [*(keys.CANDIDATE[name](c) for name in names), answer.situation.td, "; ".join(c.notes)]
+        for c in answer.candidates
+    )
     return tables.as_csv([*names, "td", "notes"], cells).rstrip("\n")
 
 
 def as_json(answer: Suggestion, command: Sequence[str]) -> str:
     """The whole answer by schema d2rpick/suggest/1."""
-    better, recommended = answer.better_td, answer.recommended
+    recommended = answer.recommended
     return tables.as_json(
         {
             **frame(answer.situation, SCHEMA, command, answer.cautions),
             "td": answer.situation.td,
             "td_window": list(answer.td_window) if answer.td_window else None,
-            "longer_pair": answer.longer._asdict() if answer.longer else None,
+            "longer_pair": keys.of_pair(answer.longer),
             **mechanics(answer.situation),
-            "candidates": [{**asdict(c), "parts": [part._asdict() for part in c.parts]} for c in answer.candidates],
+            "candidates": [{**keys.of_candidate(c), "parts": keys.of_matches(c.parts)} for c in answer.candidates],
             "acceptable_windows": None
             if answer.windows is None
             else [
@@ -68,9 +65,9 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
                 for w in answer.windows
             ],
             "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
-            "health": asdict(answer.health) if answer.health else None,
-            "expected": answer.expected._asdict() if answer.expected else None,
-            "better_td": {"td": better.td, "tr": better.tr, "residual": better.residual} if better else None,
+            "health": keys.of_health(answer.health),
+            "expected": keys.of_expected(answer.expected),
+            "better_td": keys.of_pair(answer.better_pair),
         }
     )
 
@@ -78,7 +75,7 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     """What can be expected of the recommended pair, a name and a sentence each."""
     lines = [("acceptable", acceptable(answer))] if answer.windows else []
-    best = next((c for c in answer.candidates if c.recommended), None)
+    best = answer.chosen
     if best and best.run_time_share is not None:
         rigid = f"rigid for {best.rigid_fraction:.0%} of the record"
         lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's, {rigid}"))

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from d2rpick.report import page
 from d2rpick.report.html import Markup, drawings, pairs, remarks, section, table, tag
 from d2rpick.report.suggestion import HEAD, outlook, rows
-from d2rpick.report.tables import measure, short
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,7 +26,7 @@ def drawn(answer: Suggestion) -> dict[str, tuple[str, str]]:
             figures.draw_suggestion, answer, "choice"
         )
     }
-    if better_pair(answer):
+    if answer.clearly_better:
         found["The better pair"] = figures.both_widths(figures.draw_better, answer, "better")
     return found
 
@@ -37,28 +36,18 @@ def as_page(answer: Suggestion, record: page.Record) -> str:
     return page.run_page(record.run, _sections(answer, record))
 
 
-def better_pair(answer: Suggestion) -> Pair | None:
-    """Give the better pair where it is another one and better than that recommended, to the digits people read."""
-    better, chosen = answer.better_td, answer.recommended
-    if better is None or chosen is None:
-        return better
-    if better.residual is not None and chosen.residual is not None:
-        return better if float(measure(better.residual)) < float(measure(chosen.residual)) else None
-    return better if short(better.td) != short(chosen.td) else None
-
-
 def _sections(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
     yield _choice(answer)
     yield drawings(record.figures)
     yield section("Candidates", *_candidates(answer))
-    yield page.parts(next((candidate for candidate in answer.candidates if candidate.recommended), None))
+    yield page.parts(answer.chosen)
     yield from page.evidence(answer.situation, answer.health, record)
     if answer.recommended:
         yield page.solver_input(answer.situation, (answer.recommended.tr, answer.recommended.td), record)
 
 
 def _choice(answer: Suggestion) -> Markup:
-    better = better_pair(answer)
+    better = answer.clearly_better
     if answer.recommended:
         cards = [_pair(answer, "Recommended", answer.recommended, class_="card chosen")]
     else:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from d2rpick.errors import printable
-from d2rpick.report import tables
+from d2rpick.report import keys, tables
 from d2rpick.report.situation import frame, heading, mechanics
 
 if TYPE_CHECKING:
@@ -21,8 +20,8 @@ COMPARED = ("", "switched", "reference")
 
 def as_table(answer: Verdict) -> str:
     """Heading, the measures of the pair, the verdict and its reasons."""
-    width = max(len(name) for name in measures(answer))
-    lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in measures(answer).items()]
+    width = max(len(name) for name in keys.of_verdict(answer))
+    lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in keys.of_verdict(answer).items()]
     reasons = [f"  {reason}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
@@ -31,14 +30,14 @@ def as_table(answer: Verdict) -> str:
 
 def as_markdown(answer: Verdict) -> str:
     """The measures as a Markdown table of two columns, and the reasons below it."""
-    table = tables.as_markdown(("measure", "value"), list({**measures(answer), **_of_switched(answer)}.items()))
+    table = tables.as_markdown(("measure", "value"), list({**keys.of_verdict(answer), **_of_switched(answer)}.items()))
     return "\n".join([table, *(f"\n* {reason}" for reason in answer.reasons)])
 
 
 def as_csv(answer: Verdict) -> str:
     """One row, a column for each measure, those of a switched run with ``switched_`` before them, and the reasons."""
     situation = answer.situation
-    row = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **measures(answer)}
+    row = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **keys.of_verdict(answer)}
     row |= _of_switched(answer)
     row["reasons"] = "; ".join(answer.reasons)
     return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
@@ -51,11 +50,11 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
         {
             **frame(situation, SCHEMA, command, answer.cautions),
             **mechanics(situation),
-            **measures(answer),
-            "parts": [part._asdict() for part in answer.candidate.parts],
-            "health": asdict(answer.health) if answer.health else None,
+            **keys.of_verdict(answer),
+            "parts": keys.of_matches(answer.candidate.parts),
+            "health": keys.of_health(answer.health),
             "reasons": list(answer.reasons),
-            "switched": asdict(answer.switched) if answer.switched else None,
+            "switched": keys.of_comparison(answer.switched) if answer.switched else None,
         }
     )
 
@@ -96,29 +95,5 @@ def _comparison(switched: Comparison) -> list[str]:
 
 def _of_switched(answer: Verdict) -> dict[str, Any]:
     """Measures of the switched run under names of their own; empty where there is none."""
-    found = asdict(answer.switched) if answer.switched else {}
+    found = keys.of_comparison(answer.switched) if answer.switched else {}
     return {f"switched_{name}": value for name, value in found.items() if name not in ("source", "notes")}
-
-
-def measures(answer: Verdict) -> dict[str, Any]:
-    """All measures of the pair by their names in JSON."""
-    c = answer.candidate
-    return {
-        "tr": c.tr,
-        "td": answer.situation.td,
-        "energy": c.energy,
-        "energy_ratio": c.energy_ratio,
-        "level_error": c.level_error,
-        "sign_match": c.sign_match,
-        "lock_in_error": c.lock_in_error,
-        "residual": c.residual,
-        "residual_high": c.residual_high,
-        "part_mismatch": c.part_mismatch,
-        "timing_tolerance": c.timing_tolerance,
-        "rigid_time": c.rigid_time,
-        "rigid_fraction": c.rigid_fraction,
-        "run_time_share": c.run_time_share,
-        "tr_ok": answer.tr_ok,
-        "td_ok": answer.td_ok,
-        "verified": answer.verified,
-    }

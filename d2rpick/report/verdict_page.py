@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 from d2rpick.report import page
 from d2rpick.report.html import drawings, pairs, remarks, section, table, tag
+from d2rpick.report.keys import of_verdict
 from d2rpick.report.tables import short
-from d2rpick.report.verdict import COMPARED, comparison, deviations, measures, word
+from d2rpick.report.verdict import COMPARED, comparison, deviations, word
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -38,7 +39,7 @@ def _sections(answer: Verdict, record: page.Record) -> Iterator[Markup]:
     shown = page.pair(word(answer).capitalize(), times, candidate.residual, situation.history, class_)
     yield tag("section", tag("div", shown, class_="choice"), remarks(answer.cautions, answer.reasons))
     yield drawings(record.figures)
-    yield section("Measures", pairs((name.replace("_", " "), short(one)) for name, one in measures(answer).items()))
+    yield section("Measures", pairs((name.replace("_", " "), short(one)) for name, one in of_verdict(answer).items()))
     yield page.parts(candidate)
     if answer.switched:
         yield _switched(answer.switched, record.switched.files if record.switched else ())

@@ -37,7 +37,7 @@ class Judge(Protocol):
     def end(self) -> float:
         """Last time of the history."""
 
-    def faults(self, window: Window) -> Sequence[Fault]:
+    def faults(self, window: Window, together: Iterable[int]) -> Sequence[Fault]:
         """Everything that speaks against a window; nothing when it is a good one."""
 
 

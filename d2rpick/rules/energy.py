@@ -25,8 +25,11 @@ def _faults(rule: str, case: Case) -> Iterator[Objection]:
     if case.judge is None:
         return
     found: dict[tuple[SwitchSet, str, str], list[int]] = {}
+    together: dict[tuple[float, float | None], list[int]] = {}
     for window in case.windows.windows:
-        for fault in case.judge.faults(window):
+        together.setdefault((window.tr, window.td), []).extend([] if window.part is None else [window.part])
+    for window in case.windows.windows:
+        for fault in case.judge.faults(window, together[window.tr, window.td]):
             event = window.closed if fault.at_td else window.opened
             if fault.rule == rule and event:
                 found.setdefault((event.by, window.unit.kind, fault.message), []).append(window.unit.id)
@@ -78,7 +81,7 @@ RULES: Final = (
         "the error of the locked-in energy is above --tolerance",
         "While a part is rigid it keeps the deformation it had at tr, and releases it at td. The deformation "
         "should be the one it would have had at td: same energy, same sign. Judged as d2rpick verify does, "
-        "for each part where the history has parts, else by the energy of the whole model: by the lock-in "
+        "for the parts that share a window together, else by the energy of the whole model: by the lock-in "
         "error where an oscillator describes the record, else by the level error.",
         partial(_faults, "D2R201"),
         (*_PASSING, Example(GOOD)),

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import Reference, verify_of
-from d2rpick.choice.suggest import better_pair, suggest_at
+from d2rpick.choice.suggest import find_better_pair, suggest_at
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution
 from d2rpick.rules.base import Fault, name_units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.verify import Verdict
@@ -24,13 +24,22 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import Run, Selection
 
 # What verify warns of and no rule reports.
-_KEPT: Final = ("truncated-input", "energy-only", "no-free-flight", "flight-from-energy", "plastic-or-preload")
-_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time with --after"
+_KEPT: Final = (
+    "truncated-input",
+    "energy-only",
+    "no-free-flight",
+    "flight-from-energy",
+    "flight-sources-disagree",
+    "plastic-or-preload",
+)
+_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time as `after`"
 
 
 @dataclass
 class HistoryJudge:
-    """Judges by one run: each part by its own energy where the run has parts, else by that of the whole model.
+    """Judges by one run: the parts of a window together where the run has parts, else by the whole model.
+
+    As ``suggest`` chooses it for these parts: they are locked in and released at the same times.
 
     ``selection`` says what else was asked for; with a named energy all windows are judged by that one.
     """
@@ -38,14 +47,14 @@ class HistoryJudge:
     run: Run
     selection: Selection
     settings: Settings
-    _references: dict[int | None, Reference] = field(default_factory=dict)
-    _faults: dict[tuple[int | None, float, float | None], tuple[Fault, ...]] = field(default_factory=dict)
+    _references: dict[tuple[int, ...], Reference] = field(default_factory=dict)
+    _faults: dict[tuple[tuple[int, ...], float, float | None], tuple[Fault, ...]] = field(default_factory=dict)
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
     @property
     def end(self) -> float:
         """Last time of the history."""
-        return float(self._reference(next(iter(self._known), None)).history.time[-1])
+        return float(self._reference(self._known[:1]).history.time[-1])
 
     @property
     def cautions(self) -> list[Caution]:
@@ -60,36 +69,40 @@ class HistoryJudge:
         """What the readers left out or assumed, by what was judged so far."""
         return tuple(dict.fromkeys(note for one in self._references.values() for note in one.history.notes))
 
-    def _reference(self, part: int | None) -> Reference:
-        """Give the run with the energy of a part, or of the whole model."""
-        if part not in self._references:
-            selection = self.selection if part is None else self.selection._replace(parts=(str(part),))
-            self._references[part] = Reference.of(self.run, selection)
-        return self._references[part]
+    def _reference(self, parts: tuple[int, ...]) -> Reference:
+        """Give the run with the energy of some parts, or of the whole model where there are none."""
+        if parts not in self._references:
+            chosen = self.selection._replace(parts=tuple(map(str, parts))) if parts else self.selection
+            self._references[parts] = Reference.of(self.run, chosen)
+        return self._references[parts]
 
-    def faults(self, window: Window) -> tuple[Fault, ...]:
-        """Everything that speaks against a window; of one that is not closed, or inverted, tr alone is judged."""
+    def faults(self, window: Window, together: Iterable[int]) -> tuple[Fault, ...]:
+        """Everything that speaks against a window; of one that is not closed, or inverted, tr alone is judged.
+
+        ``together`` are the parts that are switched at the same times.
+        """
         td = window.td if window.td is not None and window.td > window.tr else None
-        part = window.part if self._known else None
-        if part is not None and part not in self._known:
-            there = name_units(self._known)
+        known = self._known
+        if known and window.part is not None and window.part not in known:
+            there = name_units(known)
             return (Fault("D2R205", False, f"not in the history, which has {there}; renumbered, or not written?"),)
-        key = part, window.tr, td
+        parts = () if window.part is None else tuple(part for part in known if part in {*together})
+        key = parts, window.tr, td
         if key not in self._faults:
-            if self._known and part is None:
+            if known and not parts:
                 which = "members" if window.unit.is_set else "parts"
                 who = f"the {which} of {window.unit.kind} {window.unit.id}"
                 what = f"{who} are not known, it is judged by the whole model"
                 self._cautions[Caution("judged-by-whole", what)] = []
-            self._faults[key] = tuple(self._judged(part, window.tr, td))
+            self._faults[key] = tuple(self._judged(parts, window.tr, td))
         return self._faults[key]
 
     @property
-    def _known(self) -> list[int]:
-        return [] if self.selection.energy else [part.id for part in self.run.parts]
+    def _known(self) -> tuple[int, ...]:
+        return () if self.selection.energy else tuple(part.id for part in self.run.parts)
 
-    def _judged(self, part: int | None, tr: float, td: float | None) -> Iterator[Fault]:
-        reference = self._reference(part)
+    def _judged(self, parts: tuple[int, ...], tr: float, td: float | None) -> Iterator[Fault]:
+        reference = self._reference(parts)
         history = reference.history
         first, last = float(history.time[0]), float(history.time[-1])
         times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
@@ -105,14 +118,13 @@ class HistoryJudge:
             yield from _of_load(history, tr, self.settings)
             return
         verdict = verify_of(reference, tr, td, self.settings)
-        if part is not None and not history.energy.any():
+        if parts and not history.energy.any():
             # nothing to lock in, as the reader's note says; when it may be switched is known by momentum alone
             yield from _of_flight(verdict) if verdict.situation.flight.start is not None else ()
             return
         for caution in verdict.cautions:
             if caution.code in _KEPT:
-                parts = self._cautions.setdefault(caution, [])
-                parts += [] if part is None else [part]
+                self._cautions.setdefault(caution, []).extend(parts)
         yield from faults_of(verdict)
 
 
@@ -124,7 +136,7 @@ def faults_of(verdict: Verdict) -> Iterator[Fault]:
     yield from found
     situation = verdict.situation
     if situation.kinetic_share is not None and situation.kinetic_share > POOR_KINETIC_SHARE:
-        better = better_pair(situation)
+        better = find_better_pair(situation)
         way_out = f"better: td = {better.td:.6g} with tr = {better.tr:.6g}" if better else "no better td was found"
         what = f"{situation.kinetic_share:.0%} of the vibration energy is kinetic at td = {situation.td:.6g}"
         yield Fault("D2R203", True, f"{what} and cannot be kept by any tr; {way_out}")
@@ -181,9 +193,9 @@ def _of_error(verdict: Verdict) -> Iterator[Fault]:
 
 def _way_out(verdict: Verdict) -> str:
     """Name a tr that suits the td, or where to look for a pair."""
-    other = suggest_at(verdict.situation)
+    other = suggest_at(verdict.situation, with_better=False)
     if other.recommended:
         return f"tr = {other.recommended.tr:.6g} suits this td"
-    if other.better_td:
-        return f"no tr suits this td; td = {other.better_td.td:.6g} with tr = {other.better_td.tr:.6g} does"
+    if better := find_better_pair(verdict.situation):
+        return f"no tr suits this td; td = {better.td:.6g} with tr = {better.tr:.6g} does"
     return "no tr suits this td; see d2rpick suggest"

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 # A run has one of these; the first two were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = "ok", "none", "unreadable", "out-of-range", "failed"
 # Cautions about single runs that a row says otherwise, or that are about what a study does not answer.
-_NOT_REPEATED = ("no-candidate", "no-better-td")
+_NOT_REPEATED = ("no-candidate",)
 # Runs that a sentence names.
 _NAMED = 3
 # A common tr saves at least this part of the rigid time of the earliest one.
@@ -160,12 +160,12 @@ def ask(question: Question, source: str) -> Row:
     files = stamps(source)
     try:
         reference = read([source], question.selection, question.input_format)
-        answer = suggest_of(reference, question.td, question.settings)
+        answer = suggest_of(reference, question.td, question.settings, with_better=False)
     except (D2RPickError, OSError) as error:
         status = OUT_OF_RANGE if isinstance(error, RangeError) else UNREADABLE
         text = f"{source}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)
         return Row(source, status, text, files=files)
-    best = next((candidate for candidate in answer.candidates if candidate.recommended), None)
+    best = answer.chosen
     said = {caution.code: caution.message for caution in answer.cautions}
     row = Row(
         source=source,
@@ -241,17 +241,17 @@ def _common(td: float, rows: Sequence[Row]) -> Common:
         finer = common_windows([row.acceptable[level] for row in judged])
         worth = finer[finer[:, 0] <= latest]
         low, high = worth[0] if worth.size else (low, high)
-    tr = shortest((3 * low + high) / 4, (low + 3 * high) / 4)
+    tr = fewest_digits((3 * low + high) / 4, (low + 3 * high) / 4)
     (window,) = shared[(shared[:, 0] <= tr) & (tr <= shared[:, 1])].tolist()
     return Common(tr, tuple(window), None)
 
 
-def shortest(low: float, high: float) -> float:
+def fewest_digits(low: float, high: float) -> float:
     """Give a number of the fewest digits between ``low`` and ``high``, the nearest to their middle.
 
     Examples
     --------
-    >>> shortest(0.0128717, 0.0128989)
+    >>> fewest_digits(0.0128717, 0.0128989)
     0.01289
     """
     middle = (low + high) / 2
@@ -264,7 +264,7 @@ def _why_none(judged: Sequence[Row]) -> str:
     stretches, counts = coverage([row.acceptable[0] for row in judged])
     if not counts.size:
         return f"no tr is acceptable in any of {runs_of(len(judged))}"
-    tr = shortest(*stretches[np.argmax(counts)])
+    tr = fewest_digits(*stretches[np.argmax(counts)])
     left = [row.source for row in judged if not _holds(row.acceptable[0], tr)]
     return (
         f"no tr is acceptable in all of {runs_of(len(judged))}; tr = {tr:.6g} is in {len(judged) - len(left)}, "

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.histories.samples import integral
 from d2rpick.vibration.one_mode import energy_and_jacobian
 
 if TYPE_CHECKING:
@@ -105,8 +106,7 @@ def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[
 
 def cell_means(s: Samples, e: Samples, count: int) -> Samples:
     """Means of E(s) over equal cells of [0, 1]."""
-    integral = np.concatenate(([0.0], np.cumsum((e[1:] + e[:-1]) / 2 * np.diff(s))))
-    return np.asarray(np.diff(np.interp(np.linspace(0, 1, count + 1), s, integral)) * count)
+    return np.asarray(np.diff(np.interp(np.linspace(0, 1, count + 1), s, integral(s, e))) * count)
 
 
 def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) -> list[Samples]:

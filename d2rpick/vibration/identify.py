@@ -201,7 +201,7 @@ def _least_wrong(refused: list[Identification], time: Samples) -> Identification
     return min(refused, key=lambda attempt: attempt.rms)
 
 
-def assess(mode: Mode, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
+def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
     """Hold a mode that is known, not fitted, against a record: it must follow the samples as a fit must.
 
     Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
@@ -305,9 +305,15 @@ def _judged(
         start=record.start,
         end=record.end,
         covariance=_covariance(attempt.jacobian, rest) * attempt.units * attempt.units[:, None],
-        vibration=float(np.sqrt(np.mean(vibration**2))) * record.scale,
+        vibration=_rms(vibration) * record.scale,
     )
     return found, loose is None
+
+
+def _rms(values: Samples) -> float:
+    """Root of the mean square, also of values whose squares are no numbers any more."""
+    largest = float(np.max(np.abs(values)))
+    return largest * float(np.sqrt(np.mean((values / largest) ** 2))) if largest > 0 else 0.0
 
 
 def _loose(name: str, misfit: float, structure: float, local_structure: float) -> str | None:

@@ -9,6 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+import numpy as np
+
+from d2rpick.vibration.identify import MAX_MISFIT, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.moments import SUNK
 from d2rpick.vibration.of_energy import OfEnergy
 from d2rpick.vibration.of_modes import OfModes
@@ -22,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.moments import Measured, Moment
     from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.part_shares import PartMatch
-    from d2rpick.vibration.part_signs import Parts, PartVibration, Unsigned
+    from d2rpick.vibration.part_signs import PartVibration, SignedParts, Unsigned
     from d2rpick.vibration.span import Span
 
 
@@ -105,7 +108,7 @@ class Evidence(NamedTuple):
     span: Span | None = None
     given: bool = False
     prescribed: bool = False
-    parts: Parts | None = None
+    parts: SignedParts | None = None
     signed: PartVibration | None = None
 
 
@@ -126,16 +129,31 @@ def energy_at(history: History, td: float, evidence: Evidence) -> OfModes | OfEn
     """Give the model of the whole energy to be relied on at ``td``: an oscillator, else the samples."""
     fit = evidence.fit
     if fit is None:
-        return OfEnergy(history, td, "no oscillator was looked for (--no-verify)")
+        return OfEnergy(history, td, "no oscillator was looked for")
     prescribed = ("the prescribed oscillator does not describe the record at td",) * evidence.prescribed
     if fit.reason:
         what = "the given oscillator does not describe" if evidence.given else "no single oscillator describes"
-        return OfEnergy(history, td, f"{what} the record: {fit.reason}", prescribed)
+        return OfEnergy(history, td, f"{what} the record: {fit.reason}", (*prescribed, *_aliased(history, fit)))
     model = describing(history, td, evidence)
     if not model.described(td):
         return OfEnergy(history, td, "the oscillator does not describe the record at td", prescribed)
     sunk = model.sunk
     return OfEnergy(history, td, sunk, (SUNK, *prescribed)) if sunk else model
+
+
+def _aliased(history: History, fit: Identification) -> tuple[str, ...]:
+    """Say so when the energy swings so fast that its states miss the level as they miss the vibration."""
+    if fit.mode is None or fit.misfit is None or fit.misfit > MAX_MISFIT:
+        return ()
+    time, _ = history.between(fit.start, fit.end)
+    # the interval that a moment lies in, on average: gaps count by their length
+    interval = float(np.sum(np.diff(time) ** 2)) / (fit.end - fit.start)
+    states = np.pi / (fit.mode.fastest * interval)
+    if states >= MIN_SAMPLES_PER_PERIOD:
+        return ()
+    return (
+        f"the energy has {states:.3g} states per period, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
+    )
 
 
 def describing(history: History, td: float, evidence: Evidence) -> OfModes | OfEnergy:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.part_shares import PartMatch
-    from d2rpick.vibration.part_signs import Parts
+    from d2rpick.vibration.part_signs import SignedParts
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class OfEnergy:
     estimated = mode = kinetic_share = sunk = None
     unsigned = signed = ()
 
-    def without_parts(self, parts: Parts | None, *, sunk: bool) -> OfEnergy:
+    def without_parts(self, parts: SignedParts | None, *, sunk: bool) -> OfEnergy:
         """Say too why single parts do not tell the deformation: without a sign, or ``sunk`` at td."""
         reasons = [self.unknown]
         reasons += ["at td the parts vibrate no more than a solver errs"] * sunk

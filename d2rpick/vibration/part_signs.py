@@ -43,7 +43,7 @@ class Unsigned(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class SignedParts:
     """Signed deformations of parts over ``time`` (n,).
 
     Parameters
@@ -86,7 +86,7 @@ class Parts:
         return float(before[-1] if before.size else self.time[0])
 
 
-def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Parts:
+def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> SignedParts:
     """Read the signed deformation of each part.
 
     Parameters
@@ -123,7 +123,7 @@ def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Parts:
             unclear += [zeros.doubtful, zeros.unseen]
     total = float(np.sum(roots**2))
     held = sum(float(np.sum(column**2)) for _, column in signed)
-    return Parts(
+    return SignedParts(
         names=tuple(name for name, _ in signed),
         time=time,
         deformation=np.array([column for _, column in signed]),
@@ -204,7 +204,7 @@ def _bend(times: Samples, values: Samples) -> Samples:
 class PartVibration:
     """Vibration of signed parts: ``whole`` knows its energy, a model of all parts together or an estimate."""
 
-    parts: Parts
+    parts: SignedParts
     whole: Mode | Modes | Envelope
 
     def amplitudes(self, t: Samples | float) -> Samples:

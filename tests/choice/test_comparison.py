@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare
+from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
 from d2rpick.errors import RangeError
 from d2rpick.histories.history import History, Track
 from tests.cli.test_output import check_by_schema
@@ -267,7 +267,7 @@ def history(energy: Samples, time: Samples = TIME, name: str = "run") -> History
 
 def held(momenta: tuple[Track | None, Track | None], td: float = 0.5) -> Comparison:
     """Compare two runs of one energy by their momenta."""
-    return compare(history(1 + TIME), history(1 + TIME), (0.1, td), np.inf, 0.2, momenta, NONE)
+    return compare_runs(history(1 + TIME), history(1 + TIME), (0.1, td), np.inf, 0.2, momenta, NONE)
 
 
 def track(values: Samples) -> Track:
@@ -303,14 +303,14 @@ def test_a_momentum_that_one_run_does_not_have_is_no_error(momenta: tuple[Track 
 def test_displacement_is_the_largest_distance_of_the_centres() -> None:
     places = np.stack([TIME, TIME**2, 0 * TIME], axis=1)
     moved = places + np.outer(TIME, [0.03, 0.0, 0.04])
-    found = compare(
+    found = compare_runs(
         history(1 + TIME), history(1 + TIME), (0.1, 0.5), 0.8, 0.2, NONE, (Track(TIME, places), Track(TIME, moved))
     )
     assert found.displacement == pytest.approx(0.8 * 0.05)
 
 
 def test_a_reference_without_energy_at_td_has_no_ratio() -> None:
-    assert compare(history(0 * TIME), history(1 + TIME), (0.1, 0.5), 1.0, 0.2, NONE, NONE).energy_ratio is None
+    assert compare_runs(history(0 * TIME), history(1 + TIME), (0.1, 0.5), 1.0, 0.2, NONE, NONE).energy_ratio is None
 
 
 @pytest.mark.parametrize("short", ["reference", "switched"])
@@ -318,7 +318,7 @@ def test_a_run_that_ends_at_td_is_named(short: str) -> None:
     runs = {name: history(1 + TIME, name=name) for name in ("reference", "switched")}
     runs[short] = history(1 + TIME[:52], TIME[:52], short)
     with pytest.raises(RangeError, match=rf"^{short}: fewer than 3 states from td 0.5 to 0.51; "):
-        compare(runs["reference"], runs["switched"], (0.1, 0.5), np.inf, 0.2, NONE, NONE)
+        compare_runs(runs["reference"], runs["switched"], (0.1, 0.5), np.inf, 0.2, NONE, NONE)
 
 
 def test_no_output_replaces_a_file_of_the_switched_run(tmp_path: Path) -> None:

@@ -186,7 +186,6 @@ def test_a_usage_that_makes_no_sense_is_explained_in_one_line(
 OBJECTIONS = {
     "constant": (table(lambda _: 5.0), (), "no-candidate"),
     "zero": (table(lambda _: 0.0), (), "no-energy"),
-    "zero at td": (table(lambda t: max(0.0, math.cos(4 * t))), ("--td", "0.6"), "no-energy"),
     "negative at td": (table(lambda t: math.cos(6 * t) - 0.5), (), "no-energy"),
     "only rising": (table(lambda t: t), (), "no-candidate"),
     "td at the start": (table(lambda t: 1 + math.cos(9 * t)), ("--td", "0"), "no-candidate"),

@@ -52,7 +52,7 @@ def test_the_published_record_gets_the_published_answer(source: str, digits: flo
 def test_a_rollover_without_an_oscillator_is_judged_by_energy_after_the_trip() -> None:
     found = answer(*ROLLING)
     assert found["basis"] == "energy"
-    assert 0.088 <= found["recommended"]["tr"] <= 0.110
+    assert 0.0908 <= found["recommended"]["tr"] <= 0.160
     assert {"energy-only", "flight-from-energy"} <= codes(found)
     for candidate in found["candidates"]:
         assert {candidate[key] for key in ("sign_match", "lock_in_error", "residual", "timing_tolerance")} == {None}

@@ -88,7 +88,7 @@ def test_nothing_to_recommend_is_an_objection(history: list[str]) -> None:
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        (("--all", ENERGY), "--all belongs to -f value and -f card"),
+        (("--all", ENERGY), "--all belongs to -f value, -f card and --write-deck"),
         (("--before", BOX, BOX), "name its windows with --done"),
         (("-f", "card", ENERGY), "needs --part"),
         (("--node", "3", ENERGY), "is about the card"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
+from contextlib import contextmanager
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
@@ -13,12 +13,15 @@ import jsonschema
 import numpy as np
 import pytest
 
+from d2rpick.cli import rollover
+from d2rpick.cli.progress import Count
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import Window, simulate
 from d2rpick.report import figures_models
-from tests.command import answer, codes, run, started
+from tests.command import answer, codes, run
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from matplotlib.lines import Line2D
@@ -148,23 +151,21 @@ def test_a_run_that_does_not_balance_its_energy_says_so() -> None:
     assert run("rollover", *SHORT).stderr == ""
 
 
-def test_the_progress_of_a_scan_is_told_on_a_terminal_only() -> None:
-    pty = pytest.importorskip("pty", reason="terminals are a matter of POSIX")
+@pytest.mark.parametrize("quiet", [False, True])
+def test_the_runs_of_a_scan_are_counted(quiet: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    counted: list[tuple[Count, bool]] = []
+
+    @contextmanager
+    def counting(total: int, *, quiet: bool) -> Iterator[Count]:
+        counted.append((Count(total), quiet))
+        yield counted[-1][0]
+
+    monkeypatch.setattr(rollover, "counting", counting)
     scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.1", "--t-end", "0.11", "--mesh", "4", "--dt", "1e-3")
-    assert "switched runs" not in run(*scan).stderr
-    master, slave = pty.openpty()
-    with started(*scan, stderr=slave) as process:
-        os.close(slave)
-        told = b""
-        try:
-            while piece := os.read(master, 1000):
-                told += piece
-        except OSError:  # how Linux tells that the other end is closed
-            pass
-        process.communicate(timeout=30)
-    os.close(master)
-    assert b"switched runs" in told
-    assert b"100%" in told
+    run(*scan, *(["-q"] if quiet else []))
+    ((count, silent),) = counted
+    assert count.done == count.total > 1
+    assert silent == quiet
 
 
 @pytest.mark.parametrize(

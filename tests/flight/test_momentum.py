@@ -266,7 +266,7 @@ def test_on_the_rollover_the_box_alone_does_not_fly() -> None:
 
 def test_masses_that_are_no_parts_fly_by_the_momentum_of_the_whole_model() -> None:
     found = answer("suggest", "--td", "0.238", "--part", "1-2", str(shared("openradioss/chain_referenceT01.gz")))
-    assert found["flight"] == {"start": 0.0, "end": None, "source": "momentum", "parts": None}
+    assert found["flight"] == {"start": 0.0, "end": None, "source": "momentum", "certain": True, "parts": None}
 
 
 @pytest.mark.parametrize(("run", "start"), [("L1", 0.0200), ("L3", 0.0235)])

@@ -15,7 +15,7 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
-from d2rpick.studies.study import OK, Question, Row, ask, failed, find_runs, outline, shortest, summarise
+from d2rpick.studies.study import OK, Question, Row, ask, failed, fewest_digits, find_runs, outline, summarise
 from tests import variants
 from tests.command import BOX, GLSTAT
 from tests.reading import read_history
@@ -172,7 +172,7 @@ def test_different_bases_and_units_are_told() -> None:
 @given(st.floats(1e-6, 1e3), st.floats(0, 1))
 def test_the_shortest_number_lies_between(low: float, share: float) -> None:
     high = low * (1 + share)
-    found = shortest(low, high)
+    found = fewest_digits(low, high)
     assert low <= found <= high
     assert len(repr(found)) <= len(repr(low)) or share < 1e-3 or len(repr(found)) <= 7
 

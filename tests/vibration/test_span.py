@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from d2rpick.histories.history import History
-from d2rpick.vibration.identify import assess, identify, identify_several
+from d2rpick.vibration.identify import identify, identify_several, judge_given
 from d2rpick.vibration.one_mode import Mode
 from d2rpick.vibration.span import Span, described_span, span_of
 from tests.records import ENERGY, MODE, TIME, noisy
@@ -31,7 +31,7 @@ def by_convolution(energy: np.ndarray, anchor: float) -> tuple[float, float]:
 @pytest.mark.parametrize("size", [1e-2, 1.0, 1e300])
 def test_a_span_ends_where_running_means_leave_the_fit(size: float, anchor: float) -> None:
     energy = ENERGY + size * MODE.vibration_energy(TIME) * ((TIME < 0.0311) | (TIME > 0.1234))
-    fit = assess(MODE, TIME, ENERGY)
+    fit = judge_given(MODE, TIME, ENERGY)
     assert span_of(of(energy), anchor, fit, Span(0.0, 0.15)) == by_convolution(energy, anchor)
 
 
@@ -45,7 +45,7 @@ def test_a_refusal_on_a_few_samples_names_the_misfit_of_all() -> None:
     for found in (
         identify(TIME, energy, quick=True),
         identify_several(TIME, energy, quick=True),
-        assess(MODE, TIME, energy, quick=True),
+        judge_given(MODE, TIME, energy, quick=True),
     ):
         assert (found.mode, found.describes_record) == (None, False)
         assert found.reason

@@ -1,0 +1,64 @@
+"""One table: which result can be written in which form, and by what.
+
+A result is a module of this folder, imported when it is written: ``--help`` lists the forms without it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    Writer = Callable[[Any, Any, "Shown"], str]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a form may show beside the answer: the command that was given, how many rows, lines written before.
+
+    ``every``: all windows of a plan, not only the supported ones.
+    """
+
+    command: Sequence[str] = ()
+    limit: int = 10
+    every: bool = False
+    lines: Sequence[str] = ()
+
+
+_PLAIN: Final[Mapping[str, Writer]] = {
+    "table": lambda report, answer, _: report.as_table(answer),
+    "json": lambda report, answer, shown: report.as_json(answer, shown.command),
+    "csv": lambda report, answer, _: report.as_csv(answer),
+    "markdown": lambda report, answer, _: report.as_markdown(answer),
+}
+
+# The first form of each is the default.
+FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
+    "suggestion": {
+        **_PLAIN,
+        "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
+        "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
+        "value": lambda report, answer, _: report.as_value(answer),
+    },
+    "plan": {**_PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
+    "verdict": _PLAIN,
+    "overview": _PLAIN,
+    "study": {
+        **_PLAIN,
+        "ndjson": lambda report, answer, shown: "\n".join([*shown.lines, report.as_last_line(answer, shown.command)]),
+    },
+}
+
+
+def write(result: str, form: str, answer: Any, shown: Shown) -> str:
+    """Write an answer in one of the forms of its result.
+
+    Examples
+    --------
+    >>> list(FORMATS["suggestion"])
+    ['table', 'json', 'csv', 'markdown', 'value']
+    """
+    return FORMATS[result][form](import_module(f"d2rpick.report.{result}"), answer, shown)

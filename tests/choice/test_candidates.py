@@ -1,0 +1,100 @@
+"""Candidates for tr: which times are offered, what is measured at them, and what speaks against them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.vibration import measures
+from tests import paper
+from tests.energies import codes, of, rollover, vibration
+
+PLAIN = Settings()
+
+
+def test_all_crossings_of_the_published_example_and_their_signs() -> None:
+    answer = suggest(paper.history(), paper.TD, PLAIN)
+    found = sorted((c.tr * 1e3, c.sign_match) for c in answer.candidates if c.kind == "crossing")
+    assert [sign for _, sign in found] == [sign for _, sign in paper.CROSSINGS]
+    assert [time for time, _ in found] == pytest.approx([time for time, _ in paper.CROSSINGS], rel=1e-9)
+
+
+def test_opposite_signs_are_worse_than_locking_in_nothing() -> None:
+    answer = suggest(paper.history(), paper.TD, PLAIN)
+    opposite = [c for c in answer.candidates if c.sign_match is False]
+    share = (4 * paper.ENERGY_TD + paper.KINETIC_TD) / (paper.ENERGY_TD + paper.KINETIC_TD)
+    assert [c.residual for c in opposite] == pytest.approx([np.sqrt(share)] * len(opposite), rel=1e-7)
+    assert not any(c.acceptable for c in opposite)
+
+
+def test_residual_is_made_of_lock_in_error_and_kinetic_share() -> None:
+    answer = suggest(paper.history(), 0.05, PLAIN)
+    for c in answer.candidates:
+        assert c.lock_in_error is not None
+        assert answer.situation.kinetic_share is not None
+        assert c.residual == pytest.approx(measures.residual(c.lock_in_error, answer.situation.kinetic_share), rel=1e-9)
+
+
+def test_the_first_sample_counts_like_any_other() -> None:
+    time = np.linspace(0, 1, 2001)
+    answer = suggest(of(4 * np.cos(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN)
+    assert answer.recommended is not None
+    assert answer.recommended.tr == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_level_of_zero_is_met_once_by_each_passage() -> None:
+    time = np.linspace(0, 1, 2001)
+    answer = suggest(of(4 * np.sin(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN)
+    times = [round(c.tr, 6) for c in answer.candidates if c.kind == "crossing"]
+    assert len(times) == len(set(times)) == 6
+
+
+def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates() -> None:
+    history = vibration()
+    answer = suggest(history, 3.25, PLAIN)
+    assert answer.recommended is not None
+    assert {c.kind for c in answer.candidates if c.acceptable} == {"extremum"}
+    # the peak at 0.75 has the other sign; of 0.25, 1.25, 2.25 the earliest saves most
+    assert answer.recommended.tr == pytest.approx(0.25, abs=1e-6)
+    assert answer.recommended.residual == pytest.approx(0.0, abs=1e-6)
+
+
+def test_crossings_during_the_trip_are_not_acceptable() -> None:
+    answer = suggest(rollover(), 0.37, PLAIN)
+    start = answer.situation.flight.start
+    assert start is not None
+    early = [c for c in answer.candidates if c.tr < start]
+    assert early
+    assert not any(c.acceptable for c in early)
+    assert all("before the end of the load" in c.notes[0] for c in early)
+
+
+def test_margin_and_after_move_the_earliest_tr() -> None:
+    plain = suggest(paper.history(), paper.TD, PLAIN)
+    later = suggest(paper.history(), paper.TD, Settings(after=0.013))
+    margin = suggest(paper.history(), paper.TD, Settings(after=0.013, margin=0.02))
+    assert plain.recommended is not None
+    assert later.recommended is not None
+    assert margin.recommended is not None
+    assert plain.recommended.tr == pytest.approx(0.0128853, abs=1e-6)
+    assert later.recommended.tr == pytest.approx(0.0247264, abs=1e-6)
+    assert margin.recommended.tr == pytest.approx(0.0383104, abs=1e-6)
+    assert later.situation.flight.source == "given"
+
+
+@pytest.mark.parametrize("energy", [np.zeros(50), np.full(50, 3.0), -np.ones(50)])
+def test_energies_that_do_not_vibrate_give_no_candidate(energy: np.ndarray) -> None:
+    answer = suggest(of(energy, np.arange(50.0)), 40.0, PLAIN)
+    assert answer.candidates == ()
+    assert answer.recommended is None
+    assert "no-candidate" in codes(answer)
+
+
+def test_a_negative_level_is_never_acceptable() -> None:
+    time = np.arange(0, 4, 0.01)
+    answer = suggest(of(np.sin(2 * np.pi * time) - 0.5, time), 3.5, Settings(after=0.0))
+    assert "no-energy" in codes(answer)
+    assert answer.recommended is None
+    assert all(c.level_error is None and c.energy_ratio is None for c in answer.candidates)

@@ -1,0 +1,258 @@
+"""When the parts fly, by everything that the files of computed runs tell, against what is known of these runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.examine import examine
+from d2rpick.choice.flights import find_flights
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.choice.verify import verify
+from d2rpick.flight.energy_alone import quiet_time
+from d2rpick.flight.flight import seen_flight
+from d2rpick.histories.history import Balance, Given, History
+from d2rpick.histories.opening import open_run
+from d2rpick.histories.selection import Selection
+from d2rpick.models.rollover.files import WRITERS
+from d2rpick.models.rollover.model import Parameters
+from d2rpick.models.rollover.run import simulate
+from tests.cli.test_output import check_by_schema
+from tests.command import ENERGY, ROLLOVER, answer, codes, run
+from tests.sample_box import t01
+from tests.shared import columns, shared
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+MILLISECOND = 1e-3
+
+
+class Rolled(NamedTuple):
+    """A computed run in every format, and when it truly flies."""
+
+    files: dict[str, Path]
+    start: float
+    end: float
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        Parameters(mesh=6, speed=7.4, stiffness=6e6, damping=1.0),
+        Parameters(mesh=5, speed=6.7, stiffness=3.5e6, yield_strain=6e-3, damping=0.0),
+    ],
+    ids=["fast", "slow"],
+)
+def rolled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Rolled:
+    """Runs that no threshold was set by."""
+    record = simulate(request.param, 0.5, interval=2e-4)
+    assert record.released is not None
+    assert record.landed is not None
+    folder = tmp_path_factory.mktemp("rolled")
+    files = {name: folder / f"run.{name}" for name in (*WRITERS, "T01")}
+    for name, file in files.items():
+        file.write_bytes(t01(record) if name == "T01" else WRITERS[name](record))
+    return Rolled(files, record.released, record.landed)
+
+
+@pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])
+def test_every_format_of_a_run_tells_its_flight_within_a_millisecond(rolled: Rolled, form: str) -> None:
+    part = ["--part", "box"] if form in ("matsum", "T01") else []
+    asked = ["suggest", "--td", str(round(rolled.end - 0.01, 3)), *part, str(rolled.files[form])]
+    found = answer(*asked)
+    flight = found["flight"]
+    assert flight["certain"]
+    assert flight["source"] == "momentum"
+    assert flight["start"] == pytest.approx(rolled.start, abs=MILLISECOND)
+    assert flight["end"] == pytest.approx(rolled.end, abs=MILLISECOND)
+    assert found["recommended"]["tr"] >= rolled.start - 2e-4
+    assert not codes(found) & {"contact-in-window", "work-in-window", "flight-sources-disagree"}
+
+
+@pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])
+def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, form: str, tmp_path: Path) -> None:
+    part = ["--part", "box"] if form in ("matsum", "T01") else []
+    file, td = str(rolled.files[form]), rolled.end + 0.02
+    result = run("suggest", "--td", str(td), *part, file)
+    assert result.exit_code == 1
+    assert "no free flight at td" in result.stderr
+    assert f"to {answer('suggest', '--td', str(td), *part, file)['flight']['end']:.6g}" in result.stderr
+    judged = answer("verify", "--tr", "0.2", "--td", str(td), *part, file)
+    assert (judged["verified"], judged["td_ok"]) == (False, False)
+    rows = answer("study", "--td", str(td), *part, file)["runs"]
+    assert [row["status"] for row in rows] == ["none"]
+    assert "after the end of the flight" in rows[0]["message"]
+    deck = tmp_path / "deck.k"
+    deck.write_text(run("card", "--tr", "0.2", "--td", str(td), "--part", "1").stdout)
+    found = answer("check", str(deck), "--history", file)
+    assert "D2R204" in {finding["rule"] for finding in found["findings"]}
+
+
+def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(rolled: Rolled) -> None:
+    whole = open_run([str(rolled.files["glstat"])]).history(Selection())
+    assert whole.balance
+    silent = Balance(whole.time, sliding=whole.balance.sliding, external_work=whole.balance.external_work)
+    history = History(whole.time, whole.energy, ("run",), "made", "E", evidence=Given((), silent))
+    flight = examine(history, rolled.end - 0.01, Settings()).flight
+    assert flight.source == "contact-energy"
+    assert (flight.start, flight.end) == pytest.approx((rolled.start, rolled.end), abs=MILLISECOND)
+    assert seen_flight(history, rolled.end + 0.02).refusal
+
+
+def test_the_energy_balance_tells_the_flight_where_there_is_neither(rolled: Rolled) -> None:
+    whole = open_run([str(rolled.files["glstat"])]).history(Selection())
+    assert whole.balance
+    parts = {name: getattr(whole.balance, name) for name in ("internal", "kinetic", "external_work", "precision")}
+    history = History(whole.time, whole.energy, ("run",), "made", "E", evidence=Given((), Balance(whole.time, **parts)))
+    flight = examine(history, (rolled.start + rolled.end) / 2, Settings(replay=False)).flight
+    assert flight.source == "energy-balance"
+    assert flight.start is not None
+    assert flight.end is not None
+    # damping bends the parabola of the work of gravity: less than the flight is found then, never more
+    assert rolled.start - 4 * MILLISECOND <= flight.start < flight.end <= rolled.end + 4 * MILLISECOND
+    assert seen_flight(history, rolled.end + 0.02).refusal
+
+
+def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(rolled: Rolled) -> None:
+    whole = open_run([str(rolled.files["csv"])]).history(Selection())
+    history = History(whole.time, whole.energy, ("run",), "made", "E")
+    td = rolled.end - 0.01
+    found = suggest(history, td, Settings(replay=False))
+    if found.recommended:
+        assert found.recommended.tr >= rolled.start
+        assert not found.situation.flight.certain
+    assert suggest(history, td, Settings(replay=False, strict=True)).recommended is None
+
+
+def history_of(source: str, *parts: str) -> History:
+    return open_run([str(shared(source))]).history(Selection(parts=parts))
+
+
+@pytest.mark.parametrize(
+    ("source", "parts", "flights"),
+    [
+        ("rollover_referenceT01.gz", ("box",), [(0.0908, 0.3819)]),
+        ("car_drop/carT01.gz", (), [(0.0096, 0.0281), (0.0385, 0.1504)]),
+        ("car_drop/drop2T01.gz", (), [(0.0, 0.2858), (0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)]),
+    ],
+)
+def test_all_flights_of_runs_of_a_solver_are_found(
+    source: str, parts: tuple[str, ...], flights: list[tuple[float, float]]
+) -> None:
+    found = [(f.start, f.end) for f in find_flights(history_of(f"openradioss/{source}", *parts)) if f.start is not None]
+    for start, end in flights:
+        assert [one for one in found if abs(one[0] - start) <= 5e-4 and abs((one[1] or np.inf) - end) <= 5e-4]
+
+
+def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
+    history = history_of("openradioss/car_drop/carT01.gz")
+    flight = examine(history, 0.146, Settings(replay=False)).flight
+    assert flight.start is not None
+    assert 0.0385 <= flight.start <= 0.0390
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "LOIS-LOI38-DMAFNLIN-input_44-isolid_1-reference-DMAFNLINT01",
+        "INTERF-INT_2-pl_dam_ilev-reference-PLREG41BT01",
+        "RESSORT-couple-reference-TYPE8MT01",
+        "SUBMODEL-TRANSF-reference-BOULE1V5T01",
+        "RESSORT-kjoint2-reference-JOINTT01",
+    ],
+)
+def test_a_driven_model_does_not_fly(name: str) -> None:
+    history = history_of(f"real/more-histories/OpenRadioss__miniqa-{name}")
+    assert find_flights(history, Settings(replay=False)) == ()
+    for share in (0.25, 0.5, 0.75):
+        td = float(history.time[0] + share * np.ptp(history.time))
+        found = suggest(history, td, Settings(replay=False))
+        assert found.recommended is None
+        assert not verify(history, td / 2, td, Settings(replay=False)).verified
+
+
+def test_in_a_free_fall_there_is_nothing_to_match() -> None:
+    history = history_of("openradioss/car_drop/drop2T01.gz")
+    found = suggest(history, 0.2838, Settings())
+    assert found.recommended
+    assert (found.recommended.tr, found.candidates[0].kind) == (0.0, "start")
+    assert "at-rest" in {caution.code for caution in found.cautions}
+    assert found.windows
+    assert found.windows[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
+    assert all(verify(history, tr, 0.2838, Settings()).verified for tr in (0.0, 0.1, 0.28))
+    alone = suggest(History(history.time, history.energy, ("drop",), "csv", "E"), 0.2838, Settings())
+    assert alone.recommended
+    assert alone.recommended.tr == 0.0
+
+
+@pytest.mark.parametrize(
+    ("source", "energy", "start", "end"),
+    [
+        ("rollover_ref.csv", "boxIE_J", 0.0908, 0.3819),
+        ("load_L1_ref.csv", "IE_J", 0.0200, 0.1),
+        ("load_L3_ref.csv", "IE_J", 0.0235, 0.1),
+    ],
+)
+@pytest.mark.parametrize("share", [0.5, 0.7, 0.9, 0.97])
+def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
+    source: str, energy: str, start: float, end: float, share: float
+) -> None:
+    time, values = columns(f"openradioss/{source}", energy)
+    quiet = quiet_time(History(time, values, (source,), "csv", energy), start + share * (end - start))
+    assert quiet is None or quiet.start >= start
+
+
+def test_what_stays_of_a_contact_energy_is_no_flight_where_a_load_of_another_kind_works() -> None:
+    time = np.linspace(0, 1, 501)
+    touched = np.where(time < 0.2, 5 * time, 1.0)
+    for work, flies in ((np.zeros_like(time), True), (40 * np.maximum(0, time - 0.5), False)):
+        balance = Balance(time, sliding=touched, external_work=work, kinetic=np.full_like(time, 10.0))
+        history = History(time, 1 + 0.3 * np.sin(200 * time), ("run",), "made", "E", evidence=Given((), balance))
+        assert examine(history, 0.9, Settings(replay=False)).in_flight is flies
+
+
+def test_sources_that_contradict_each_other_are_both_named_and_the_shorter_flight_counts() -> None:
+    found = history_of("openradioss/rollover_referenceT01.gz", "box")
+    assert found.balance
+    longer = np.where(found.time < 0.15, found.time, 0.15)
+    evidence = Given(found.momenta, Balance(found.time, sliding=longer, external_work=found.balance.external_work))
+    history = History(found.time, found.energy, ("run",), "made", "E", parts=found.parts, evidence=evidence)
+    situation = examine(history, 0.37, Settings(replay=False))
+    assert situation.flight.start == pytest.approx(0.15, abs=MILLISECOND)
+    (doubt,) = situation.flight.doubts
+    assert "by the momentum" in doubt
+    assert "by the contact energy" in doubt
+
+
+ALONE = ("--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
+
+
+def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> None:
+    assert "(energy alone, not certain)" in run("suggest", *ALONE).stdout
+    found = answer("suggest", *ALONE)
+    assert (found["flight"]["source"], found["flight"]["certain"]) == ("energy", False)
+    pair = ("verify", "--tr", str(found["recommended"]["tr"]), *ALONE)
+    assert "verdict  verified by the energy level alone" in run(*pair).stdout
+    assert [run(*asked, "--strict").exit_code for asked in (("suggest", *ALONE), pair)] == [1, 1]
+    (message,) = (w["message"] for w in found["warnings"] if w["code"] == "flight-from-energy")
+    assert "given up for safety" in message
+
+
+def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> None:
+    found = answer("suggest", *ALONE)
+    check_by_schema(found)
+    windows = found["acceptable_windows"]
+    (own,) = (window for window in windows if window["recommended"])
+    assert own["start"] <= found["recommended"]["tr"] <= own["end"]
+    assert all(found["flight"]["start"] <= w["start"] < w["end"] <= 0.37 for w in windows)
+    assert sum(w["share"] for w in windows) <= 1
+    for window in windows[:3]:
+        for tr in (window["start"], (window["start"] + window["end"]) / 2, window["end"]):
+            assert answer("verify", "--tr", repr(tr), *ALONE)["verified"]
+    assert f"{own['start']:.6g} to {own['end']:.6g}" in run("suggest", *ALONE).stdout
+    assert answer("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None

@@ -1,0 +1,64 @@
+"""Measures of a pair of times, against the motion of the oscillator and against independent digits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from d2rpick.vibration import measures
+from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.replay import Replay, from_mode, replayed_residual, to_mode
+from tests import paper
+
+modes = st.builds(
+    Mode,
+    omega=st.floats(1, 50),
+    alpha=st.floats(0, 2),
+    cosine=st.floats(-2, 2),
+    sine=st.floats(0.1, 2),
+    origin=st.floats(-1, 1),
+    preload=st.one_of(st.just(0.0), st.floats(-1, 1)),
+)
+
+
+@settings(max_examples=80, deadline=None)
+@given(modes, st.floats(0, 3), st.floats(0, 3))
+def test_measures_by_formula_are_those_of_the_motion(mode: Mode, tr: float, window: float) -> None:
+    td = tr + window
+    oscillator, start = from_mode(mode, tr)
+    replay = Replay(oscillator, start, tr, tr, td)
+    at_td = replay.reference(td)
+    whole = float(oscillator.vibration_energy(at_td))
+    assume(whole > 1e-9)
+    kinetic = measures.kinetic_share(mode, td)
+    lock_in = float(measures.lock_in_error(mode, tr, td))
+    assert kinetic == pytest.approx(1 - float(oscillator.internal_energy(at_td)) / whole, abs=1e-7)
+    frozen = replay.motion(td)
+    apart = float((frozen.y - frozen.z) - (at_td.y - at_td.z))
+    assert lock_in == pytest.approx(abs(apart) / np.sqrt(whole), abs=1e-6, rel=1e-7)
+    assert replay.residual() == pytest.approx(measures.residual(lock_in, kinetic), abs=1e-6, rel=1e-7)
+    assert float(replayed_residual(mode, np.array([tr]), td)[0]) == pytest.approx(replay.residual(), abs=1e-6, rel=1e-7)
+
+
+def test_the_published_pair_loses_nearly_all_vibration() -> None:
+    mode = to_mode(paper.OSCILLATOR, 6.0)
+    assert measures.kinetic_share(mode, paper.TD) == pytest.approx(paper.KINETIC_SHARE, rel=1e-10)
+    assert measures.residual(
+        float(measures.lock_in_error(mode, 0.0128852793630525, paper.TD)), paper.KINETIC_SHARE
+    ) == (pytest.approx(0.957444, abs=1e-6))
+
+
+@settings(max_examples=60, deadline=None)
+@given(modes, st.floats(0, 3), st.floats(0, 3))
+def test_the_timing_tolerance_is_where_the_error_has_grown(mode: Mode, tr: float, window: float) -> None:
+    td = tr + window
+    assume(float(mode.vibration_energy(td)) > 1e-6)
+    tolerance = float(measures.timing_tolerance(mode, np.array([tr]), td)[0])
+    here = float(measures.lock_in_error(mode, tr, td))
+    grown = here + measures.TOLERATED_GROWTH
+    inside = np.linspace(tr - tolerance, tr + tolerance, 501)[1:-1]
+    assert max(measures.lock_in_error(mode, float(t), td) for t in inside) <= grown * (1 + 1e-9) + 1e-9
+    ends = [measures.lock_in_error(mode, tr + side * tolerance, td) for side in (-1, 1)]
+    assert max(ends) == pytest.approx(grown, rel=1e-6) or tolerance == pytest.approx(2 * np.pi / mode.omega)
