@@ -243,7 +243,7 @@ def suggest(
     window = None if td_window is None else arguments.window("td_window", td_window)
     asked = window if td is None else arguments.number("td", td)
     settings = arguments.settings(choosing)
-    selection = _selection(run, parts, flying)
+    selection = selection_for(run, parts, flying)
     core = suggest_of(Reference.of(run.files, selection), asked, settings)
     times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked)) if asked else ()
     return Suggestion(
@@ -304,7 +304,7 @@ def verify(
 
     pair = arguments.number("tr", tr), arguments.number("td", td)
     settings = arguments.settings(choosing)
-    selection = _selection(run, parts, flying)
+    selection = selection_for(run, parts, flying)
     reference = Reference.of(run.files, selection)
     core = verify_of(reference, *pair, settings)
     times = ["--tr", repr(pair[0]), "--td", repr(pair[1])]
@@ -326,7 +326,7 @@ def verify(
     )
 
 
-def _selection(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
+def selection_for(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
     """Add the parts to the columns that were named when the run was read."""
     if not hasattr(run, "files"):
         raise TypeError(f"run is {run!r}, what read() or from_frame() gives was expected")

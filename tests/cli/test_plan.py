@@ -125,3 +125,39 @@ def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tm
     wrong = run("plan", "-q", *PART, "--done", str(done), *history)
     assert wrong.exit_code == 2
     assert "said to be done" in wrong.stderr
+
+
+DECK = """*KEYWORD
+*CONTROL_TERMINATION
+       1.2
+*DATABASE_GLSTAT
+    0.0001
+*DATABASE_MATSUM
+    0.0001
+*PART
+box
+         1         1         1
+*PART
+step
+         2         1         1
+*END
+"""
+
+
+def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(history: list[str], tmp_path: Path) -> None:
+    main, folder = tmp_path / "main.k", tmp_path / "next"
+    main.write_text(DECK)
+    args = ("plan", "-q", "--part", "flying", "--deck", str(main), "--write-deck", str(folder), *history)
+    result = run(*args)
+    assert result.exit_code == 0, result.stdout
+    assert "0 errors, 0 warnings" in result.stdout
+    assert (folder / "main.k").read_text() == DECK.replace("*END", "*INCLUDE\nswitches.k\n*END")
+    judged = run("check", str(folder / "main.k"), *(text for name in history for text in ("--history", name)))
+    assert judged.exit_code == 0, judged.stdout
+    again = run(*args)
+    assert again.exit_code == 2
+    assert "exists" in again.stderr
+    assert run(*args, "--overwrite").exit_code == 0
+    alone = run("plan", "--part", "box", "--deck", str(main), *history)
+    assert alone.exit_code == 2
+    assert "--deck needs --write-deck" in alone.stderr
