@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from d2rpick.library.answers import verify as verify
     from d2rpick.library.checking import Findings as Findings
     from d2rpick.library.checking import check as check
+    from d2rpick.library.plans import Plan as Plan
+    from d2rpick.library.plans import plan as plan
     from d2rpick.library.runs import Run as Run
     from d2rpick.library.runs import from_frame as from_frame
     from d2rpick.library.runs import read as read
@@ -39,6 +41,7 @@ _HOME = {
     ),
     **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "library.answers"),
     **dict.fromkeys(("Findings", "check"), "library.checking"),
+    **dict.fromkeys(("Plan", "plan"), "library.plans"),
     **dict.fromkeys(("Run", "from_frame", "read"), "library.runs"),
     **dict.fromkeys(("Study", "study"), "library.studies"),
     "Oscillator": "vibration.oscillator",

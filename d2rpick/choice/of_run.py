@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from d2rpick.choice.examine import examine
 from d2rpick.choice.suggest import Suggestion, suggest_at
 from d2rpick.choice.verify import Verdict, verify, with_comparison
+from d2rpick.flight.flying_parts import with_parts_by_number
 from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.opening import Selection, open_run
 
@@ -33,7 +34,12 @@ class Reference(NamedTuple):
     @classmethod
     def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read what is selected of a run that is open; FormatError when it is not there."""
-        return cls(run, run.history(selection))
+        return cls(run, run.history(with_parts_by_number(run, selection) if selection.parts else selection))
+
+    def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:
+        """Read of another run of the model the parts that this one has, whatever words they were asked for by."""
+        ids = tuple(str(part.id) for part in self.history.parts or ())
+        return Reference.of(run, selection._replace(parts=ids) if ids else selection)
 
 
 _Answer = TypeVar("_Answer", Suggestion, Verdict)
@@ -45,17 +51,21 @@ def read(names: Sequence[str], selection: Selection = _DEFAULT, input_format: st
 
 
 def suggest_of(
-    reference: Reference, td: float | tuple[float, float], settings: Settings, *, with_better: bool = True
+    reference: Reference, td: float | tuple[float, float] | None, settings: Settings, *, with_better: bool = True
 ) -> Suggestion:
-    """Choose tr for ``td``, or both times with td in a window (low, high) [time].
+    """Choose tr for ``td``, or both times with td in a window (low, high) or, for None, in the longest flight [time].
 
     ``with_better`` False: for a given td no better one is looked for.
 
     Raises
     ------
     RangeError
-        If td or the window lies outside the record.
+        If td or the window lies outside the record, or no flight is seen.
     """
+    if td is None:
+        from d2rpick.choice.suggest_td import suggest_in_longest_flight
+
+        return _with_health(suggest_in_longest_flight(reference.history, settings), reference.run)
     if isinstance(td, tuple):
         from d2rpick.choice.suggest_td import suggest_in_window
 

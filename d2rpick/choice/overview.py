@@ -10,6 +10,7 @@ import numpy as np
 from d2rpick.choice.health import Health, assess
 from d2rpick.errors import FormatError
 from d2rpick.flight.flight import all_seen
+from d2rpick.flight.flying_parts import with_parts_by_number
 from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.companions import doubts
 from d2rpick.histories.selection import select_parts
@@ -144,6 +145,8 @@ def _health(run: Run, flights: Sequence[FreeFlight]) -> Health | None:
 
 
 def _flights(run: Run, selection: Selection) -> tuple[tuple[str, FreeFlight], ...]:
+    if selection.parts:
+        selection = with_parts_by_number(run, selection)
     for wanted in (selection.parts, selection.flying):
         if wanted:
             select_parts(wanted, run.parts, run.name)

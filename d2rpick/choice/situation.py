@@ -57,13 +57,14 @@ class Situation:
 
     @property
     def earliest_tr(self) -> float | None:
-        """Start of the flight with the margin, or None when unknown [time]."""
-        return None if self.flight.start is None else self.flight.start + self.settings.margin
+        """Start of the flight with the margin, or None when unknown [time]; no load comes before the record."""
+        start, margin = self.flight.start, self.settings.margin or 0.0
+        return start if start is None or start <= self.history.time[0] else start + margin
 
     @property
     def latest_td(self) -> float:
         """End of the flight with the margin; infinite when no contact was seen [time]."""
-        return float("inf") if self.flight.end is None else self.flight.end - self.settings.margin
+        return float("inf") if self.flight.end is None else self.flight.end - (self.settings.margin or 0.0)
 
     @cached_property
     def at_rest(self) -> bool:

@@ -34,6 +34,11 @@ class Pair(NamedTuple):
     td: float
     residual: float | None
 
+    @property
+    def rigid_time(self) -> float:
+        """Length of the rigid window [time]."""
+        return self.td - self.tr
+
 
 class AcceptableWindow(NamedTuple):
     """From ``start`` to ``end`` [time] every tr is acceptable; ``share`` is its share of the flight up to td [-]."""
@@ -47,7 +52,8 @@ class Suggestion(NamedTuple):
     """Answer of ``suggest``: ranked candidates, the recommended pair, a better one at another td, warnings.
 
     ``windows`` are those of acceptable tr, on basis "energy", ``td_window`` is where td was chosen, if it was;
-    ``expected`` what the energy alone tells of the time after td.
+    ``expected`` what the energy alone tells of the time after td.  ``longer`` is the longest acceptable pair in that
+    window, where much saving was given up for quality.
     """
 
     situation: Situation
@@ -59,6 +65,7 @@ class Suggestion(NamedTuple):
     td_window: tuple[float, float] | None = None
     expected: Expectation | None = None
     windows: tuple[AcceptableWindow, ...] | None = None
+    longer: Pair | None = None
 
     @property
     def chosen(self) -> Candidate | None:

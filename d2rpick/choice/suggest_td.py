@@ -1,74 +1,98 @@
-"""Choosing both times: td in a window, and tr for it."""
+"""Choosing both times: td in a window or in the longest flight, and tr for it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache, partial
-from typing import TYPE_CHECKING
-
-import numpy as np
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
-from d2rpick.choice.expectation import expectation, mean_in_flight, shortfall
-from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, kept, rank
+from d2rpick.choice.expectation import mean_in_flight, shortfall
+from d2rpick.choice.flights import find_flights
+from d2rpick.choice.margin import margin_before_contact
+from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, rank
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
-from d2rpick.flight.flight import SOURCES, all_seen
+from d2rpick.errors import RangeError
+from d2rpick.flight.flight import SOURCES, witnesses
 from d2rpick.vibration.fits import Fits
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Iterator
 
-    from numpy.typing import NDArray
-
-    from d2rpick.choice.candidates import Candidate, Candidates
+    from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
+    from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
 
     Look = Callable[[float], Situation]
+    Choice = tuple[Situation, Candidate]
 
-# Peaks of a window that are tried, the highest first: the higher a peak of several modes, the less energy is kinetic.
-_MOST_PEAKS = 12
+# Peaks of a window that are tried: the highest, since the higher a peak of several modes, the less energy is kinetic,
+# and the last, since the later td the more is saved.
+_MOST_PEAKS: Final = 12
+# Rigid time that is given up for quality is told from this share of the window on.
+_MUCH: Final = 0.1
+
+
+def suggest_in_longest_flight(history: History, settings: Settings) -> Suggestion:
+    """Choose both times in the longest flight of the record, td up to its end less the margin.
+
+    Raises
+    ------
+    RangeError
+        If nothing in the record shows a flight.
+    """
+    flights = flights_of(history, settings)
+    if not flights:
+        found = f"{', '.join(history.source)}: nothing in the record shows a flight"
+        raise RangeError(f"{found}; name td, or a window for it")
+    window = max((bounds(history, flight) for flight in flights), key=lambda one: one[1] - one[0])
+    return suggest_in_window(history, window, settings)
+
+
+def flights_of(history: History, settings: Settings) -> tuple[Flight, ...]:
+    """Find all flights; where the energy is all there is, one oscillator for the whole record, else none is sought."""
+    if any(True for _ in witnesses(history)) or not settings.replay:
+        return find_flights(history, settings)
+    middle = examine(history, float(history.time[0] + history.time[-1]) / 2, settings)
+    if middle.flight.source == "oscillator":
+        return (middle.flight,)
+    return find_flights(history, replace(settings, replay=False))
+
+
+def bounds(history: History, flight: Flight) -> tuple[float, float]:
+    """Give a flight as a window within the record [time]."""
+    first, last = float(history.time[0]), float(history.time[-1])
+    return first if flight.start is None else flight.start, last if flight.end is None else flight.end
 
 
 def suggest_in_window(history: History, window: tuple[float, float], settings: Settings) -> Suggestion:
     """Choose td in ``window`` and tr for it; RangeError when the window lies outside the record.
 
-    Where deformations are known: of the best pairs of each peak of the energy those with a residual within 0.02 of
-    the smallest, and of these the one with the longest rigid window.  Where no peak has an acceptable tr, the ends of
-    the window are tried.  On the energy alone: the highest acceptable peaks up to twice the mean energy.
+    Of the pairs of all peaks of the energy those that are alike in quality count, and of these the one with the
+    longest rigid window wins.  Where deformations are known, a residual within 0.02 of the smallest is alike; on the
+    energy alone, a level within the tolerance of the best one, which is twice the mean energy.  td keeps the margin
+    from the contact, unless the whole window lies in it.  Without an acceptable peak the ends of the window are tried.
     """
     for time in window:
         history.energy_at(time)
     look = cache(partial(examine, history, settings=settings, fits=Fits()))  # the record is examined once for each td
     situation = _flying(look, window)
-    window_in_flight = window[0], max(window[0], min(window[1], situation.latest_td))
-    if situation.vibration.unknown:
-        found = _highest(situation, window_in_flight, look)
-    else:
-        peaks = situation.peaks(*window_in_flight)
-        best = _best(situation, peaks, look) or _best(situation, window_in_flight, look)
-        found = suggest_at(best or look(window[1]))
-    return found._replace(td_window=window)
+    inside = window[0], _latest(situation, window)
+    choose = _by_level if situation.vibration.unknown else _by_residual
+    chosen, longest = choose(situation, inside, look)
+    found = suggest_at(look(chosen if chosen is not None else inside[1]))
+    return found._replace(td_window=window, longer=_given_up(longest, found.recommended, inside, look))
 
 
-def advice(history: History, settings: Settings) -> str:
-    """Tell where td should lie when none was given: before the end of the flight, on the last peak before it."""
-    time = history.time
-    flights = [flight for _, flight in all_seen(history)]
-    if flights:
-        longest = max(flights, key=lambda flight: flight.end - flight.start)
-        start, end, seen = longest.start, longest.end, longest.end_seen
-    else:
-        middle = examine(history, float(time[0] + time[-1]) / 2, settings)
-        start, seen = middle.flight.start or float(time[0]), middle.flight.end is not None
-        end = float(time[-1]) if middle.flight.end is None else middle.flight.end
-    peaks = [t for t in examine(history, (start + end) / 2, settings).peaks(start, end) if t < end]
-    where = (
-        f"the flight ends at {end:.6g}" if seen else f"no contact was found before the end of the record at {end:.6g}"
-    )
-    last = f"the last peak of the energy before it is at {peaks[-1]:.6g}" if peaks else "the energy has no peak there"
-    return f"{', '.join(history.source)}: {where}, {last}"
+def _latest(situation: Situation, window: tuple[float, float]) -> float:
+    """Last td in the window that keeps the margin; where none does, the last one in the flight."""
+    low, high = window
+    margin = margin_before_contact(situation.history, situation.flight, situation.settings.margin).time
+    end = float("inf") if situation.flight.end is None else situation.flight.end
+    return min(high, end - margin if end - margin > low else max(low, situation.latest_td))
 
 
 def _flying(look: Look, window: tuple[float, float]) -> Situation:
@@ -87,50 +111,62 @@ def _certainty(situation: Situation) -> tuple[bool, int]:
     return not situation.in_flight, SOURCES.index(situation.flight.source)
 
 
-def _best(situation: Situation, times: tuple[float, ...], look: Look) -> Situation | None:
-    """Situation at the td of the best pair, of the highest of these times; None where none has an acceptable tr."""
-    highest = sorted(times, key=lambda t: -situation.vibration.energy(t))[:_MOST_PEAKS]
-    pairs: list[tuple[Situation, Candidate]] = []
-    for td in highest:
-        there = look(td)
-        best = best_of(there, rank(find_candidates(there)))
-        if best and not best.same_swing:
-            pairs.append((there, best))
+def _given_up(longest: float | None, chosen: Pair | None, window: tuple[float, float], look: Look) -> Pair | None:
+    """Give the pair at the td of the longest rigid window where it is much longer than the chosen one."""
+    pair = _longest(_acceptable([look(longest)])) if longest is not None else None
+    if pair is None or chosen is None or pair[1].rigid_time - chosen.rigid_time <= _MUCH * (window[1] - window[0]):
+        return None
+    return Pair(pair[1].tr, pair[0].td, pair[1].residual)
+
+
+def _by_residual(situation: Situation, window: tuple[float, float], look: Look) -> tuple[float | None, float | None]:
+    """Give the td of the longest rigid window among those alike in residual, and among all acceptable ones."""
+    peaks = situation.peaks(*window)
+    highest = sorted(peaks, key=lambda t: -situation.vibration.energy(t))[:_MOST_PEAKS]
+    pairs = _acceptable(look(td) for td in dict.fromkeys((*highest, *peaks[-_MOST_PEAKS:])))
+    pairs = pairs or _acceptable(map(look, window))
     limit = min((best.error for _, best in pairs), default=0.0) + EQUALLY_GOOD
-    good = [(best.rigid_time, there) for there, best in pairs if best.error <= limit]
-    return max(good, key=lambda one: (one[0], one[1].td))[1] if good else None
+    alike = [pair for pair in pairs if pair[1].error <= limit]
+    return _td(_longest(alike)), _td(_longest(pairs))
 
 
-def _highest(situation: Situation, window: tuple[float, float], look: Look) -> Suggestion:
-    """Choose the highest peaks up to twice the mean energy; without them what is best at the end of the window."""
-    history, mean = situation.history, mean_in_flight(situation)
-    if mean is not None:
-        peaks = [t for t in situation.peaks(*window) if shortfall(history.energy_at(t), mean) < 1]
-        peaks_before = situation.peaks(float(history.time[0]), window[1])
-        for td in sorted(peaks, key=lambda t: shortfall(history.energy_at(t), mean)):
-            there = situation.at(td)
-            if not _shortening(there, find_candidates(there)).any():
-                continue  # an oscillator is not sought again for each peak
-            ranked = rank(find_candidates(look(td)))
-            on_peaks = np.isin(ranked.tr, peaks_before) & _shortening(look(td), ranked)
-            errors = [(shortfall(ranked.energy[i], mean), i) for i in np.flatnonzero(on_peaks).tolist()]
-            limit = min((error for error, _ in errors), default=0.0) + EQUALLY_GOOD
-            good = [i for error, i in errors if error <= limit < float("inf")]
-            if good:
-                return _recommending(suggest_at(look(td)), min(good, key=lambda i: ranked.tr[i]))
-    return suggest_at(look(window[1]))
+def _by_level(situation: Situation, window: tuple[float, float], look: Look) -> tuple[float | None, float | None]:
+    """Give the same where only the level is known: the closer to all vibration energy, 2 <E>, the better."""
+    mean = mean_in_flight(situation)
+    peaks = situation.peaks(*window)
+    if mean is None or not peaks:
+        return None, None
+    falls = {td: shortfall(situation.history.energy_at(td), mean) for td in peaks}
+    below = sorted((td for td in peaks if falls[td] < 1), key=lambda td: falls[td])
+    best = next((td for td in below if _acceptable([situation.at(td)])), None)  # no oscillator is sought again
+    if best is None:
+        return None, None
+    limit = falls[best] + situation.settings.tolerance
+    alike = _longest(_shortening(situation, [td for td in below if falls[td] <= limit]))
+    chosen = look(alike[0].td) if alike else None
+    return _td(alike if chosen and _acceptable([chosen]) else None), _td(_longest(_shortening(situation, below)))
 
 
-def _shortening(situation: Situation, candidates: Candidates) -> NDArray[np.bool_]:
-    """Which candidates are acceptable, keep the limits and save something."""
-    return kept(situation, candidates) & ~candidates.same_swing
+def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice]:
+    """Give acceptable choices, the latest td first, as long as an earlier one may be longer."""
+    start, longest = situation.earliest_tr, 0.0
+    for td in sorted(times, reverse=True):
+        if start is None or td - start <= longest:
+            return
+        for pair in _acceptable([situation.at(td)]):
+            longest = max(longest, pair[1].rigid_time)
+            yield pair
 
 
-def _recommending(found: Suggestion, place: int) -> Suggestion:
-    """Give the suggestion with the candidate at another place recommended."""
-    best = found.candidates[place]
-    return found._replace(
-        candidates=found.candidates.recommending(place),
-        recommended=Pair(best.tr, found.situation.td, best.residual),
-        expected=expectation(found.situation, best.energy),
-    )
+def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
+    """What is recommended in each situation, where that saves something."""
+    found = ((there, best_of(there, rank(find_candidates(there)))) for there in situations)
+    return [(there, best) for there, best in found if best and not best.same_swing]
+
+
+def _longest(pairs: Iterable[Choice]) -> Choice | None:
+    return max(pairs, key=lambda pair: (pair[1].rigid_time, pair[0].td), default=None)
+
+
+def _td(pair: Choice | None) -> float | None:
+    return pair[0].td if pair else None

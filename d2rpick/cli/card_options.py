@@ -138,7 +138,9 @@ def prints_card(options: dict[str, Any], output_format: str) -> bool:
 def energy_of(run: Run, options: dict[str, Any], *, prints: bool) -> History:
     """Take the energy that the options choose; where a card names parts that the history has not, that of the model."""
     chosen = {**options, "part": ()} if prints and _only_printed(run, options) else options
-    return run.history(shared.selection(chosen))
+    from d2rpick.choice.of_run import Reference
+
+    return Reference.of(run, shared.selection(chosen)).history
 
 
 def card_request(run: Run, options: dict[str, Any], history: History) -> CardRequest:

@@ -35,6 +35,7 @@ def command(write_as: str | None, **options: Any) -> None:
     model: kinetic energy, total energy, external work, contact energy, momentum, ... Where the files have the momenta
     of parts, those that fly together with the chosen ones count.
     """
+    from d2rpick.choice.of_run import Reference
     from d2rpick.histories.writing import TABLE_WRITERS, format_of
 
     form = write_as or format_of(options["output_file"], list(TABLE_WRITERS))
@@ -42,7 +43,7 @@ def command(write_as: str | None, **options: Any) -> None:
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
         output = Output.of(options, *run.sources)
-        history = run.history(asked.selection)
+        history = Reference.of(run, asked.selection).history
         table = {"time": history.time, "internal_energy": history.energy}
         if history.parts and len(history.parts) > 1:
             energies = run.part_energies(history.parts)

@@ -94,8 +94,8 @@ def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated
 
 _AFTER = click.option("--after", type=TIME, metavar="T", help="End of the load.  [default: found from the record]")
 _MARGIN = click.option(
-    "--margin", type=NOT_NEGATIVE, default=0.0, show_default=True, metavar="T",
-    help="Time to keep clear after the load and before the next contact.",
+    "--margin", type=NOT_NEGATIVE, metavar="T",
+    help="Time to keep clear after the load and before the next contact.  [default: 0; where td is chosen, derived]",
 )  # fmt: skip
 _TOLERANCE = click.option(
     "--tolerance", type=FRACTION, default=0.2, show_default=True, metavar="L",
@@ -136,7 +136,7 @@ def reading_options(function: Decorated) -> Decorated:
         _FORMAT, _TIME, _ENERGY,
         click.option(
             "--part", metavar="IDS", multiple=True, type=NAMES,
-            help="Parts to switch, by number (3,7), range (10-19) or title; their energies are added.",
+            help="Parts to switch: number (3,7), range (10-19), title, `flying` or `all`; energies are added.",
         ),
         _FLYING, _CHANNEL,
     )(function)  # fmt: skip

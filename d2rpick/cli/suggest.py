@@ -14,13 +14,12 @@ from d2rpick.cli.wording import in_words, with_options
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
-    from d2rpick.choice.of_run import Reference
-    from d2rpick.choice.settings import Settings
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.opening import Run
 
 EXAMPLES = """\b
 Examples:
+  d2rpick suggest --part box sample_data/rolloverT01.gz
   d2rpick suggest --td 0.064 sample_data/energy.csv
   d2rpick suggest --td-window 0.06 0.07 sample_data/energy.csv
   d2rpick suggest --td 0.37 --energy boxIE_J sample_data/rollover.csv
@@ -62,10 +61,12 @@ def command(
 ) -> None:
     """Rank the times tr at which the parts of HISTORY can be made rigid until td, or choose both times.
 
+    Without --td both are chosen, in --td-window or in the longest flight.
+
     A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
-    from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.of_run import Reference, suggest_of
 
     if _only_in_environment(ctx, "td", overruled_by="td_window"):
         td = None
@@ -79,7 +80,7 @@ def command(
         run = asked.open()
         output = Output.of(options, *run.sources)
         reference = Reference(run, energy_of(run, options, prints=prints))
-    answer = _answer(reference, td_window if td is None else td, settings)
+    answer = suggest_of(reference, td_window if td is None else td, settings)
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
         from d2rpick.report import figures
@@ -108,17 +109,6 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
         raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty; give the lower time first")
     if card and not ids:
         raise click.UsageError("-f card needs --part, the parts to switch (Radioss: --node, their main nodes)")
-
-
-def _answer(reference: Reference, td: float | tuple[float, float] | None, settings: Settings) -> Suggestion:
-    """Choose tr for td, or both in a window; UsageError with what the record tells when neither is given."""
-    from d2rpick.choice.of_run import suggest_of
-
-    if td is None:
-        from d2rpick.choice.suggest_td import advice
-
-        raise click.UsageError(f"{advice(reference.history, settings)}; give --td or --td-window")
-    return suggest_of(reference, td, settings)
 
 
 def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:

@@ -74,7 +74,7 @@ def command(
     answer = verify_of(reference, tr, td, settings)
     if other and finished:
         with reading(finished.names, quiet=asked.quiet):
-            answer = compare_with(answer, reference, Reference.of(other, finished.selection))
+            answer = compare_with(answer, reference, reference.like(other, finished.selection))
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
         from d2rpick.report import figures

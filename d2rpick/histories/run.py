@@ -110,6 +110,10 @@ class Run:
         """Internal energies of some parts, shape (n, parts), at the times of their history [energy]."""
         return self._of_holder("internal_energy", parts)
 
+    def part_kinetic_energies(self, parts: Sequence[Part]) -> Samples:
+        """Kinetic energies of some parts, shape (n, parts) [energy]; FormatError where they are not written."""
+        return self._of_holder("kinetic_energy", parts)
+
     def quantities(self, time: Samples) -> dict[str, Samples]:
         """Give the quantities of the whole model, by their names in `QUANTITIES`, that are written at ``time`` (n,)."""
         found: dict[str, Samples] = {}

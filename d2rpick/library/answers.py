@@ -200,7 +200,7 @@ def suggest(
     flying: Parts | None = None,
     **choosing: Unpack[Choosing],
 ) -> Suggestion:
-    """Choose tr for ``td``, or both times with td in ``td_window``, as ``d2rpick suggest`` does.
+    """Choose tr for ``td``, or both times with td in ``td_window`` or the longest flight, as ``d2rpick suggest`` does.
 
     Parameters
     ----------
@@ -209,9 +209,10 @@ def suggest(
     td : float
         When the parts are switched back [time].
     td_window : (float, float)
-        Instead of ``td``: where to choose it [time].
+        Instead of ``td``: where to choose it [time]; without both, in the longest flight.
     parts : number, title or several, optional
-        The parts to be switched; ``"10-19"`` is a range.
+        The parts to be switched; ``"10-19"`` is a range, ``"flying"`` all deformable parts that fly together,
+        ``"all"`` all that have energy.
     flying : number, title or several, optional
         What flies together with them.
     **choosing
@@ -239,13 +240,14 @@ def suggest(
     """
     from d2rpick.choice.of_run import Reference, suggest_of
 
-    if (td is None) == (td_window is None):
+    if td is not None and td_window is not None:
         raise TypeError("td or td_window was expected, and not both")
-    asked = arguments.number("td", td) if td is not None else arguments.window("td_window", td_window)
+    window = None if td_window is None else arguments.window("td_window", td_window)
+    asked = window if td is None else arguments.number("td", td)
     settings = arguments.settings(choosing)
-    selection = _selection(run, parts, flying)
+    selection = selection_for(run, parts, flying)
     core = suggest_of(Reference.of(run.files, selection), asked, settings)
-    times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked))
+    times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked)) if asked else ()
     return Suggestion(
         run=run,
         situation=core.situation,
@@ -304,12 +306,12 @@ def verify(
 
     pair = arguments.number("tr", tr), arguments.number("td", td)
     settings = arguments.settings(choosing)
-    selection = _selection(run, parts, flying)
+    selection = selection_for(run, parts, flying)
     reference = Reference.of(run.files, selection)
     core = verify_of(reference, *pair, settings)
     times = ["--tr", repr(pair[0]), "--td", repr(pair[1])]
     if switched is not None:
-        core = compare_with(core, reference, Reference.of(switched.files, selection))
+        core = compare_with(core, reference, reference.like(switched.files, selection))
         times += [text for name in switched.sources for text in ("--switched", name)]
     return Verdict(
         run=run,
@@ -326,7 +328,7 @@ def verify(
     )
 
 
-def _selection(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
+def selection_for(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
     """Add the parts to the columns that were named when the run was read."""
     if not hasattr(run, "files"):
         raise TypeError(f"run is {run!r}, what read() or from_frame() gives was expected")

@@ -22,7 +22,8 @@ class Choosing(TypedDict, total=False):
     """How to choose and judge, as the options of ``d2rpick suggest``; times in the unit of the history.
 
     ``after``: the load ends here (default: found from the record).  ``margin``: kept clear after the load and before
-    the next contact (0).  ``tolerance``: on the lock-in error, on the level error where no oscillator is known (0.2).
+    the next contact (0; where td is chosen, derived).
+    ``tolerance``: on the lock-in error, on the level error where no oscillator is known (0.2).
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: given instead of
     identified, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the oscillator
     is identified there only.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr where the
@@ -31,7 +32,7 @@ class Choosing(TypedDict, total=False):
     """
 
     after: float | None
-    margin: float
+    margin: float | None
     tolerance: float
     max_kinetic_share: float | None
     max_residual: float | None
@@ -55,7 +56,7 @@ _LIMITS = {
     "cost_share": (0.0, 1.0),
     "step_ratio": (1.0, math.inf),
 }
-_OPTIONAL = {"after", "max_kinetic_share", "max_residual", "v0", "cost_share"}
+_OPTIONAL = {"after", "margin", "max_kinetic_share", "max_residual", "v0", "cost_share"}
 
 
 def number(name: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:

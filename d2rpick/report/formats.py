@@ -17,10 +17,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Shown:
-    """What a form may show beside the answer: the command that was given, how many rows, lines written before."""
+    """What a form may show beside the answer: the command that was given, how many rows, lines written before.
+
+    ``every``: all windows of a plan, not only the supported ones.
+    """
 
     command: Sequence[str] = ()
     limit: int = 10
+    every: bool = False
     lines: Sequence[str] = ()
 
 
@@ -39,6 +43,7 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
         "value": lambda report, answer, _: report.as_value(answer),
     },
+    "plan": {**_PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
     "verdict": _PLAIN,
     "overview": _PLAIN,
     "study": {

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.warnings import Caution
     from d2rpick.flight.flight import Flight
+    from d2rpick.histories.history import History
 
 
 def heading(situation: Situation) -> list[str]:
@@ -61,7 +62,11 @@ def _basis(situation: Situation) -> str:
 
 def frame(situation: Situation, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
     """Keys that every JSON result begins with, and the history it rests on."""
-    history = situation.history
+    return frame_of(situation.history, schema, command, cautions)
+
+
+def frame_of(history: History, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
+    """Give the same keys where no td is looked at."""
     return {
         "schema": schema,
         "tool_version": __version__,

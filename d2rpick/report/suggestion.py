@@ -55,6 +55,7 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
             **frame(answer.situation, SCHEMA, command, answer.cautions),
             "td": answer.situation.td,
             "td_window": list(answer.td_window) if answer.td_window else None,
+            "longer_pair": keys.of_pair(answer.longer),
             **mechanics(answer.situation),
             "candidates": [{**keys.of_candidate(c), "parts": keys.of_matches(c.parts)} for c in answer.candidates],
             "acceptable_windows": None
@@ -78,6 +79,8 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     if best and best.run_time_share is not None:
         rigid = f"rigid for {best.rigid_fraction:.0%} of the record"
         lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's, {rigid}"))
+    if answer.longer and answer.recommended:
+        lines.append(("longer", given_up(answer.longer, answer.recommended)))
     expected = answer.expected
     if expected:
         at_level = f"{expected.ratio_at_level:.0%} with the energy of td"
@@ -88,6 +91,14 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
         )
         lines.append(("mean after", f"about {own}{at_level}; mean in flight {expected.mean_energy:.6g}"))
     return lines
+
+
+def given_up(longer: Pair, chosen: Pair) -> str:
+    """How much rigid time was given up for a better level or residual, and for which."""
+    what = "a lower level at td" if longer.residual is None else f"residual {tables.measure(longer.residual)}"
+    lost = longer.rigid_time - chosen.rigid_time
+    times = f"tr = {longer.tr:.6g}, td = {longer.td:.6g} is rigid for {longer.rigid_time:.6g}"
+    return f"{times}, with {what}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
 
 
 def acceptable(answer: Suggestion) -> str:

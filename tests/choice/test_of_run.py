@@ -109,9 +109,9 @@ def test_no_td_of_a_window_is_examined_twice(monkeypatch: pytest.MonkeyPatch) ->
 
     seen: list[float] = []
 
-    def noted(history: object, td: float, settings: Settings) -> object:
+    def noted(history: object, td: float, settings: Settings, fits: object) -> object:
         seen.append(td)
-        return examine.examine(history, td, settings)  # type: ignore[arg-type]
+        return examine.examine(history, td, settings, fits=fits)  # type: ignore[arg-type]
 
     monkeypatch.setattr(suggest_td, "examine", noted)
     suggest_of(read([ENERGY]), (0.06, 0.09), PLAIN)

@@ -142,7 +142,11 @@ def test_a_study_and_a_check_say_what_the_command_line_says(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
-        (lambda: loose.suggest(d2.read(ENERGY)), TypeError, "td or td_window was expected"),
+        (
+            lambda: loose.suggest(d2.read(ENERGY), td=0.06, td_window=(0.06, 0.07)),
+            TypeError,
+            "td or td_window was expected",
+        ),
         (lambda: loose.suggest(d2.read(ENERGY), "0.064"), TypeError, "td is '0.064', a number was expected"),
         (lambda: loose.suggest(d2.read(ENERGY), td_window=(2, 1)), ValueError, "td_window is 2 to 1, which is empty"),
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, tolerence=1), TypeError, "there is no argument 'tolerence'"),

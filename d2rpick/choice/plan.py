@@ -1,0 +1,252 @@
+"""A plan for a run: every flight with its switch times, and which windows this one reference supports.
+
+A window in which nothing vibrates locks in nothing and leaves all landings where they are.  One that locks in energy
+moves the next landing by a little, for which the margin is kept, and those after it by more than any margin.  So one
+reference supports every window up to and with the first that locks in energy; the next ones are planned from the run
+that was switched so (THEORY.md section 12).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.choice.margin import Margin, margin_before_contact
+from d2rpick.choice.of_run import Reference, suggest_of
+from d2rpick.choice.suggest_td import bounds, flights_of
+from d2rpick.choice.switched_run import Done, done_windows, switched_history
+from d2rpick.choice.warnings import Caution
+from d2rpick.flight.energy_alone import round_off
+from d2rpick.vibration.measures import run_time_share
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.choice.switched_run import Times
+    from d2rpick.flight.flight import Flight
+    from d2rpick.histories.history import History
+
+# A rigid window shorter than this share of the record saves less than a restart costs.
+MIN_RIGID: Final = 0.05
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One flight of a run and the rigid window in it; times in the unit of the history.
+
+    ``status``: "supported" by this reference, "re-plan" from a switched run, "done", or "left-out"; ``reason`` says
+    why for all but the first.  ``answer`` is what ``suggest`` says for this flight, None where it was not asked.
+    ``done`` is what became of a window that is done.
+    """
+
+    number: int
+    flight: Flight
+    start: float
+    end: float
+    margin: Margin
+    status: str
+    reason: str | None = None
+    answer: Suggestion | None = None
+    done: Done | None = None
+
+    @property
+    def window(self) -> Times | None:
+        """When the parts are rigid, (tr, td) [time]; None where nothing can be recommended."""
+        if self.done:
+            return self.done.tr, self.done.td
+        pair = self.answer.recommended if self.answer and self.status in ("supported", "re-plan") else None
+        return (pair.tr, pair.td) if pair else None
+
+    @property
+    def rigid_time(self) -> float | None:
+        """Length of the window [time]."""
+        return self.window[1] - self.window[0] if self.window else None
+
+    @property
+    def candidate(self) -> Candidate | None:
+        """The recommended tr with its measures."""
+        if self.answer is None or self.window is None:
+            return None
+        return next((one for one in self.answer.candidates if one.recommended), None)
+
+    @property
+    def locks_in(self) -> bool | None:
+        """Whether the window locks in energy, so that landings after it move; None without a window.
+
+        It does not where the energy stays the same but for round-off, as in a free fall from rest.
+        """
+        if self.answer is None or self.window is None:
+            return None
+        history = self.answer.situation.history
+        _, energy = history.between(self.start, self.window[1])
+        return float(np.ptp(energy)) > round_off(history)
+
+
+class Plan(NamedTuple):
+    """Answer of ``plan``: all flights in the order of time, and what to be aware of.
+
+    ``min_rigid``: shorter windows are left out [time].
+    """
+
+    history: History
+    settings: Settings
+    min_rigid: float
+    rows: tuple[Planned, ...]
+    cautions: tuple[Caution, ...]
+
+    @property
+    def supported(self) -> tuple[Planned, ...]:
+        """Windows that this reference supports."""
+        return tuple(row for row in self.rows if row.status == "supported")
+
+    def windows(self, *, every: bool = False) -> tuple[Times, ...]:
+        """Give (tr, td) of the supported windows, or of ``every`` one that is not done [time]."""
+        wanted = ("supported", "re-plan") if every else ("supported",)
+        return tuple(row.window for row in self.rows if row.status in wanted and row.window)
+
+    @property
+    def rigid_time(self) -> float:
+        """Length of all supported windows [time]."""
+        return sum(row.rigid_time or 0.0 for row in self.supported)
+
+    @property
+    def rigid_fraction(self) -> float:
+        """Share of the record in which the parts are rigid by the supported windows [-]."""
+        return self.rigid_time / float(self.history.time[-1] - self.history.time[0])
+
+    @property
+    def run_time_share(self) -> float | None:
+        """Expected run time with the supported windows over that of the reference; None without a cost share [-]."""
+        share, ratio = self.settings.cost_share, self.settings.step_ratio
+        return None if share is None else run_time_share(self.rigid_fraction, share, ratio)
+
+
+def plan_of(
+    reference: Reference,
+    settings: Settings,
+    *,
+    min_rigid: float | None = None,
+    done: Sequence[Times] = (),
+    before: Reference | None = None,
+) -> Plan:
+    """Plan the rigid windows of a run.
+
+    Parameters
+    ----------
+    reference : Reference
+        The run: without switching, or switched in the windows that are ``done``.
+    settings : Settings
+        As for ``suggest``.  ``after`` counts in the flight that it lies in; what flies before is left out.
+    min_rigid : float, optional
+        Shorter windows are left out [time].  Default: 5 % of the record.
+    done : sequence of (float, float)
+        Windows in which the run was switched, in order [time].
+    before : Reference, optional
+        The run that these were planned from: by its landings it is told how far those of this run have moved.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    RangeError
+        If a time lies outside the record, or the parts were deformable in a window that is done.
+    """
+    history = reference.history
+    span = float(history.time[-1] - history.time[0])
+    shortest = MIN_RIGID * span if min_rigid is None else min_rigid
+    history, found, cautions = switched_history(reference, done)
+    reference = reference._replace(history=history)
+    flights = flights_of(history, settings)
+    known = done_windows(history, flights, found, before and flights_of(before.history, settings))
+    rows = tuple(_with_status(list(_rows(reference, flights, settings, shortest, known)), known))
+    return Plan(history, settings, shortest, rows, (*cautions, *_cautions(rows, known)))
+
+
+def _rows(
+    reference: Reference, flights: Sequence[Flight], settings: Settings, shortest: float, known: Sequence[Done]
+) -> Iterator[Planned]:
+    """Give every flight with its window, as if each were the first."""
+    last = max((one.td for one in known), default=None)
+    for number, flight in enumerate(flights, start=1):
+        start, end = bounds(reference.history, flight)
+        margin = margin_before_contact(reference.history, flight, settings.margin)
+        row = Planned(number, flight, start, end, margin, "left-out")
+        within = [one for one in known if one.flight == flight]
+        if within:
+            for one in within:
+                yield replace(row, status="done", reason=one.told, done=one)
+        elif last is not None and start < last:
+            yield replace(row, reason="before the last window that is done")
+        elif settings.after is not None and end <= settings.after:
+            yield replace(row, reason=f"the load ends after it, at {settings.after:.6g}")
+        elif end - margin.time - start < shortest:
+            yield replace(row, reason=_too_short(end - margin.time - start, shortest, margin))
+        else:
+            yield _asked(reference, row, settings, shortest)
+
+
+def _asked(reference: Reference, row: Planned, settings: Settings, shortest: float) -> Planned:
+    """Ask ``suggest`` for the window of a flight."""
+    own = settings.after is not None and row.start <= settings.after <= row.end
+    answer = suggest_of(reference, (row.start, row.end), settings if own else replace(settings, after=None))
+    row = replace(row, answer=answer)
+    if answer.recommended is None:
+        why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
+        return replace(row, reason="; ".join(why))
+    if answer.recommended.rigid_time < shortest:
+        return replace(row, reason=_too_short(answer.recommended.rigid_time, shortest, row.margin))
+    return replace(row, status="supported")
+
+
+def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
+    kept = f", with the margin {margin.time:.3g} before the contact" if margin.time else ""
+    return f"too short: rigid for {max(rigid, 0.0):.3g}{kept}, at least {shortest:.3g} was asked for"
+
+
+def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Planned]:
+    """Let windows after the first that locks in energy, or after a landing while rigid, wait for another run."""
+    wrong = next((one for one in known if one.landed_rigid), None)
+    why = (
+        f"the run landed at {wrong.landing:.6g} while it was rigid; plan the windows from there again" if wrong else ""
+    )
+    for row in rows:
+        if row.status == "supported" and why:
+            yield replace(row, status="re-plan", reason=why)
+            continue
+        yield row
+        if row.status == "supported" and row.locks_in and row.window:
+            tr, td = row.window
+            moved = f"the window {tr:.6g} to {td:.6g} locks in energy and moves the landings after it"
+            why = f"{moved}; plan this one from the run switched so"
+
+
+def _blocked(rows: Sequence[Planned]) -> Iterator[Caution]:
+    """Say so where a short window takes the place of a longer one, which could be supported instead."""
+    first = next((row for row in rows if row.status == "supported" and row.locks_in), None)
+    longest = max((row for row in rows if row.status == "re-plan"), key=lambda row: row.rigid_time or 0, default=None)
+    if first and longest and first.rigid_time and longest.rigid_time and longest.rigid_time > first.rigid_time:
+        found = f"flight {longest.number} is rigid for {longest.rigid_time:.3g}, flight {first.number} before it for"
+        cure = "with a minimal rigid time between the two it would be supported instead"
+        yield Caution("longer-window-later", f"{found} {first.rigid_time:.3g}: {cure}")
+
+
+def _cautions(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Caution]:
+    """What to be aware of in all windows, once each."""
+    for one in known:
+        if one.landed_rigid:
+            yield Caution("landed-rigid", f"the window {one.tr:.6g} to {one.td:.6g}: {one.told}")
+    windows = [row for row in rows if row.status == "supported" and row.answer]
+    for row in windows:
+        for caution in row.answer.cautions if row.answer else ():
+            which = f"flight {row.number}: " if len(rows) > 1 else ""
+            yield caution._replace(message=which + caution.message)
+    yield from _blocked(rows)
+    if not rows:
+        yield Caution("no-flight", "nothing in the record shows a flight")

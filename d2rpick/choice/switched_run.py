@@ -1,0 +1,187 @@
+"""A switched run as the reference for the windows after: when its parts were rigid, and how its landings moved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.choice.warnings import Caution
+from d2rpick.errors import FormatError, RangeError
+from d2rpick.flight.energy_alone import round_off
+from d2rpick.histories.history import Given
+from d2rpick.histories.samples import window
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from d2rpick.choice.of_run import Reference
+    from d2rpick.flight.flight import Flight
+    from d2rpick.histories.history import History, Part, Samples
+
+    Times = tuple[float, float]
+
+# Of a part that is deformable fewer states follow each other without kinetic energy, or with one internal energy.
+_FEWEST: Final = 12
+# An internal energy that changes by less is one value: solvers write single precision.
+_SAME: Final = 1e-6
+
+
+class Done(NamedTuple):
+    """A window in which a run was switched: the flight that it lies in, when that landed, and when it should have.
+
+    ``landing`` and ``planned`` are None where no contact is seen, or no earlier run is at hand; ``step`` is the output
+    interval, below which they are the same [time].
+    """
+
+    tr: float
+    td: float
+    flight: Flight | None
+    landing: float | None
+    planned: float | None
+    step: float
+
+    @property
+    def landed_rigid(self) -> bool:
+        """Whether the contact came while the parts were rigid."""
+        return self.landing is not None and self.landing < self.td
+
+    @property
+    def moved(self) -> float | None:
+        """How much later the run landed than planned [time]."""
+        return None if self.landing is None or self.planned is None else self.landing - self.planned
+
+    @property
+    def told(self) -> str:
+        """What became of it, for people."""
+        if self.landing is None:
+            return "no landing was seen after it"
+        if self.landed_rigid:
+            return f"landed at {self.landing:.6g}, {self.td - self.landing:.3g} before td: rigid in the contact"
+        found = f"landed at {self.landing:.6g}, {self.landing - self.td:.3g} after td"
+        if self.moved is None:
+            return found
+        if abs(self.moved) <= self.step:
+            return f"{found}, as planned"
+        return f"{found}, {abs(self.moved):.3g} {'earlier' if self.moved < 0 else 'later'} than planned"
+
+
+def switched_history(
+    reference: Reference, done: Sequence[Times]
+) -> tuple[History, tuple[Times, ...], tuple[Caution, ...]]:
+    """Take a run for a reference although its parts were rigid for some time.
+
+    Parameters
+    ----------
+    reference : Reference
+    done : sequence of (float, float)
+        Windows (tr, td) in which it was switched, as far as they are known [time].
+
+    Returns
+    -------
+    history : History
+        Without the momenta of parts where a rigid body had taken these over.
+    windows : tuple of (float, float)
+        Those that are done: ``done``, and others in which the parts have no kinetic energy.
+    cautions : tuple of Caution
+        What was recognised beside ``done``.
+
+    Raises
+    ------
+    RangeError
+        If a window lies outside the record, or the parts were deformable in it.
+    """
+    history = reference.history
+    for tr, td in done:
+        for time in (tr, td):
+            history.energy_at(time)
+        _check_rigid(reference, tr, td)
+    absent = _absent_times(reference)
+    more = tuple(one for one in absent if not any(tr < one[1] and one[0] < td for tr, td in done))
+    cautions = [Caution("rigid-times", f"the parts were rigid from {a:.6g} to {b:.6g}: taken as done") for a, b in more]
+    if absent:
+        whole = tuple(one for one in history.momenta if one.parts is None)
+        history = replace(history, evidence=Given(whole, history.balance))
+    return history, tuple(sorted((*done, *more))), tuple(cautions)
+
+
+def done_windows(
+    history: History, flights: Sequence[Flight], windows: Sequence[Times], planned: Sequence[Flight] | None
+) -> tuple[Done, ...]:
+    """Find when the flights of windows that are done have landed, and when they landed in the run before."""
+    found = []
+    for tr, td in windows:
+        flight, before = _around(history, flights, tr, td), _around(history, planned or (), tr, td)
+        found.append(Done(tr, td, flight, flight.end if flight else None, before.end if before else None, history.step))
+    return tuple(found)
+
+
+def _around(history: History, flights: Sequence[Flight], tr: float, td: float) -> Flight | None:
+    """Give the flight that shares most time with a window, None where none does."""
+
+    def shared(flight: Flight) -> float:
+        start = float(history.time[0]) if flight.start is None else flight.start
+        return min(td, np.inf if flight.end is None else flight.end) - max(tr, start)
+
+    best = max(flights, key=shared, default=None)
+    return best if best and shared(best) > 0 else None
+
+
+def _check_rigid(reference: Reference, tr: float, td: float) -> None:
+    """Raise RangeError where no part was rigid in a window, as far as single parts tell."""
+    history, parts = reference.history, _deformable(reference)
+    time = history.time
+    inside = window(time, np.nextafter(tr, td), np.nextafter(td, tr))
+    inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))  # switched at the first step after tr
+    if not parts or len(time[inside]) < _FEWEST:
+        return
+    energies, kinetic = reference.run.part_energies(parts)[inside], _kinetic(reference, parts)
+    if float(np.abs(energies).max()) <= round_off(history):
+        return  # a free fall looks the same
+    still = np.ptp(energies, axis=0) <= _SAME * np.abs(energies).max(axis=0)
+    absent = (kinetic[inside] == 0).all(axis=0) if kinetic is not None else np.zeros(len(parts), dtype=bool)
+    if not (still | absent).any():
+        where = f"{', '.join(history.source)}: the parts deform from {tr:.6g} to {td:.6g}"
+        raise RangeError(f"{where}, a window that is said to be done; give the run that was switched so")
+
+
+def _absent_times(reference: Reference) -> tuple[Times, ...]:
+    """Times in which parts have no kinetic energy although the run moves: a rigid body has it instead."""
+    parts, balance = _deformable(reference), reference.history.balance
+    kinetic = _kinetic(reference, parts) if parts else None
+    if kinetic is None or balance is None or balance.kinetic is None:
+        return ()
+    time = reference.history.time
+    moves = np.interp(time, balance.time, balance.kinetic) > round_off(reference.history)
+    gone = ((kinetic == 0) & kinetic.any(axis=0)).any(axis=1) & moves
+    return tuple((float(time[a]), float(time[b])) for a, b in _stretches(gone))
+
+
+def _stretches(states: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last of states that follow each other."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]])))
+    pairs = edges.reshape(-1, 2)
+    return [(int(a), int(b) - 1) for a, b in pairs if b - a >= _FEWEST]
+
+
+def _deformable(reference: Reference) -> tuple[Part, ...]:
+    """Give the chosen parts, or all, that have internal energy at the times of the history."""
+    run, history = reference.run, reference.history
+    parts = history.parts or run.parts
+    if not parts:
+        return ()
+    energies = run.part_energies(parts)
+    if len(energies) != history.time.size:
+        return ()
+    return tuple(part for part, energy in zip(parts, energies.T, strict=True) if energy.any())
+
+
+def _kinetic(reference: Reference, parts: Sequence[Part]) -> Samples | None:
+    """Kinetic energies of parts, shape (n, parts); None where they are not written."""
+    try:
+        return reference.run.part_kinetic_energies(parts)
+    except FormatError:
+        return None

@@ -1,0 +1,150 @@
+"""The plan of a run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Unpack
+
+from d2rpick.library import arguments
+from d2rpick.library.answers import selection_for, written
+from d2rpick.library.frames import frame_of
+from d2rpick.library.repeat import command_line
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from d2rpick.choice.plan import Plan as Core
+    from d2rpick.choice.plan import Planned
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.library.arguments import Choosing, Parts
+    from d2rpick.library.runs import Run
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Answer of `plan`; nothing of it changes.
+
+    ``flights`` has a row per flight with ``window``, ``status`` and ``reason``; ``windows`` are the (tr, td) that this
+    run supports, ``all_windows`` also those that wait for a switched run; times in the unit of the run.
+    """
+
+    run: Run = field(repr=False)
+    flights: tuple[Planned, ...] = field(repr=False)
+    windows: tuple[tuple[float, float], ...]
+    all_windows: tuple[tuple[float, float], ...]
+    warnings: tuple[Caution, ...]
+    command: tuple[str, ...] = field(repr=False)
+    _core: Core = field(repr=False)
+
+    @property
+    def rigid_fraction(self) -> float:
+        """Share of the record in which the parts are rigid by ``windows`` [-]."""
+        return self._core.rigid_fraction
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the JSON document of the command line as a dictionary; its schema is named in it."""
+        found: dict[str, Any] = json.loads(self.to_json())
+        return found
+
+    def to_json(self) -> str:
+        """Give the JSON document of ``d2rpick plan``, schema d2rpick/plan/1."""
+        from d2rpick.report.plan import as_json
+
+        return as_json(self._core, self.command)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give a row per flight, a column per key of ``windows`` in the JSON; what is not known is NaN.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> d2.plan(d2.read("sample_data/energy.csv")).to_frame()["status"].tolist()
+        ['supported']
+        """
+        from d2rpick.report.plan import WINDOW
+
+        return frame_of(self.to_dict()["windows"], WINDOW, source=list(self._core.history.source))
+
+    def plot(self) -> Figure:
+        """Draw the energy with the flights and the rigid windows, as a matplotlib Figure."""
+        from d2rpick.report.figures_plan import draw_plan
+
+        return draw_plan(self._core)
+
+    def report(self, path: arguments.Path) -> Path:
+        """Write the plan to one HTML page that needs no network; an existing file is replaced."""
+        from d2rpick.report.plan_page import as_page
+
+        return written(path, as_page(self._core, self.run.files, ("d2rpick", *self.command), None))
+
+
+def plan(
+    run: Run,
+    *,
+    parts: Parts | None = None,
+    flying: Parts | None = None,
+    min_rigid: float | None = None,
+    done: Iterable[tuple[float, float]] = (),
+    before: Run | None = None,
+    **choosing: Unpack[Choosing],
+) -> Plan:
+    """Plan the rigid windows of a run, as ``d2rpick plan`` does.
+
+    Parameters
+    ----------
+    run : Run
+        As `read` gives it: without switching, or switched in the windows that are ``done``.
+    parts, flying, **choosing
+        As for `suggest`.
+    min_rigid : float, optional
+        Leave shorter windows out [time].  Default: 5 % of the record.
+    done : pairs of float
+        Windows (tr, td) in which the run was switched [time].
+    before : Run, optional
+        The run that these were planned from; its landings are compared.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    D2RPickError
+        If the run has no such parts or energy, or its parts were deformable in a window that is done.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> found = d2.plan(d2.read("sample_data/rollover_box.matsum"), parts="box")
+    >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
+    [(0.097, 0.37)]
+    """
+    from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.plan import plan_of
+    from d2rpick.deck.printing.common import check_windows
+
+    settings = arguments.settings(choosing)
+    shortest = None if min_rigid is None else arguments.number("min_rigid", min_rigid, 0.0)
+    pairs = [arguments.window(f"done[{number}]", list(pair)) for number, pair in enumerate(done)]
+    selection = selection_for(run, parts, flying)
+    reference = Reference.of(run.files, selection)
+    earlier = reference.like(before.files, selection) if before is not None else None
+    windows = check_windows(pairs) if pairs else ()
+    core = plan_of(reference, settings, min_rigid=shortest, done=windows, before=earlier)
+    own = () if shortest is None else ("--min-rigid", repr(shortest))
+    return Plan(
+        run=run,
+        flights=core.rows,
+        windows=core.windows(),
+        all_windows=core.windows(every=True),
+        warnings=core.cautions,
+        command=command_line("plan", own, run, selection, choosing),
+        _core=core,
+    )

@@ -1,0 +1,47 @@
+"""The figure of a plan: the energy of the run with its flights and all rigid windows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from matplotlib.figure import Figure
+
+from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, finish
+
+if TYPE_CHECKING:
+    from d2rpick.choice.plan import Plan
+
+_COLOURS: Final = {"supported": GOOD, "re-plan": SWITCHED, "done": "#999999"}
+_HATCHES: Final = {"supported": None, "re-plan": "//", "done": None}  # told apart without colour, too
+_SIZES: Final = {False: (10.0, 4.0), True: (4.2, 3.9)}
+# Share of the axes below the energy in which the windows are drawn.
+_STRIP: Final = 0.07
+
+
+def draw_plan(plan: Plan, *, narrow: bool = False) -> Figure:
+    """Draw the energy over time, the flights behind it and the rigid windows below it."""
+    figure = Figure(figsize=_SIZES[narrow], layout="constrained")
+    axes = figure.subplots()
+    history = plan.history
+    axes.plot(history.time, history.energy, color=REFERENCE, linewidth=1, label="internal energy")
+    for row in plan.rows:
+        axes.axvspan(row.start, row.end, color=FLIGHT, alpha=0.15, linewidth=0, label="flight")
+        if row.window:
+            axes.axvspan(
+                *row.window, ymax=_STRIP, facecolor=_COLOURS[row.status], hatch=_HATCHES[row.status],
+                edgecolor="white", linewidth=0, label=f"rigid, {row.status}",
+            )  # fmt: skip
+            axes.annotate(
+                str(row.number), (sum(row.window) / 2, _STRIP), xycoords=("data", "axes fraction"), xytext=(0, 2),
+                textcoords="offset points", ha="center", fontsize="small",
+            )  # fmt: skip
+    low, high = axes.get_ylim()
+    axes.set_ylim(low - 2 * _STRIP * (high - low), high)
+    unit = history.time_unit
+    axes.set(xlabel=f"time [{unit}]" if unit else "time", ylabel="internal energy")
+    finish(axes, legend=False)
+    known = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    figure.legend(
+        known.values(), known, loc="outside lower left", ncols=2 if narrow else 4, fontsize="small", frameon=False
+    )
+    return figure

@@ -1,0 +1,164 @@
+"""The answer of ``plan`` as table, JSON, CSV, Markdown and bare values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from d2rpick.errors import printable
+from d2rpick.report import tables
+from d2rpick.report.situation import frame_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.choice.plan import Plan, Planned
+
+SCHEMA = "d2rpick/plan/1"
+HEAD = ("", "flight", "from", "to", "margin", "tr", "td", "rigid", "of record", "quality", "status")
+
+# Keys of a window in JSON, and columns of the csv.
+WINDOW = (
+    "flight", "flight_start", "flight_end", "flight_source", "certain", "status", "reason", "tr", "td", "rigid_time",
+    "rigid_fraction", "run_time_share", "locks_in", "basis", "kind", "level_error", "lock_in_error", "residual",
+    "kinetic_share", "margin", "margin_source", "landing_spread", "landing", "landing_planned",
+)  # fmt: skip
+
+
+def as_table(plan: Plan) -> str:
+    """What was read, a row per flight, what the supported windows save, and why others are not supported."""
+    table = tables.as_text(HEAD, rows(plan)) if plan.rows else "no flight"
+    named = [f"flight {row.number}  {row.reason}" for row in plan.rows if row.reason]
+    lines = [heading(plan), "", table, "", *(f"{name.ljust(9)}  {text}" for name, text in outlook(plan)), *named]
+    return "\n".join(lines)
+
+
+def as_markdown(plan: Plan) -> str:
+    """The flights as a Markdown table, and below it what is saved, and why windows are not supported."""
+    named = [f"flight {row.number}: {row.reason}" for row in plan.rows if row.reason]
+    return "\n\n".join(
+        [tables.as_markdown(HEAD, rows(plan)), *(f"{name}: {text}" for name, text in outlook(plan)), *named]
+    )
+
+
+def as_csv(plan: Plan) -> str:
+    """A row per flight, a column for each key of ``windows`` in the JSON output."""
+    return tables.as_csv(WINDOW, (list(window(plan, row).values()) for row in plan.rows)).rstrip("\n")
+
+
+def as_json(plan: Plan, command: Sequence[str]) -> str:
+    """The whole plan by schema d2rpick/plan/1."""
+    return tables.as_json(
+        {
+            **frame_of(plan.history, SCHEMA, command, plan.cautions),
+            "min_rigid": plan.min_rigid,
+            "windows": [window(plan, row) for row in plan.rows],
+            "rigid_time": plan.rigid_time,
+            "rigid_fraction": plan.rigid_fraction,
+            "run_time_share": plan.run_time_share,
+        }
+    )
+
+
+def as_value(plan: Plan, *, every: bool = False) -> str:
+    """A line ``tr td`` for each supported window, or for ``every`` one, in the shortest digits that read back."""
+    return "\n".join(f"{tr!r} {td!r}" for tr, td in plan.windows(every=every))
+
+
+def window(plan: Plan, row: Planned) -> dict[str, Any]:
+    """Keys of one flight and its window in JSON."""
+    best, times, done = row.candidate, row.window, row.done
+    situation = row.answer.situation if row.answer and times else None
+    span = float(plan.history.time[-1] - plan.history.time[0])
+    return {
+        "flight": row.number,
+        "flight_start": row.start,
+        "flight_end": row.flight.end,
+        "flight_source": row.flight.source,
+        "certain": row.flight.certain,
+        "status": row.status,
+        "reason": row.reason,
+        "tr": times[0] if times else None,
+        "td": times[1] if times else None,
+        "rigid_time": row.rigid_time,
+        "rigid_fraction": None if row.rigid_time is None else row.rigid_time / span,
+        "run_time_share": best.run_time_share if best else None,
+        "locks_in": row.locks_in,
+        "basis": situation.basis if situation else None,
+        "kind": best.kind if best else None,
+        "level_error": best.level_error if best else None,
+        "lock_in_error": best.lock_in_error if best else None,
+        "residual": best.residual if best else None,
+        "kinetic_share": situation.kinetic_share if situation else None,
+        "margin": None if done else row.margin.time,
+        "margin_source": None if done else row.margin.source,
+        "landing_spread": None if done else row.margin.spread,
+        "landing": done.landing if done else None,
+        "landing_planned": done.planned if done else None,
+    }
+
+
+def heading(plan: Plan) -> str:
+    """What was read."""
+    history = plan.history
+    unit = f" {history.time_unit}" if history.time_unit else ""
+    what = f"{', '.join(history.source)}: {history.format}, {history.channel}"
+    span = f"{history.time[0]:.6g} to {history.time[-1]:.6g}{unit}"
+    return printable(f"history   {what}, {history.time.size} states, {span}")
+
+
+def outlook(plan: Plan) -> list[tuple[str, str]]:
+    """What the supported windows save, and what comes next; a name and a sentence each."""
+    supported, waiting = plan.supported, [row for row in plan.rows if row.status == "re-plan"]
+    if not supported:
+        return [("supported", "no window")]
+    count = "1 window" if len(supported) == 1 else f"{len(supported)} windows"
+    lines = [("supported", f"{count}, rigid for {plan.rigid_time:.6g}, {plan.rigid_fraction:.0%} of the record")]
+    if plan.run_time_share is not None:
+        lines.append(("run time", f"about {plan.run_time_share:.0%} of the reference's"))
+    lines += [(f"flight {row.number}", given_up(row)) for row in supported if row.answer and row.answer.longer]
+    if waiting:
+        lines.append(("next", "run with these windows, and plan the others from that run (--done)"))
+    return lines
+
+
+def given_up(row: Planned) -> str:
+    """How much rigid time of a window was given up for quality."""
+    from d2rpick.report.suggestion import given_up as told
+
+    assert row.answer is not None
+    assert row.answer.longer is not None
+    assert row.answer.recommended is not None
+    return told(row.answer.longer, row.answer.recommended)
+
+
+def rows(plan: Plan) -> list[list[tables.Cell]]:
+    """Cells of all flights, below ``HEAD``; those of supported windows have a star."""
+    span = float(plan.history.time[-1] - plan.history.time[0])
+    return [
+        [
+            "*" if row.status == "supported" else " ",
+            row.number,
+            row.start,
+            "end of record" if row.flight.end is None else row.flight.end,
+            "-" if row.done else f"{row.margin.time:.3g}",
+            row.window[0] if row.window else None,
+            row.window[1] if row.window else None,
+            row.rigid_time,
+            None if row.rigid_time is None else f"{row.rigid_time / span:.0%}",
+            quality(row),
+            row.status,
+        ]
+        for row in plan.rows
+    ]
+
+
+def quality(row: Planned) -> str | None:
+    """How well the pair of a window matches, in a word or two."""
+    best = row.candidate
+    if best is None:
+        return None
+    if best.kind == "start":
+        return "nothing vibrates"
+    if best.residual is not None:
+        return f"residual {tables.measure(best.residual)}"
+    return f"level error {tables.measure(best.level_error)}"

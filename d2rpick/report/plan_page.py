@@ -1,0 +1,61 @@
+"""The answer of ``plan`` as one HTML page to be read, printed and signed."""
+
+from __future__ import annotations
+
+import shlex
+from typing import TYPE_CHECKING
+
+from d2rpick.report import page
+from d2rpick.report.figures import svg_element
+from d2rpick.report.figures_plan import draw_plan
+from d2rpick.report.html import Markup, drawings, pairs, remarks, resource, section, table, tag
+from d2rpick.report.plan import HEAD, heading, outlook, rows
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.choice.plan import Plan, Planned
+    from d2rpick.histories.opening import Run
+
+_CAPTION = "Internal energy with the flights, and below it the rigid windows with their numbers"
+
+
+def as_page(plan: Plan, run: Run, command: Sequence[str], card: str | None) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    plan : Plan
+    run : Run
+        What was read.
+    command : sequence of str
+        Arguments that repeat the answer.
+    card : str or None
+        Solver input for the supported windows, where it is known whom it switches.
+    """
+    return page.run_page(run, _sections(plan, run, command, card))
+
+
+def _sections(plan: Plan, run: Run, command: Sequence[str], card: str | None) -> Iterator[Markup]:
+    cards = [_window(row, plan) for row in plan.supported]
+    if not cards:
+        nothing = tag("p", "No window of this run can be recommended.")
+        cards = [tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")]
+    yield tag("section", tag("div", *cards, class_="choice"), remarks(plan.cautions), pairs(outlook(plan)))
+    drawn = tuple(svg_element(draw_plan(plan, narrow=narrow), f"plan-{narrow}-") for narrow in (False, True))
+    yield drawings({_CAPTION: (drawn[0], drawn[1])})
+    reasons = pairs([(f"flight {row.number}", row.reason) for row in plan.rows if row.reason])
+    yield section("Flights", table("Flights", HEAD[1:], [row[1:] for row in rows(plan)]), reasons)
+    if card:
+        yield section("For the solver's input", tag("pre", card))
+    what, _, text = heading(plan).partition(" ")
+    notes = [("note", note) for note in plan.history.notes]
+    yield section("What was read", pairs([(what, text.strip()), *page.digests(run.files), *notes]))
+    yield section("Method and limits", resource("method.html"))
+    yield section("To repeat this", tag("pre", shlex.join(command), class_="wrap"))
+
+
+def _window(row: Planned, plan: Plan) -> Markup:
+    assert row.window is not None
+    residual = row.candidate.residual if row.candidate else None
+    return page.pair(f"Flight {row.number}", row.window, residual, plan.history, "card chosen")

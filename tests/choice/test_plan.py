@@ -1,0 +1,166 @@
+"""Plans: flights, windows and what one reference supports, on computed runs of the box and of a real solver."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.choice.of_run import Reference, read, suggest_of
+from d2rpick.choice.plan import Plan, plan_of
+from d2rpick.choice.settings import Settings
+from d2rpick.errors import RangeError
+from d2rpick.histories.opening import Selection
+from tests.drops import drop, written
+from tests.shared import shared
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PLAIN = Settings()
+BOX = Selection(parts=("box",))
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
+    return read(written(drop(), tmp_path_factory.mktemp("run")), BOX)
+
+
+@pytest.fixture(scope="module")
+def plan(reference: Reference) -> Plan:
+    return plan_of(reference, PLAIN)
+
+
+def real(name: str) -> Reference:
+    return read([str(shared(f"openradioss/car_drop/{name}"))])
+
+
+def statuses(plan: Plan) -> list[str]:
+    return [row.status for row in plan.rows]
+
+
+def test_every_flight_of_the_box_is_listed_where_it_lies(plan: Plan) -> None:
+    touched = drop().landings
+    assert len(plan.rows) >= 3
+    for row in plan.rows:
+        inside = [t for t in touched if row.start + 2e-3 < t[1] and t[0] < row.end - 2e-3]
+        assert not inside, f"{row.start} to {row.end}"
+
+
+def test_the_first_fall_is_rigid_from_the_start_and_the_first_that_locks_in_energy_is_the_last_supported(
+    plan: Plan,
+) -> None:
+    first, *others = [row for row in plan.rows if row.window]
+    assert first.window is not None
+    assert first.window[0] == 0.0
+    assert (first.status, first.locks_in) == ("supported", False)
+    assert others[0].status == "supported"
+    assert others[0].locks_in
+    assert {row.status for row in others[1:]} == {"re-plan"}
+    assert others[0].window is not None
+    for row in others[1:]:
+        assert f"{others[0].window[0]:.6g} to {others[0].window[1]:.6g}" in (row.reason or "")
+
+
+def test_each_window_is_what_suggest_says_for_its_td(reference: Reference, plan: Plan) -> None:
+    for tr, td in plan.windows(every=True):
+        found = suggest_of(reference, td, PLAIN)
+        assert found.recommended is not None
+        assert (found.recommended.tr, found.recommended.td) == (tr, td)
+
+
+def test_windows_keep_their_margin_and_follow_each_other(plan: Plan) -> None:
+    windows = plan.windows(every=True)
+    assert all(one[1] < other[0] for one, other in pairwise(windows))
+    for row in plan.rows:
+        if row.window and row.flight.end is not None:
+            assert row.start <= row.window[0] < row.window[1] <= row.end - row.margin.time + 1e-12
+            assert row.margin.time >= 0.03 * (row.end - row.start)
+    assert plan.rigid_time == pytest.approx(sum(td - tr for tr, td in plan.windows()))
+
+
+def test_a_margin_that_is_given_overrules(reference: Reference) -> None:
+    given = plan_of(reference, Settings(margin=0.02))
+    assert {row.margin.time for row in given.rows} == {0.02}
+    assert given.rows[0].window == pytest.approx((0.0, given.rows[0].end - 0.02), abs=1e-9)  # no load before the record
+
+
+def test_short_windows_are_left_out_with_the_reason(reference: Reference) -> None:
+    found = plan_of(reference, PLAIN, min_rigid=0.2)
+    for row in found.rows:
+        assert (row.status == "left-out") == (row.window is None)
+        assert row.window is None or row.window[1] - row.window[0] >= 0.2
+        assert row.status != "left-out" or "at least 0.2 was asked for" in (row.reason or "")
+    assert plan_of(reference, PLAIN, min_rigid=2.0).supported == ()
+
+
+def test_after_counts_in_its_flight_alone(reference: Reference, plan: Plan) -> None:
+    second = plan.rows[1]
+    found = plan_of(reference, Settings(after=(second.start + second.end) / 2))
+    assert found.rows[0].status == "left-out"
+    assert found.rows[1].window is None or found.rows[1].window[0] >= (second.start + second.end) / 2
+    assert [row.window for row in found.rows[2:]] == [row.window for row in plan.rows[2:]]
+
+
+# ---- switched runs
+
+
+def test_a_switched_run_is_recognised_and_the_next_window_planned(
+    reference: Reference, plan: Plan, tmp_path: Path
+) -> None:
+    done = plan.windows()
+    switched = read(written(drop(*done), tmp_path), BOX)
+    found = plan_of(switched, PLAIN, done=done, before=reference)
+    assert [row.window for row in found.rows if row.status == "done"] == list(done)
+    assert found.windows()
+    assert found.windows()[0][0] > done[-1][1]
+    for row in found.rows:
+        if row.done:
+            assert row.done.moved is not None
+            assert abs(row.done.moved) <= row.margin.time
+            assert not row.done.landed_rigid
+    landed = [row.done.landing for row in found.rows if row.done]
+    contacts = [start for start, _ in drop(*done).landings]
+    assert all(min(abs(one - at) for at in contacts) < 2e-3 for one in landed if one is not None)
+
+
+def test_a_run_that_was_not_switched_is_not_taken_for_one(reference: Reference, plan: Plan) -> None:
+    with pytest.raises(RangeError, match="said to be done"):
+        plan_of(reference, PLAIN, done=plan.windows())
+    with pytest.raises(RangeError, match="outside the record"):
+        plan_of(reference, PLAIN, done=[(0.1, 9.0)])
+
+
+# ---- a real solver
+
+
+def test_the_flights_and_windows_of_the_computed_box() -> None:
+    """Contacts as the solver wrote them, openradioss/car_drop/drop2_runs.csv."""
+    found = plan_of(real("drop2T01.gz"), PLAIN)
+    flights = [(0, 0.2858), (0.3022, 0.3386), (0.3394, 0.4196), (0.4206, 0.4800), (0.5020, 0.5966), (0.619, 0.6614)]
+    for row, (start, end) in zip(found.rows, flights, strict=False):
+        assert (row.start, row.end) == pytest.approx((start, end), abs=1e-3)
+    assert statuses(found) == ["supported", "left-out", "supported", "re-plan", "re-plan", "left-out", "re-plan"]
+
+
+def test_a_landing_while_rigid_is_told() -> None:
+    """Three windows planned from one reference: the third landed 5.4 ms early, while it was rigid."""
+    legs = [str(shared(f"openradioss/car_drop/switched/drop2_w123_T0{leg}.gz")) for leg in range(1, 7)]
+    done = [(0.0, 0.2838), (0.3654, 0.4176), (0.5046, 0.5946)]
+    found = plan_of(read(legs), PLAIN, done=done, before=real("drop2T01.gz"))
+    moved = [row.done.moved for row in found.rows if row.done]
+    assert moved == pytest.approx([0.0, -1.6e-3, -5.4e-3], abs=3e-4)
+    assert [row.done.landed_rigid for row in found.rows if row.done] == [False, False, True]
+    assert found.supported == ()
+    assert "landed-rigid" in [caution.code for caution in found.cautions]
+    alone = plan_of(read(legs), PLAIN)  # recognised by the kinetic energy that the parts lack
+    recognised = [row.window for row in alone.rows if row.done and row.window]
+    assert [time for pair in recognised for time in pair] == pytest.approx([t for pair in done for t in pair], abs=1e-3)
+
+
+def test_the_switched_car_landed_as_computed() -> None:
+    legs = [str(shared(f"openradioss/car_drop/switched/car_all_T0{leg}.gz")) for leg in range(1, 4)]
+    found = plan_of(read(legs), PLAIN, done=[(0.0496, 0.1464)], before=real("carT01.gz"))
+    (moved,) = (row.done.moved for row in found.rows if row.done)
+    assert moved == pytest.approx(0.5e-3, abs=1.5e-4)

@@ -1,0 +1,163 @@
+"""The command ``plan`` in all its forms."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.cli.test_output import check_by_schema
+from tests.command import BOX, ENERGY, answer, run
+from tests.drops import drop, written
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PART = ("--part", "box")
+
+
+@pytest.fixture(scope="module")
+def history(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    return written(drop(), tmp_path_factory.mktemp("run"))
+
+
+def test_all_forms_hold_the_same_windows(history: list[str]) -> None:
+    found = answer("plan", *PART, *history)
+    check_by_schema(found)
+    supported = [(row["tr"], row["td"]) for row in found["windows"] if row["status"] == "supported"]
+    every = [(row["tr"], row["td"]) for row in found["windows"] if row["tr"] is not None]
+    assert 1 < len(supported) < len(every)
+    for flag, wanted in (((), supported), (("--all",), every)):
+        lines = run("plan", "-q", "-f", "value", *flag, *PART, *history).stdout.splitlines()
+        assert [tuple(map(float, line.split(" "))) for line in lines] == wanted
+    table = run("plan", "-q", "-f", "csv", *PART, *history).stdout
+    assert [row["td"] for row in csv_rows(table)] == [row["td"] for row in found["windows"]]
+    for form in ("table", "markdown"):
+        text = run("plan", "-q", "-f", form, *PART, *history).stdout
+        assert all(f"{tr:.6g}" in text and f"{td:.6g}" in text for tr, td in every)
+        assert "plan this one from the run switched so" in text
+
+
+def csv_rows(text: str) -> list[dict[str, object]]:
+    """Rows of the csv, numbers as numbers."""
+    import csv
+    import io
+
+    rows = csv.DictReader(io.StringIO(text))
+    return [
+        {key: float(cell) if key in ("tr", "td") and cell else cell or None for key, cell in row.items()}
+        for row in rows
+    ]
+
+
+def test_the_card_holds_the_supported_windows_and_passes_check(history: list[str], tmp_path: Path) -> None:
+    card = tmp_path / "switches.k"
+    result = run("plan", "-q", "-f", "card", *PART, "-o", str(card), *history)
+    assert (result.exit_code, result.stdout) == (0, "")
+    windows = json.loads(run("check", "-q", "-f", "json", str(card)).stdout)["windows"]
+    lines = run("plan", "-q", "-f", "value", *PART, *history).stdout.split()
+    assert [time for one in windows for time in (one["tr"], one["td"])] == pytest.approx(
+        list(map(float, lines)), abs=1e-7
+    )
+
+
+def test_radioss_gets_a_leg_for_each_switch(history: list[str]) -> None:
+    card = run("plan", "-q", "-f", "card", "--solver", "radioss", "--node", "7", *PART, *history).stdout
+    lines = run("plan", "-q", "-f", "value", *PART, *history).stdout.splitlines()
+    assert card.count("/RBODY/ON") == len(lines)
+    assert card.count("/RBODY/OFF") >= len(lines)
+
+
+def test_pictures_and_pages_are_written(history: list[str], tmp_path: Path) -> None:
+    plot, page = tmp_path / "plan.svg", tmp_path / "plan.html"
+    assert run("plan", "-q", *PART, "--plot", str(plot), "--report", str(page), *history).exit_code == 0
+    assert plot.read_text().startswith("<?xml")
+    text = page.read_text()
+    assert "*DEFORMABLE_TO_RIGID_AUTOMATIC" in text
+    assert "http://" not in text.replace("http://www.w3.org", "")
+
+
+def test_nothing_to_recommend_is_an_objection(history: list[str]) -> None:
+    for form in ("table", "json", "csv", "markdown", "value", "card"):
+        result = run("plan", "-q", "--min-rigid", "5", "-f", form, *PART, *history)
+        assert result.exit_code == 1, form
+    assert run("plan", "-q", "--min-rigid", "5", "--exit-zero", *PART, *history).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (("--all", ENERGY), "--all belongs to -f value, -f card and --write-deck"),
+        (("--before", BOX, BOX), "name its windows with --done"),
+        (("-f", "card", ENERGY), "needs --part"),
+        (("--node", "3", ENERGY), "is about the card"),
+        (("--done", "nowhere.txt", BOX), "nowhere.txt"),
+        (("--min-rigid", "-1", BOX), "at least 0"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(args: tuple[str, ...], message: str) -> None:
+    result = run("plan", *args)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert message in result.stderr
+
+
+def test_one_oscillator_is_one_flight() -> None:
+    found = answer("plan", ENERGY)
+    (row,) = found["windows"]
+    assert (row["status"], row["basis"], row["margin_source"]) == ("supported", "oscillator", "no-contact")
+    assert row["residual"] < 1e-3
+
+
+def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tmp_path: Path) -> None:
+    done = tmp_path / "switches.txt"
+    run("plan", "-q", "-f", "value", *PART, "-o", str(done), *history)
+    windows = [tuple(map(float, line.split())) for line in done.read_text().splitlines()]
+    switched = written(drop(*((tr, td) for tr, td in windows)), tmp_path / "next")
+    before = [text for name in history for text in ("--before", name)]
+    found = answer("plan", *PART, "--done", str(done), *before, *switched)
+    check_by_schema(found)
+    assert [(row["tr"], row["td"]) for row in found["windows"] if row["status"] == "done"] == windows
+    assert all(row["landing"] > row["td"] for row in found["windows"] if row["status"] == "done")
+    told = run("plan", "-q", *PART, "--done", str(done), *before, *switched).stdout
+    assert "as planned" in told
+    assert "than planned" in told
+    wrong = run("plan", "-q", *PART, "--done", str(done), *history)
+    assert wrong.exit_code == 2
+    assert "said to be done" in wrong.stderr
+
+
+DECK = """*KEYWORD
+*CONTROL_TERMINATION
+       1.2
+*DATABASE_GLSTAT
+    0.0001
+*DATABASE_MATSUM
+    0.0001
+*PART
+box
+         1         1         1
+*PART
+step
+         2         1         1
+*END
+"""
+
+
+def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(history: list[str], tmp_path: Path) -> None:
+    main, folder = tmp_path / "main.k", tmp_path / "next"
+    main.write_text(DECK)
+    args = ("plan", "-q", "--part", "flying", "--deck", str(main), "--write-deck", str(folder), *history)
+    result = run(*args)
+    assert result.exit_code == 0, result.stdout
+    assert "0 errors, 0 warnings" in result.stdout
+    assert (folder / "main.k").read_text() == DECK.replace("*END", "*INCLUDE\nswitches.k\n*END")
+    judged = run("check", str(folder / "main.k"), *(text for name in history for text in ("--history", name)))
+    assert judged.exit_code == 0, judged.stdout
+    again = run(*args)
+    assert again.exit_code == 2
+    assert "exists" in again.stderr
+    assert run(*args, "--overwrite").exit_code == 0
+    alone = run("plan", "--part", "box", "--deck", str(main), *history)
+    assert alone.exit_code == 2
+    assert "--deck needs --write-deck" in alone.stderr

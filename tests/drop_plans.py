@@ -1,0 +1,66 @@
+"""Plans of the falling box held against the runs that are switched so: ``python -m tests.drop_plans``.
+
+Twenty sets of parameters, fixed before any of them was run: height of the fall and tilt on a grid, the speed across,
+the stiffness of the ground and of the bars in turn.  Each supported window has to end before the landing of the
+switched run.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from itertools import product
+from pathlib import Path
+from typing import NamedTuple
+
+from d2rpick.choice.of_run import read
+from d2rpick.choice.plan import plan_of
+from d2rpick.choice.settings import Settings
+from d2rpick.histories.opening import Selection
+from d2rpick.models.rollover.model import Parameters
+from d2rpick.models.rollover.run import Window, simulate
+from tests.drops import written
+
+SETS = tuple(
+    Parameters(
+        drop=height, tilt=tilt, speed=(0.0, 1.0, 2.0)[i % 3], ground_stiffness=(5e5, 2e5)[i % 2],
+        stiffness=(4.5e6, 2.5e6)[i // 2 % 2], mesh=8,
+    )
+    for i, (height, tilt) in enumerate(product((0.2, 0.3, 0.4, 0.6), (10.0, 20.0, 30.0, 35.0, 44.0)))
+)  # fmt: skip
+T_END, INTERVAL = 1.2, 2e-4
+BOX = Selection(parts=("box",))
+
+
+class Outcome(NamedTuple):
+    """Supported windows, and the contact of the switched run after each, None where none comes [s]."""
+
+    windows: tuple[tuple[float, float], ...]
+    landings: tuple[float | None, ...]
+
+    @property
+    def kept(self) -> bool:
+        """Whether each window ends before the landing."""
+        return all(
+            landing is None or td < landing for (_, td), landing in zip(self.windows, self.landings, strict=True)
+        )
+
+
+def outcome(parameters: Parameters) -> Outcome:
+    """Plan the run of some parameters, and compute it switched in the supported windows."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = written(simulate(parameters, T_END, interval=INTERVAL), Path(folder))
+        windows = plan_of(read(files, BOX), Settings()).windows()
+    switched = simulate(parameters, T_END, *(Window(*one) for one in windows), interval=INTERVAL)
+    contacts = switched.landings
+    after = tuple(next((start for start, _ in contacts if start > tr), None) for tr, _ in windows)
+    return Outcome(windows, after)
+
+
+if __name__ == "__main__":
+    for number, parameters in enumerate(SETS, start=1):
+        found = outcome(parameters)
+        pairs = zip(found.windows, found.landings, strict=True)
+        told = "; ".join(
+            f"{tr:.4f} to {td:.4f}, contact {at if at is None else round(at, 4)}" for (tr, td), at in pairs
+        )
+        print(f"{number:2d} {'kept' if found.kept else 'NOT KEPT'}  {told}", flush=True)

@@ -1,0 +1,36 @@
+"""Runs of the planar box that falls and bounces, as files of LS-DYNA."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+from d2rpick.models.rollover import files
+from d2rpick.models.rollover.model import Parameters
+from d2rpick.models.rollover.run import Window, simulate
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from d2rpick.models.rollover.record import Record
+
+MESH = 6  # coarse, for speed
+T_END = 1.2
+
+
+@cache
+def drop(*windows: tuple[float, float], height: float = 0.4, tilt: float = 30.0, speed: float = 0.0) -> Record:
+    """Compute a run that is switched in ``windows`` [s]."""
+    parameters = Parameters(speed=speed, drop=height, tilt=tilt, mesh=MESH)
+    return simulate(parameters, T_END, *(Window(*one) for one in windows))
+
+
+def written(record: Record, folder: Path) -> list[str]:
+    """Write matsum and glstat of a run, and give their names."""
+    folder.mkdir(parents=True, exist_ok=True)
+    names = []
+    for form in ("matsum", "glstat"):
+        path = folder / form
+        path.write_bytes(files.WRITERS[form](record))
+        names.append(str(path))
+    return names

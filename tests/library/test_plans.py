@@ -1,0 +1,52 @@
+"""The plan in Python says what the command line says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import d2rpick as d2
+from tests.command import ENERGY, answer
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MATSUM = "sample_data/rollover_box.matsum"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options"),
+    [
+        ({"parts": "box"}, ("--part", "box")),
+        ({"parts": "flying", "min_rigid": 0.1}, ("--part", "flying", "--min-rigid", "0.1")),
+        (
+            {"parts": "box", "margin": 0.02, "cost_share": 0.8},
+            ("--part", "1", "--margin", "0.02", "--cost-share", "0.8"),
+        ),
+    ],
+)
+def test_arguments_mean_what_options_mean(arguments: dict[str, Any], options: tuple[str, ...]) -> None:
+    found = d2.plan(d2.read(MATSUM), **arguments)
+    theirs = answer("plan", *options, MATSUM)
+    assert {**found.to_dict(), "command": None} == {**theirs, "command": None}
+    assert {**answer(*found.command), "command": None} == {**theirs, "command": None}
+    assert [(row["tr"], row["td"]) for row in theirs["windows"] if row["status"] == "supported"] == list(found.windows)
+
+
+def test_a_table_a_figure_and_a_page(tmp_path: Path) -> None:
+    found = d2.plan(d2.read(MATSUM), parts="box")
+    frame = found.to_frame()
+    assert frame["status"].tolist() == [row.status for row in found.flights]
+    assert found.plot().axes
+    assert "<html" in found.report(tmp_path / "plan.html").read_text()
+    assert found.rigid_fraction == pytest.approx(sum(td - tr for tr, td in found.windows) / 0.42, rel=1e-3)
+
+
+def test_a_wrong_argument_is_named() -> None:
+    with pytest.raises(ValueError, match="min_rigid is -1"):
+        d2.plan(d2.read(ENERGY), min_rigid=-1)
+    with pytest.raises(ValueError, match=r"done\[0\] is"):
+        d2.plan(d2.read(ENERGY), done=[(0.2, 0.1)])
+    with pytest.raises(d2.RangeError, match="outside the record"):
+        d2.plan(d2.read(ENERGY), done=[(0.1, 0.9)])
