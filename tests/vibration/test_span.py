@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from d2rpick.histories.history import History
-from d2rpick.vibration.identify import judge_given, identify, identify_several
+from d2rpick.vibration.identify import identify, identify_several, judge_given
 from d2rpick.vibration.one_mode import Mode
 from d2rpick.vibration.span import Span, described_span, span_of
 from tests.records import ENERGY, MODE, TIME, noisy
