@@ -92,7 +92,7 @@ def all_flights(momenta: Momenta) -> tuple[FreeFlight, ...]:
 
 def tells(momenta: Momenta) -> bool:
     """Whether the chosen parts, or the model, move enough for their momentum to say that they do not fly."""
-    change = float(np.ptp(momenta.values[:, list(momenta.chosen)], axis=0).max())
+    change = momenta.change(momenta.chosen)
     return momenta.time.size >= FEWEST and change > _VISIBLE * momenta.noise(momenta.chosen)
 
 
@@ -103,9 +103,8 @@ def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
     springs, the members of the set count instead.
     """
     parts = momenta.chosen if momenta.values[:, list(momenta.chosen)].any() else members
-    values = momenta.values[:, list(parts)]
-    change = float(np.ptp(values, axis=0).max())
-    size = change if change > 2 * momenta.noise(parts) else float(np.abs(values).max())
+    change = momenta.change(parts)
+    size = change if change > 2 * momenta.noise(parts) else float(np.abs(momenta.values[:, list(parts)]).max())
     return size > _VISIBLE * noise
 
 
@@ -149,8 +148,7 @@ def _bent(time: Samples, values: Samples) -> Samples:
 
 def _sets(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
     """Sets of parts to try: the chosen ones, these with more and more of the attached ones, all that move."""
-    moving = [i for i in range(momenta.values.shape[1]) if np.ptp(momenta.values[:, i]) > 0]
-    members = list(momenta.chosen)
+    moving, members = momenta.moving, list(momenta.chosen)
     yield tuple(members)
     for part in _attached(momenta, members, moving, td):
         members.append(part)

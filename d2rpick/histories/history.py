@@ -85,13 +85,36 @@ class Momenta:
     flying: tuple[int, ...] | None = None
 
     def of(self, members: Sequence[int]) -> Samples:
-        """Sum over the parts with these indices, shape (n, 3)."""
-        return np.asarray(self.values[:, list(members)].sum(axis=1))
+        """Sum over the parts with these indices, shape (n, 3), read-only."""
+        key = tuple(members)
+        if key not in self._sums:
+            self._sums[key] = _frozen(self.values[:, list(members)].sum(axis=1))
+        return self._sums[key]
 
     def noise(self, members: Sequence[int]) -> float:
         """What the printed digits of these parts leave open in their sum [momentum]."""
-        largest = np.abs(self.values[:, list(members)]).max(axis=(0, 2), initial=0.0)
-        return sum(self.precision.quantum(float(value)) for value in largest) / 2
+        largest = np.abs(np.stack(self._bounds))[:, list(members)].max(axis=(0, 2), initial=0.0)
+        return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
+
+    def change(self, members: Sequence[int]) -> float:
+        """Largest range that a component of one of these parts has over the record [momentum]."""
+        lowest, highest = self._bounds
+        return float((highest - lowest)[list(members)].max())
+
+    @cached_property
+    def moving(self) -> tuple[int, ...]:
+        """Indices of the parts whose components are not all the same number."""
+        lowest, highest = self._bounds
+        return tuple(np.flatnonzero(highest.max(axis=1) > lowest.min(axis=1)).tolist())
+
+    @cached_property
+    def _bounds(self) -> tuple[Samples, Samples]:
+        """Lowest and highest value of each component over the record, shape (parts, 3) [momentum]."""
+        return self.values.min(axis=0), self.values.max(axis=0)
+
+    @cached_property
+    def _sums(self) -> dict[tuple[int, ...], Samples]:
+        return {}  # the same few sets are asked for at many times
 
 
 class Track(NamedTuple):

@@ -1,0 +1,140 @@
+"""Answers stay what they were: a table of old ones, to the digits people read, that work on speed must not change."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.of_run import read, suggest_of
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.choice.suggest_td import suggest_in_window
+from d2rpick.histories.history import History
+from d2rpick.histories.selection import Selection
+from tests.command import ROOT
+
+if TYPE_CHECKING:
+    from d2rpick.choice.suggest import Suggestion
+
+SAMPLES = {
+    "paper": ("energy.csv", Selection()),
+    "glstat": ("energy.glstat", Selection()),
+    "shell box": ("rollover.csv", Selection(energy=("boxIE_J",))),
+    "time history": ("rolloverT01.gz", Selection()),
+    "planar box": ("rollover_box.csv", Selection(energy=("internal_energy",))),
+}
+# Frequencies in the record and shares of their energies, and noise [of the highest energy].
+MADE = {
+    "one mode": (((4.3, 1.0),), 0.01),
+    "two modes": (((3.1, 1.0), (5.7, 0.6)), 0.003),
+    "five modes": (((3.1, 1.0), (5.7, 0.7), (9.3, 0.5), (13.9, 0.4), (21.2, 0.3)), 0.003),
+    "noise": (((2.0, 0.3),), 0.3),
+}
+STATES = 2500
+
+
+def made(name: str) -> History:
+    """Energy of the modes, damped, with white noise."""
+    modes, noise = MADE[name]
+    time = np.linspace(0.0, 1.0, STATES)
+    energy = sum((share * np.sin(2 * np.pi * rate * time + rate) ** 2 for rate, share in modes), np.zeros(STATES))
+    energy = np.exp(-0.8 * time) * energy
+    energy += noise * energy.max() * np.random.default_rng(14).standard_normal(STATES)
+    return History(time, energy, source=(name,), format="made", channel="E")
+
+
+def answer(name: str, td: float | tuple[float, float], **asked: float | bool) -> Suggestion:
+    """Answer for a sample or a made-up record; a window of td is given by its two ends."""
+    settings = Settings(**asked)  # type: ignore[arg-type]
+    if name in SAMPLES:
+        file, selection = SAMPLES[name]
+        return suggest_of(read([str(ROOT / "sample_data" / file)], selection), td, settings)
+    return suggest_in_window(made(name), td, settings) if isinstance(td, tuple) else suggest(made(name), td, settings)
+
+
+def digest(found: Suggestion) -> str:
+    """What is recommended, how sure it is, and the first of the ranks, to printed digits."""
+    pair, better, best = found.recommended, found.better_pair, found.chosen
+    parts = [found.situation.basis]
+    parts += [f"{pair.tr:.6g} {pair.td:.6g} {_measure(pair.residual)}" if pair else "none"]
+    parts += [f"+-{(best.tr_high - best.tr_low) / 2:.1e}" if best and best.tr_high and best.tr_low else "-"]
+    parts += [f"{better.tr:.6g} {better.td:.6g} {_measure(better.residual)}" if better else "none"]
+    parts += [f"{len(found.candidates)}/{sum(one.acceptable for one in found.candidates)}"]
+    parts += [" ".join(f"{one.tr:.6g}" for one in found.candidates[1:4])]
+    parts += ["; ".join(f"{one.start:.5g}-{one.end:.5g}" for one in (found.windows or ())[:3])]
+    return " | ".join(parts)
+
+
+def _measure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
+
+
+# fmt: off
+OLD: list[tuple[str, float | tuple[float, float], dict[str, float | bool], str]] = [
+    ("paper", 0.064, {},
+     ("oscillator | 0.0128853 0.064 0.957 | +-1.0e-07 | 0.0135867 0.0687534 0.000 | "
+     "10/4 | 0.0247264 0.0383104 0.0495088 | ")),
+    ("paper", 0.1, {"margin": 0.005},
+     ("oscillator | 0.0126389 0.1 0.990 | +-1.0e-07 | 0.013103 0.0938997 0.000 | "
+     "15/7 | 0.0250568 0.0378429 0.050125 | ")),
+    ("paper", (0.06, 0.07), {},
+     ("oscillator | 0.0135867 0.0687534 0.000 | +-1.0e-07 | 0.0135867 0.0687534 0.000 | "
+     "10/4 | 0.0238274 0.0397308 0.0477726 | ")),
+    ("paper", 0.064, {"replay": False},
+     ("energy | 0.000223445 0.064 - | +-6.4e-06 | 0.00101301 0.0562 - | "
+     "10/10 | 0.0122694 0.0128831 0.0247289 | 0.00017669-0.00026935; 0.012206-0.012332; 0.012819-0.012945")),
+    ("glstat", 0.1, {},
+     ("oscillator | 0.0126389 0.1 0.990 | +-6.5e-07 | 0.013103 0.0938997 0.000 | "
+     "15/7 | 0.0250568 0.0378429 0.050125 | ")),
+    ("shell box", 0.37, {},
+     ("energy | 0.156795 0.37 - | +-2.8e-04 | 0.158504 0.36901 - | "
+     "286/217 | 0.157262 0.15831 0.158973 | 0.15623-0.17525; 0.1759-0.20282; 0.20312-0.21659")),
+    ("shell box", (0.25, 0.37), {},
+     ("energy | 0.217501 0.26351 - | +-1.5e-04 | 0.217501 0.26351 - | "
+     "59/23 | 0.131506 0.227506 0.22551 | 0.12991-0.13401; 0.13481-0.13509; 0.14277-0.14482")),
+    ("time history", 0.37, {},
+     ("energy | 0.102359 0.37 - | +-4.0e-05 | 0.102683 0.372005 - | "
+     "101/95 | 0.105003 0.108745 0.121949 | 0.091005-0.37")),
+    ("planar box", 0.3, {},
+     "energy | 0.0943632 0.3 - | +-4.0e-05 | 0.099 0.296 - | 41/34 | 0.103275 0.119325 0.126129 | 0.087-0.3"),
+    ("planar box", (0.2, 0.37), {"max_residual": 0.5},
+     "energy | none | - | none | 35/30 | 0.099 0.10055 0.123 | "),
+    ("one mode", 0.8, {},
+     "oscillator | 0.0941268 0.8 0.705 | +-1.3e-04 | 0.104731 0.828681 0.000 | 13/6 | 0.168248 0.329018 0.398432 | "),
+    ("one mode", (0.5, 0.9), {},
+     ("oscillator | 0.104731 0.828681 0.000 | +-1.3e-04 | 0.104731 0.828681 0.000 | "
+     "14/7 | 0.157443 0.34176 0.385479 | ")),
+    ("two modes", 0.8, {},
+     "oscillator | none | - | 0.0390059 0.750233 0.424 | 9/0 | 0.458137 0.634915 0.362027 | "),
+    ("two modes", 0.7, {"tolerance": 0.05},
+     "oscillator | none | - | 0.0390059 0.750233 0.424 | 13/0 | 0.356023 0.68076 0.462341 | "),
+    ("five modes", 0.8, {},
+     ("energy | 0.646157 0.8 - | +-6.9e-05 | 0.650106 0.796719 - | "
+     "45/11 | 0.644658 0.645058 0.643057 | 0.63752-0.63922; 0.63976-0.64013; 0.64041-0.64081")),
+    ("five modes", 0.8, {"after": 0.1},
+     ("energy | 0.633516 0.8 - | +-2.4e-04 | 0.165315 0.796719 - | "
+     "45/36 | 0.646157 0.644658 0.645058 | 0.16565-0.17229; 0.47747-0.48475; 0.62756-0.63922")),
+    ("five modes", (0.5, 0.9), {"after": 0.1},
+     ("energy | 0.247699 0.579432 - | +-2.2e-04 | 0.13494 0.579432 - | "
+     "216/179 | 0.137255 0.139656 0.140456 | 0.1-0.15707; 0.17921-0.18879; 0.20403-0.26489")),
+    ("five modes", 0.77, {"after": 0.2, "strict": True},
+     ("energy | 0.2027 0.77 - | +-1.0e-04 | 0.203302 0.769108 - | "
+     "444/382 | 0.265566 0.280512 0.281313 | 0.2-0.21792; 0.26112-0.38986; 0.42332-0.45083")),
+    ("five modes", 0.8, {"max_kinetic_share": 0.3, "after": 0.1},
+     "energy | none | - | none | 45/36 | 0.646157 0.644658 0.645058 | "),
+    ("noise", 0.8, {},
+     "energy | none | - | none | 409/0 | 0.0332585 0.0363682 0.036477 | "),
+    ("noise", (0.6, 0.9), {"replay": False, "after": 0.05},
+     ("energy | 0.0688275 0.762305 - | +-1.2e-04 | 0.0688275 0.762305 - | "
+     "903/815 | 0.123222 0.123272 0.13642 | 0.050765-0.050859; 0.052296-0.052494; 0.062396-0.062438")),
+]
+# fmt: on
+
+
+@pytest.mark.parametrize(("name", "td", "asked", "old"), OLD)
+def test_an_old_answer_is_given_again(
+    name: str, td: float | tuple[float, float], asked: dict[str, float | bool], old: str
+) -> None:
+    assert digest(answer(name, td, **asked)) == old

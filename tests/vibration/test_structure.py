@@ -1,0 +1,54 @@
+"""What a fit leaves over: scatter or structure, and when a part of the samples is enough to tell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from d2rpick.vibration.fit_one import VIBRATION, fails, fit, rates
+from d2rpick.vibration.identify import HOPELESS, identify, identify_several
+from d2rpick.vibration.one_mode import energy_and_jacobian
+from d2rpick.vibration.structure import MAX_STRUCTURE, structure_of, surely_structured
+
+S = np.linspace(0.0, 1.0, 20_000)
+
+
+def noise(size: int, seed: int = 14) -> np.ndarray:
+    """White noise of unit variance."""
+    return np.random.default_rng(seed).standard_normal(size)
+
+
+def test_a_vibration_is_structure_and_white_noise_is_none() -> None:
+    wave = np.sin(40 * S)
+    assert structure_of(wave) == pytest.approx(np.sqrt(0.5), rel=0.05)
+    assert structure_of(noise(S.size)) < 0.05
+    assert surely_structured(0.1 * wave, 1.0)
+    assert not surely_structured(MAX_STRUCTURE * wave, 1.0)
+    assert not any(surely_structured(noise(2000, seed), 1.0) for seed in range(200))
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.05, 0.3])
+def test_a_part_of_the_samples_refuses_only_what_all_of_them_refuse(scatter: float) -> None:
+    one = np.exp(-S) * np.sin(20 * S) ** 2 + scatter * noise(S.size) / 4
+    two = one + 0.7 * np.exp(-S) * np.cos(33 * S) ** 2
+    many = two + 0.6 * np.exp(-S) * np.sin(57 * S) ** 2 + 0.5 * np.exp(-S) * np.sin(91 * S) ** 2
+    for energy in (one, two, many):
+        for fitter in (identify, identify_several):
+            quick, full = fitter(S, energy, quick=True), fitter(S, energy)
+            assert quick.describes_record == full.describes_record
+            if full.describes_record:
+                assert (quick.mode, quick.rms) == (full.mode, full.rms)
+
+
+def test_a_fit_that_leaves_another_mode_fails_early() -> None:
+    one = np.exp(-S) * np.sin(20 * S) ** 2
+    right = fit(rates(S, one), S, one, VIBRATION, HOPELESS)
+    assert right is not None
+
+    def model(parameters: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return energy_and_jacobian(parameters, s, VIBRATION)
+
+    two = one + 0.2 * np.exp(-S) * np.sin(33 * S) ** 2
+    assert not fails(right, model, S, one)
+    assert fails(right, model, S, two)
+    assert not fails(right, model, S[:1500], two[:1500])  # so few are all fitted
