@@ -140,6 +140,7 @@ def of_health(health: Health | None) -> dict[str, Any] | None:
         "window_work": health.window_work,
         "window_eroded": health.window_eroded,
         "reason": health.reason,
+        "window_reason": health.window_reason,
     }
 
 

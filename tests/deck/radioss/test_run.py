@@ -117,7 +117,7 @@ def test_stresses_of_solids_without_a_frame_do_not_turn(tmp_path: Path, more: st
         tmp_path, EXAMPLE.deck.replace("/END", f"{more}/END"), (("0.09", f"{ON}/DTIX\n1e-6 1e-6\n"), ("0.2", OFF))
     )
     (tmp_path / "box_0003.rad").unlink()
-    assert check_deck(start).findings == ()  # without stress there are no channels to turn
+    assert check_deck(start).findings == ()  # without stress there is nothing to turn
 
 
 def test_files_of_a_run_are_found_by_name_or_by_what_they_hold(tmp_path: Path) -> None:
