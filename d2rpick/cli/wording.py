@@ -14,7 +14,7 @@ OPTIONS: Final = {
     "time": "--time",
     "write_as": "--write-as",
 }
-_READ_BY_PEOPLE: Final = {"table", "markdown", "github", "junit"}
+_FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 
 
 def with_options(message: str) -> str:
@@ -36,4 +36,4 @@ def in_words(text: str, form: str) -> str:
     >>> in_words("choose with `energy`", "table"), in_words("choose with `energy`", "json")
     ('choose with --energy', 'choose with `energy`')
     """
-    return with_options(text) if form in _READ_BY_PEOPLE else text
+    return text if form in _FOR_PROGRAMS else with_options(text)

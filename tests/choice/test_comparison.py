@@ -213,7 +213,7 @@ def test_a_wrong_energy_while_rigid_is_a_note_and_not_what_came_back(replayed: C
 def test_what_a_reader_has_to_say_of_the_switched_run_is_not_lost(replayed: Callable[..., str]) -> None:
     cut = replayed("cut", *SWITCHES, change=lambda text: text[:-200])
     found = verified(replayed("reference"), cut, "--part", "3")
-    assert any("stops inside" in note for note in found["switched"]["notes"])
+    assert any("ends within" in note for note in found["switched"]["notes"])
     assert found["history"]["notes"] == []
 
 

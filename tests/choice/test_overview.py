@@ -154,7 +154,7 @@ def test_a_killed_run_is_said_to_be_incomplete(tmp_path: Path) -> None:
     found = info(str(file))
     assert not found["complete"]
     assert found["states"] == 1500
-    assert any("stops inside" in note for note in found["notes"])
+    assert any("ends within" in note for note in found["notes"])
     assert "complete           no" in run("info", str(file)).stdout
 
 

@@ -43,7 +43,7 @@ def refused(*args: str) -> str:
 
 # Files that are no history: content, further arguments, and what the message has to say.
 FILES = {
-    "empty": (b"", (), ["input: the file is empty", "energy history was expected"]),
+    "empty": (b"", (), ["input: the file is empty", "has the run been started?"]),
     "binary": (bytes(range(256)) * 20, (), ["input: binary data", "csv", "glstat", "export"]),
     "prose": (b"Dear all,\nplease find enclosed\n", (), ["input:1: 'Dear all,'", "a table of time and energy"]),
     "header only": (HEAD.encode(), (), ["input:1: ", "no rows"]),
@@ -55,8 +55,8 @@ FILES = {
     "an empty cell": (with_line(7, "0.05,"), (), ["input:7: 'internal_energy' is ''", "a number was expected"]),
     "a cell too few": (with_line(7, "0.05"), (), ["input:7: 1 value", "2 were expected"]),
     "a time that is none": (with_line(7, "later,1"), (), ["input:7: 'time' is 'later'", "a number was expected"]),
-    "damaged gzip": (gzip.compress(table(math.cos))[:10] + b"\xff" * 99, (), ["input: gzip", "copy the file again"]),
-    "not glstat": (table(math.cos), ("-F", "glstat"), ["input:1: ", "this is no glstat"]),
+    "damaged gzip": (gzip.compress(table(math.cos))[:10] + b"\xff" * 99, (), ["input: damaged gzip data", "again"]),
+    "not glstat": (table(math.cos), ("-F", "glstat"), ["input:1: ", "this is not a glstat"]),
     "no state of glstat": (
         b" title\n                         ls-dyna smp.1 d\n\n\n", (), ["input: no states", "first output"]
     ),
@@ -69,7 +69,7 @@ FILES = {
         table(math.cos), ("--energy", "internal_enrg"), ["no column 'internal_enrg'", "did you mean 'internal_energy'"]
     ),
     "column zero": (table(math.cos), ("--energy", "0"), ["no column '0'", "1 'time'"]),
-    "energy is the time": (table(math.cos), ("--energy", "time"), ["input: ", "twice"]),
+    "energy is the time": (table(math.cos), ("--energy", "time"), ["input: ", "choose another one as energy"]),
     "td after the record": (table(math.cos), ("--td", "7"), ["input: ", "time 7 lies outside the record, 0 to 1"]),
     "after outside": (table(math.cos), ("--after", "7"), ["input: --after 7 lies outside the record, 0 to 1"]),
     "window outside": (table(math.cos), ("--fit-window", "0", "7"), ["--fit-window 7 lies outside the record, 0 to 1"]),
@@ -97,7 +97,7 @@ def test_a_file_that_cannot_be_used_is_named_with_what_is_wrong(
         (("absent.csv",), ["absent.csv: no such file", "check the name"]),
         (
             (str(Path(__file__).parent),),
-            [f"{Path(__file__).parent}: no glstat, matsum, binout or T01", "name the file"],
+            [f"{Path(__file__).parent}: no glstat, matsum, binout or T01", "give the file"],
         ),
         ((GLSTAT, "-F", "csv"), [f"{GLSTAT}:1: ", "a table of time and energy"]),
         ((GLSTAT, "--energy", "internal enrgy"), ["did you mean 'internal energy'", "kinetic energy"]),
@@ -160,7 +160,7 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         (f"{ONE_COMMAND} --tr 0.006", ["--tr and --td need each other"]),
         (f"{ONE_COMMAND} --td 0.006", ["--tr and --td need each other"]),
         (f"{ONE_COMMAND} --tr 0.006 --td 0.005", ["--tr 0.006 is not before --td 0.005"]),
-        (f"{ONE_COMMAND} -o motion.txt", ["motion.txt", "--write-as csv, hdf5, glstat, matsum"]),
+        (f"{ONE_COMMAND} -o motion.txt", ["motion.txt", "--write-as: csv, hdf5, glstat, matsum"]),
         # files to be written; all of them are known to be wrong before anything is computed
         (f"suggest --td 0.064 -o absent/result.txt {ENERGY}", ["absent/result.txt: no such folder: 'absent'"]),
         (f"suggest --td 0.064 -o . {ENERGY}", [".: this is a folder"]),
@@ -168,7 +168,7 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         (f"suggest --td 0.064 --plot absent/plot.png {ENERGY}", ["absent/plot.png: no such folder: 'absent'"]),
         (f"suggest --td 0.064 --plot plot.gif {ENERGY}", ["plot.gif", "png, svg, pdf"]),
         (f"suggest --td 0.064 --plot plot {ENERGY}", ["plot: ", "png, svg, pdf"]),
-        (f"suggest --td 0.064 -o x.svg --plot ./x.svg {ENERGY}", ["--plot and --output-file name the same file"]),
+        (f"suggest --td 0.064 -o x.svg --plot ./x.svg {ENERGY}", ["--plot and --output-file are the same file"]),
         (f"{ONE_COMMAND} --plot plot.gif", ["plot.gif", "png, svg, pdf"]),
     ],
 )  # fmt: skip

@@ -271,8 +271,8 @@ def test_a_comment_silences_a_rule_of_the_history_too() -> None:
     [
         (("--select", "D2R10l"), "did you mean D2R1"),
         (("--ignore", "D2R999"), "no rule 'D2R999'"),
-        (("--after", "0.03"), "name it with --history"),
-        (("--energy", "boxIE_J"), "name it with --history"),
+        (("--after", "0.03"), "give one with --history"),
+        (("--energy", "boxIE_J"), "give one with --history"),
         (("--history", "absent.csv"), "absent.csv"),
         (("--history", ENERGY, "--after", "7"), "--after 7 lies outside the record"),
         (("--fail-on", "info"), "info"),
@@ -414,11 +414,11 @@ def test_a_history_that_tells_no_flight_is_an_objection() -> None:
     assert "D2R204" not in rules(answer("check", "main.k", "--history", "rising.csv", "--after", "0.2"))
 
 
-def test_a_history_without_energy_is_an_objection() -> None:
+def test_a_window_in_which_nothing_vibrates_is_no_objection() -> None:
     rows = "\n".join(f"{t:.3f},0" for t in np.linspace(0, 1, 400))
     Path("flat.csv").write_text(f"time,internal_energy\n{rows}\n")
     found = answer("check", place("main.k", deck_of(0.5, 0.55)), "--history", "flat.csv", "--after", "0.1")
-    assert [f["message"] for f in found["findings"] if f["rule"] == "D2R201"]
+    assert found["findings"] == []
 
 
 def test_td_after_the_next_contact_is_named_at_td() -> None:

@@ -140,7 +140,7 @@ def test_a_damaged_line_of_a_resume_file_is_passed_over(damage: str, tmp_path: P
     ledger.write_text(f"{ledger.read_text()}{damage}\n")
     again = run(*args)
     assert (again.exit_code, json.loads(again.stdout)["runs"]) == (whole.exit_code, json.loads(whole.stdout)["runs"])
-    assert "1 of 1 runs taken" in again.stderr
+    assert "1 of 1 runs reused" in again.stderr
     assert "damaged or without a checksum: 1" in again.stderr
 
 

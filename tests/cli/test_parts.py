@@ -127,4 +127,4 @@ def test_where_nothing_can_be_chosen_the_table_says_so(tmp_path: Path) -> None:
     result = run("suggest", "--td", "0.064", "--part", "frame", str(file))
     assert result.exit_code == 0
     assert "recommended  tr = 0, td = 0.064" in result.stdout
-    assert "there is nothing to match" in result.stderr
+    assert "nothing vibrates from" in result.stderr

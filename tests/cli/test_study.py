@@ -135,7 +135,7 @@ def test_when_none_can_be_read_the_first_reason_is_told() -> None:
 def test_no_runs_are_a_question_of_usage(args: tuple[str, ...]) -> None:
     result = run(*args, stdin=b"# none\n\n")
     assert (result.exit_code, result.stdout) == (2, "")
-    assert "name them, or a list of them with --from" in result.stderr
+    assert "give their names, or a list with --from" in result.stderr
 
 
 # Lists, folders, patterns.
@@ -210,10 +210,10 @@ def test_a_killed_study_loses_nothing_that_was_finished(runs: list[str], tmp_pat
     slow.unlink()
     variants.write(slow, variants.variant(1.0005))
     again = run(*args)
-    assert again.stderr.startswith(f"note: {finished} of 4 runs taken from {ledger}\n")
+    assert again.stderr.startswith(f"note: {finished} of 4 runs reused from {ledger}\n")
     whole = run(*(arg for arg in args if arg not in ("--resume", str(ledger))))
     assert {**json.loads(again.stdout), "command": 0} == {**json.loads(whole.stdout), "command": 0}
-    assert run(*args).stderr.startswith(f"note: 4 of 4 runs taken from {ledger}\n")
+    assert run(*args).stderr.startswith(f"note: 4 of 4 runs reused from {ledger}\n")
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
@@ -259,18 +259,18 @@ def test_a_run_that_kills_its_process_is_a_row(
 
 def taken(args: Sequence[str]) -> str:
     """Say how many runs were taken from the ledger."""
-    return next((line for line in run(*args).stderr.splitlines() if "taken from" in line), "")
+    return next((line for line in run(*args).stderr.splitlines() if "reused from" in line), "")
 
 
 def test_runs_are_computed_again_after_a_change(runs: list[str], tmp_path: Path) -> None:
     ledger = str(tmp_path / "ledger.ndjson")
     args = (*STUDY, *runs, "--resume", ledger)
     assert taken(args) == ""
-    assert taken(args) == f"note: 3 of 3 runs taken from {ledger}"
+    assert taken(args) == f"note: 3 of 3 runs reused from {ledger}"
     changed = "have changed, or were computed with other options"
-    assert taken((*args, "--tolerance", "0.19")) == f"note: 0 of 3 runs taken from {ledger}; 3 {changed}"
+    assert taken((*args, "--tolerance", "0.19")) == f"note: 0 of 3 runs reused from {ledger}; 3 {changed}"
     os.utime(runs[1])
-    assert taken(args) == f"note: 2 of 3 runs taken from {ledger}; 1 {changed}"
+    assert taken(args) == f"note: 2 of 3 runs reused from {ledger}; 1 {changed}"
     assert taken((*args, "--tolerance", "0.19")).startswith("note: 2 of 3")
     assert run(*args, "-q").stderr == ""
 
@@ -278,7 +278,7 @@ def test_runs_are_computed_again_after_a_change(runs: list[str], tmp_path: Path)
 def test_what_ndjson_gave_can_be_taken_up(runs: list[str], tmp_path: Path) -> None:
     ledger = tmp_path / "result.ndjson"
     ledger.write_text(run(*STUDY, *runs[:2], "-f", "ndjson").stdout)
-    assert taken((*STUDY, *runs, "--resume", str(ledger))) == f"note: 2 of 3 runs taken from {ledger}"
+    assert taken((*STUDY, *runs, "--resume", str(ledger))) == f"note: 2 of 3 runs reused from {ledger}"
     *_, third = lines_of(ledger.read_text())
     assert third["source"] == runs[2]
 
@@ -298,7 +298,7 @@ def test_a_ledger_is_never_replaced_by_a_result(runs: list[str], tmp_path: Path,
     name = str(tmp_path / "file.svg")
     result = run(*STUDY, *runs, "--resume", name, option, name, "--overwrite")
     assert result.exit_code == 2
-    assert "name the same file" in result.stderr
+    assert "are the same file" in result.stderr
     assert not Path(name).exists()
 
 

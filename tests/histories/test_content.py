@@ -110,7 +110,7 @@ def test_a_file_replaced_by_another_is_read_as_it_was(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("on_disk")
-@pytest.mark.parametrize(("rest", "reason"), [(b"", "became shorter|written anew"), (OTHER, "written anew")])
+@pytest.mark.parametrize(("rest", "reason"), [(b"", "became shorter|written anew"), (OTHER, "rewritten")])
 def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, rest: bytes, reason: str) -> None:
     file = tmp_path / "glstat"
     file.write_bytes(ONE)

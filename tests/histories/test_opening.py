@@ -68,7 +68,7 @@ def test_standard_input_is_read_once_and_still_hashed(monkeypatch: pytest.Monkey
 
 def test_a_given_format_is_not_second_guessed(file: Write) -> None:
     assert read_history([file(CSV)], input_format="csv").format == "csv"
-    with pytest.raises(FormatError, match="this is no glstat"):
+    with pytest.raises(FormatError, match="this is not a glstat"):
         read_history([file(CSV)], input_format="glstat")
     with pytest.raises(FormatError, match="binary"):
         read_history([file(b"\x00\x01\x02" * 99)], input_format="csv")

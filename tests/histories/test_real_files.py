@@ -44,47 +44,47 @@ class Readable(NamedTuple):
 READABLE = {
     "Crimping__results-glstat.head16000": Readable(
         "internal energy", 13, ((0.0, 2e-20), (0.00299997, 0.00361695), (0.00599994, 0.356039)),
-        ("stops inside",),
+        ("ends within",),
     ),
     "FV_crashworthiness__DRI-OLD_LSDYNA-z_acc_filtered.csv": Readable(
         "A8874: Z-acceleration", 152,
         ((0.0, -81362.117188), (0.075999438763, 162256.60938), (0.15000039339, -255236.17188)),
-        ("no internal energy by its name",), LONE,
+        ("not an internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__DRI-OLD_LSDYNA-z_acc_totfloor.csv": Readable(
         "A2: Z-Rigid Body Acceleration", 126,
         ((0.0, -9623.0292969), (0.06299957633, 123345.07812), (0.12499960512, -878.76928711)),
-        ("no internal energy by its name",), LONE,
+        ("not an internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__DRI-OLD_LSDYNA-z_accel_1.csv": Readable(
         "Z-acceleration", 152, ((0.0, 39466.921875), (0.075999461114, 157388.57812), (0.15000037849, 67724.9375)),
-        ("no internal energy by its name",), LONE,
+        ("not an internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__F28_validation-e=0-4frames-ALLKE_Global.csv": Readable(
         "Energy(J): XY-History ALLKE(Scalar).1/ALLKE", 61, ((0.0, 38764.8), (0.150001, 1273.01), (0.3, 303.246)),
-        ("no internal energy by its name",), LONE,
+        ("not an internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__F28_validation-e=0_energies-ALLPD_Frames.csv": Readable(
         "Energy(J): ALLPD_frames/ALLPD/INP2SIM_ELSET_ASSEMBLY_PART-1-1_FRAMES-1/", 301,
         ((0.0, 0.0), (0.150001, 16961.8), (0.3, 16995.3)),
-        ("no internal energy by its name",), LONE,
+        ("not an internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__mesh_convergence-050x-ALLPD_Skin.csv": Readable(
         "Energy(J): ALLPD_Skin/ALLPD/INP2SIM_ELSET_ASSEMBLY_PART-1-1_SKIN-1/", 61,
         ((0.0, 0.0), (0.150001, 1668.28), (0.3, 1671.43)),
-        ("no internal energy by its name",), LONE,
+        ("not an internal energy by its name",), LONE,
     ),
     "FV_crashworthiness__ovalization_study-e=070-ALLKE_Global.csv": Readable(
         "Energy(J): ALLKE_Global/ALLKE", 61, ((0.0, 49697.8), (0.150001, 1941.81), (0.3, 787.411)),
-        ("no internal energy by its name",), LONE,
+        ("not an internal energy by its name",), LONE,
     ),
     "Masters-Project__Steel_Explicit-Kinetic_Energy": Readable(
         "Kinetic Energy", 101, ((0.0, 0.0), (0.02499989979, 0.00057965097949), (0.049999900162, 0.00053615897195)),
-        ("no internal energy by its name",), ("1",),
+        ("not an internal energy by its name",), ("1",),
     ),
     "Masters-Project__Steel_Explicit-glstat.head16000": Readable(
         "internal energy", 17, ((0.0, 2e-20), (0.00399979, 0.330105), (0.0079998, 1.31465)),
-        ("stops inside",),
+        ("ends within",),
     ),
     "OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01": Readable(
         "internal_energy", 801, ((0.0, 0.0), (4.0005, 216242.9), (8.001, 350376.8)),
@@ -196,7 +196,7 @@ READABLE = {
     ),
     "editOpeniGame__Bolt_B_Explicit-glstat.head16000": Readable(
         "internal energy", 17, ((0.0, 1.6e-19), (0.0398316, 0.0208757), (0.079875, 0.242757)),
-        ("stops inside",),
+        ("ends within",),
     ),
     "lasso-python__sph_models-R12_2_1-binout": Readable(
         "internal_energy", 88,

@@ -258,14 +258,14 @@ def test_it_is_a_file_like_any_other_output(tmp_path: Path) -> None:
     for name, message in (
         (taken, "the file exists"),
         (Path(ENERGY), "is an input"),
-        (tmp_path / "no" / "a", "no folder"),
+        (tmp_path / "no" / "a", "no such folder"),
     ):
         result = run("suggest", "--td", "0.064", "--report", str(name), ENERGY)
         assert result.exit_code == 2
         assert message in result.stderr
     both = str(tmp_path / "a.svg")
     result = run("suggest", "--td", "0.064", "--report", both, "--plot", both, ENERGY)
-    assert "--report and --plot name the same file" in result.stderr
+    assert "--report and --plot are the same file" in result.stderr
     assert "--report writes a file" in run("suggest", "--td", "0.064", "--report", "-", ENERGY).stderr
     assert taken.read_text() == "mine"
 

@@ -44,7 +44,7 @@ def test_a_row_comes_back_to_the_last_digit(tmp_path: Path, curve: bool) -> None
     name, ledger, row = kept(tmp_path, question)
     again = Ledger(ledger, question)
     assert values(again.find(name)) == values(row)
-    assert again.told(1) == f"1 of 1 runs taken from {ledger}"
+    assert again.told(1) == f"1 of 1 runs reused from {ledger}"
 
 
 def test_a_row_is_found_under_another_name_of_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -54,7 +54,7 @@ def find_curves(text: Text, selection: Selection) -> Curves | None:
 
 
 class _Found:
-    """What was found in a text: curves, the label of their x axis, and what it stops inside of."""
+    """What was found in a text: curves, the label of their x axis, and what it ends within of."""
 
     def __init__(self, text: Text) -> None:
         self.source, self._text = text.name, text
@@ -117,7 +117,7 @@ class Curves:
         self.time_unit = unit_of(found.x_label)
         self._curves = _uniquely_named(found.curves)
         self.channels = tuple(self._curves)
-        notes = [f"the file stops inside {found.stops}"] if found.stops else []
+        notes = [f"the file ends within {found.stops}"] if found.stops else []
         if found.x_label and not is_time(found.x_label):
             notes.append(f"the x axis is called {found.x_label!r}; it was taken for the time")
         last = found.curves[-1]

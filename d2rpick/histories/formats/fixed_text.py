@@ -101,13 +101,13 @@ class Blocks:
     states : int
         Number of whole states.
     complete : bool
-        False when the file stops inside a state or a line.
+        False when the file ends within a state or a line.
     notes : tuple of str
         What was left out.
     tail : int
         Address at which the last block of the file starts, whole or not; ``begin`` when there is none.
     rest : Stretch or None
-        The last block, when the file stops inside it: it is no state unless ``admit_rest`` makes it one.
+        The last block, when the file ends within it: it is no state unless ``admit_rest`` makes it one.
     """
 
     def __init__(self, data: bytes | Content, source: str, begin: int, grammar: Grammar) -> None:
@@ -158,7 +158,7 @@ class Blocks:
         return values
 
     def admit_rest(self, names: Sequence[Hashable]) -> None:
-        """Let the last state count although the file stops inside it, if these numbers and a line behind are there."""
+        """Let the last state count although the file ends within it, if these numbers and a line behind are there."""
         if self.rest is None:
             return
         offsets = [self.layout(self.rest.example, self.rest.stride).fields.get(name, UNSURE) for name in names]
@@ -239,7 +239,7 @@ class Blocks:
         if is_last:
             self.complete, self.rest = False, block
         where = "the file" if is_last else "a leg of the run"
-        self.notes += (f"{where} stops inside the state of line {self.line(block.start)}, which was left out",)
+        self.notes += (f"{where} ends within the state of line {self.line(block.start)}, which was left out",)
 
     def _known(self, position: int, recent: list[tuple[int, int]]) -> tuple[int, int, int] | None:
         """Try the recent layouts: example, stride and count of the blocks that follow one of them."""

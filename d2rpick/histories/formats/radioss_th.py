@@ -198,7 +198,7 @@ class TimeHistory(SolverFile):
             where = f"{self.source}: state {state + 1}: a record of {lengths[mark // 2]} bytes was expected"
             cure = f"if the states before are good, cut the file to {begin} bytes"
             raise FormatError(f"{where} at byte {begin + marks[2 * (mark // 2)]}; {cure}")
-        stop = f"{self.source}: the file stops inside state {states + 1}, which was left out"
+        stop = f"{self.source}: the file ends within state {states + 1}, which was left out"
         return states, (stop,) if rest else ()
 
     def _silent_parts(self) -> tuple[str, ...]:

@@ -186,14 +186,14 @@ def test_curves_side_by_side_are_not_mixed(text: str, energy: list[str], reason:
 @pytest.mark.parametrize(
     ("text", "asked", "reason"),
     [
-        (FOUR, [], "2 columns are named like an internal energy.*--energy: 2 'boxIE_J', 3 'stepIE_J'"),
+        (FOUR, [], "2 columns are named like an internal energy.*`energy`: 2 'boxIE_J', 3 'stepIE_J'"),
         ("time,a,b\n0,1,2\n1,2,3\n", [], "no column is named like an internal energy.*2 'a', 3 'b'"),
         ("0,1,2\n1,2,3\n", [], "2 'column 2', 3 'column 3'"),
         (FOUR, ["boxIEJ2"], r"no column 'boxIEJ2' \(did you mean 'boxIE_J'\?\); there are: 1 'time_s', 2"),
         (FOUR, ["5"], "no column '5'"),
         (FOUR, ["0"], "no column '0'"),
-        (FOUR, ["KE", "ke"], "asked for twice"),
-        (FOUR, ["1"], "'1' is the time column, not to be used twice"),
+        (FOUR, ["KE", "ke"], "given twice"),
+        (FOUR, ["1"], "'1' is the time column; choose"),
         ("time,IE,ie\n0,1,2\n1,2,3\n", ["Ie"], "'Ie' may be any of these columns: 2 'IE', 3 'ie'"),
         ("time,IE,IE\n0,1,2\n1,2,3\n", [], "2 columns are named"),
         ("time,3,2\n0,1,2\n1,2,3\n", ["2"], "may be any of these"),
@@ -227,9 +227,9 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
         ("time,IE\n0,1\n1\n2,3\n", "table:3: 1 values, 2 were expected"),
         ("time,IE\n0,1\n1,2,3\n2,3\n", "table:3: 3 values, 2 were expected"),
         ("time,IE\n0,1\n1,2\nend\n", "table:4: 1 values"),
-        ("time,IE\n0\n1,2\n2,3\n", "table:2: '0' is unlike the rows below"),
-        ("time,IE\n0,-\n1,2\n2,3\n", "table:2: '0,-' is unlike the rows below"),
-        ("time;IE\n0,5;1.5\n0,6;1,5\n", "table:2: 'IE' is '1.5'|table:2: '0,5;1.5' is unlike"),
+        ("time,IE\n0\n1,2\n2,3\n", "table:2: '0' differs from the rows below"),
+        ("time,IE\n0,-\n1,2\n2,3\n", "table:2: '0,-' differs from the rows below"),
+        ("time;IE\n0,5;1.5\n0,6;1,5\n", "table:2: 'IE' is '1.5'|table:2: '0,5;1.5' differs"),
         ("time,IE\n0,1\n1,2\n\n0,3\n1,4\n", "table:5: the time starts again after a gap"),
         ("time,IE\n5,1\n3,2\n4,3\n1,4\n2,5\n", "table:3: time steps back from 5 to 3"),
         ("time,IE\n0,1\n1,2\n2,3\n\n# two\n0.5,4\n", "table:7: the time starts again after a gap"),
@@ -238,7 +238,7 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
         ("# run\ntime,IE\n0,1\n1,2\n\n2,3\n0.5,4\n1.5,5\n1,6\n", "table:7: time steps back from 2 to 0.5"),
         ("time,IE\n0,1\n1,2\ntime,IE\n0,3\n1,4\n", "table:4: a second header, another curve begins here"),
         ("time,ALLKE\n0,1\n1,2\n", r"'ALLKE', by its name not an internal energy \(ALLKE\); choose with `energy`"),
-        ("Nodal History,Z-acceleration\nTime,A8,\n0,1,\n1,2,\n", "'A8: Z-acceleration', by this name"),
+        ("Nodal History,Z-acceleration\nTime,A8,\n0,1,\n1,2,\n", "'A8: Z-acceleration', by its name"),
         ("run,IE\na1,1\na2,2\n", "no rows of at least two numbers"),
         ("run,IE,KE\na1,1,2\na2,2,3\n", "table:2: 'run' is 'a1'"),
         ("time,IE\n", "table:1: 'time,IE' and no rows"),
@@ -265,7 +265,7 @@ def test_notes_say_what_was_assumed(text: str, note: str) -> None:
 def test_a_quantity_that_is_asked_for_is_taken_with_a_note() -> None:
     history = read("time,ALLKE\n0,1\n1,2\n", "ALLKE")
     assert history.energy.tolist() == [1, 2]
-    assert "'ALLKE' is no internal energy by its name" in history.notes[0]
+    assert "'ALLKE' is not an internal energy by its name" in history.notes[0]
 
 
 LONG = [f"{i},{i % 7}.5" for i in range(40_000)]

@@ -97,7 +97,7 @@ def test_what_the_labels_say() -> None:
         "'Displacement'; it was taken for the time"
         in read(CURVEPLOT.replace("Time (ms)", "Displacement"), "1").notes[0]
     )
-    assert "no internal energy by its name" in read(CURVEPLOT, "2").notes[0]
+    assert "not an internal energy by its name" in read(CURVEPLOT, "2").notes[0]
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_pairs_below_their_count_are_a_curve() -> None:
     assert states_of(read(COUNTED + COUNTED.replace("1.5", "7"), "2"))[0] == (0.0, 7.0)
     history = read(COUNTED.replace("3\n", "4\n"))
     assert (states_of(history), history.complete) == (PAIRS, False)
-    assert history.notes == ("the file stops inside the curve 1",)
+    assert history.notes == ("the file ends within the curve 1",)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +177,7 @@ def test_pairs_below_their_count_are_a_curve() -> None:
         ("3\n0 1\n1e999 2\n1e999 3\n", "curves:3: '1e999' of 'curve 1', a number was expected"),
         (
             "Curveplot\nt\nTime\nEnergy Ratio\nC\nEnergy Ratio #pts=2\n0 1\n1 1\nendcurve\n",
-            "'Energy Ratio', by this name",
+            "'Energy Ratio', by its name",
         ),
         ("4\n0 1\n1 2\n0 3\n1 4\n", "curves:4: time steps back from 1 to 0 in 'curve 1'"),
     ],

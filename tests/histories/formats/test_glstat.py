@@ -131,7 +131,7 @@ def test_notes_say_what_was_left_out() -> None:
     assert read(WHOLE).notes == ()
     assert "no head" in read(WHOLE[WHOLE.index(" time step") :]).notes[0]
     assert "same printed time" in read(HEAD + block(0.0, 1.0) + block(0.0, 2.0)).notes[0]
-    assert "a leg of the run stops inside the state of line 29" in read(SCENARIOS[KILLED][0]).notes[0]
+    assert "a leg of the run ends within the state of line 29" in read(SCENARIOS[KILLED][0]).notes[0]
     assert "kinetic" in read(WHOLE, "kinetic energy").notes[0]
 
 
@@ -212,7 +212,7 @@ def test_refused(name: str) -> None:
             "did you mean 'kinetic energy'.*there are: time step, kinetic energy, internal energy",
         ),
         (("stonewall energy",), "no 'stonewall energy' .did you mean 'stonewall energy wall# [12]'"),
-        (("internal energy", "Internal Energy"), "asked for twice"),
+        (("internal energy", "Internal Energy"), "given twice"),
         (("time",), "no 'time'"),
     ],
 )

@@ -175,7 +175,7 @@ def chunked(file: h5py.File) -> None:
 
 def test_bytes_behind_the_end_are_refused() -> None:
     content = written(plain).getvalue()
-    with pytest.raises(FormatError, match=f"{len(content) + 4} bytes, by its own head {len(content)}; it is damaged"):
+    with pytest.raises(FormatError, match=f"{len(content) + 4} bytes, {len(content)} by its own header; it is damaged"):
         history_of(hdf5_file, content + b"0000", name="run.h5")
 
 

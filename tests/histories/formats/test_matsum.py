@@ -155,7 +155,7 @@ def test_quantity_that_was_not_written_is_refused() -> None:
 @pytest.mark.parametrize("text", [b"", b"\n", b"time,energy\n0,1\n", bytes(5000)], ids=range(4))
 def test_something_else_is_no_matsum(text: bytes) -> None:
     assert not matsum.recognises(text)
-    with pytest.raises(FormatError, match="this is no matsum"):
+    with pytest.raises(FormatError, match="this is not a matsum"):
         read(text)
 
 
