@@ -305,15 +305,9 @@ def _judged(
         start=record.start,
         end=record.end,
         covariance=_covariance(attempt.jacobian, rest) * attempt.units * attempt.units[:, None],
-        vibration=_rms(vibration) * record.scale,
+        vibration=float(np.hypot.reduce(vibration) / np.sqrt(s.size)) * record.scale,  # squares may overflow
     )
     return found, loose is None
-
-
-def _rms(values: Samples) -> float:
-    """Root of the mean square, also of values whose squares are no numbers any more."""
-    largest = float(np.max(np.abs(values)))
-    return largest * float(np.sqrt(np.mean((values / largest) ** 2))) if largest > 0 else 0.0
 
 
 def _loose(name: str, misfit: float, structure: float, local_structure: float) -> str | None:
