@@ -25,6 +25,9 @@ from tests.command import ENERGY, GLSTAT, run
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from d2rpick.histories.history import History
+    from d2rpick.vibration.fits import Fits
+
 BOX = Selection(parts=("box",))
 PLAIN = Settings()
 
@@ -109,9 +112,9 @@ def test_no_td_of_a_window_is_examined_twice(monkeypatch: pytest.MonkeyPatch) ->
 
     seen: list[float] = []
 
-    def noted(history: object, td: float, settings: Settings) -> object:
+    def noted(history: History, td: float, settings: Settings, fits: Fits) -> object:
         seen.append(td)
-        return examine.examine(history, td, settings)  # type: ignore[arg-type]
+        return examine.examine(history, td, settings, fits)
 
     monkeypatch.setattr(suggest_td, "examine", noted)
     suggest_of(read([ENERGY]), (0.06, 0.09), PLAIN)

@@ -22,7 +22,8 @@ from tests.shared import shared
 
 if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
-    from d2rpick.histories.history import Samples
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.fits import Fits
 
 PLAIN = Settings()
 T01 = str(ROLLOVER).replace(".csv", "T01.gz")
@@ -88,9 +89,9 @@ def test_on_energy_alone_the_highest_peaks_up_to_twice_the_mean() -> None:
 def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr(monkeypatch: pytest.MonkeyPatch) -> None:
     sought: list[float] = []
 
-    def counted(history: History, td: float, settings: Settings) -> Situation:
+    def counted(history: History, td: float, settings: Settings, fits: Fits) -> Situation:
         sought.append(td)
-        return examine(history, td, settings)
+        return examine(history, td, settings, fits)
 
     monkeypatch.setattr("d2rpick.choice.suggest_td.examine", counted)
     late = Settings(after=0.34)  # no tr lies between the end of the load and these peaks
