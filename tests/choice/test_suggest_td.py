@@ -22,7 +22,7 @@ from tests.shared import shared
 
 if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
-    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.history import Samples
     from d2rpick.vibration.fits import Fits
 
 PLAIN = Settings()
