@@ -32,7 +32,7 @@ def child(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:
 def one_line(found: subprocess.CompletedProcess[str]) -> str:
     """Message of a call that could not run."""
     assert (found.returncode, found.stdout, found.stderr.count("\n")) == (2, "", 1), found
-    assert "a fault of this program" not in found.stderr
+    assert "internal error" not in found.stderr
     return found.stderr
 
 

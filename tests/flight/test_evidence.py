@@ -240,7 +240,7 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
     assert "verdict  verified by the energy level alone" in run(*pair).stdout
     assert [run(*asked, "--strict").exit_code for asked in (("suggest", *ALONE), pair)] == [1, 1]
     (message,) = (w["message"] for w in found["warnings"] if w["code"] == "flight-from-energy")
-    assert "given up for safety" in message
+    assert "left unused for safety" in message
 
 
 def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> None:

@@ -179,12 +179,12 @@ RAMP = np.linspace(0.0, 1.0, 201)
         (np.where(np.arange(201) % 2, 1.0, -1.0), "does not oscillate"),
         (RAMP, "vibration periods, fewer than"),
         ((RAMP * np.exp(-5 * RAMP)) ** 2, "vibration periods, fewer than"),  # critically damped
-        ((np.exp(-3 * RAMP) - np.exp(-9 * RAMP)) ** 2, "systematic rest"),  # overdamped
-        (np.sin(20 * RAMP) ** 2 + np.sin(31 * RAMP) ** 2, "more than 0.4"),
-        (np.sin(20 * RAMP) ** 2 + 0.2 * np.sin(31 * RAMP) ** 2, "systematic rest"),
+        ((np.exp(-3 * RAMP) - np.exp(-9 * RAMP)) ** 2, "deviates systematically"),  # overdamped
+        (np.sin(20 * RAMP) ** 2 + np.sin(31 * RAMP) ** 2, "more than 40%"),
+        (np.sin(20 * RAMP) ** 2 + 0.2 * np.sin(31 * RAMP) ** 2, "deviates systematically"),
         (np.exp(2 * RAMP) * np.sin(20 * RAMP) ** 2, "grows"),
         (np.sin(20 * RAMP) ** 2 - 805, "plastic energy would be -8.1e+02"),
-        (np.random.default_rng(0).standard_normal(201), "more than 0.4"),
+        (np.random.default_rng(0).standard_normal(201), "more than 40%"),
     ],
 )
 def test_what_no_oscillator_describes_is_refused_with_the_reason(energy: Samples, reason: str) -> None:
@@ -243,7 +243,7 @@ def test_a_real_load_is_refused_and_the_flight_after_it_accepted(name: str, end_
 def test_a_real_rollover_is_refused() -> None:
     time, energy = columns("openradioss/rollover_ref.csv", "boxIE_J")
     flight = (time >= 0.09) & (time <= 0.37)
-    assert "misses the energy by 0.71" in refused(time[flight], energy[flight])
+    assert "misses the energy by 71%" in refused(time[flight], energy[flight])
 
 
 @pytest.mark.parametrize("channel", ["IE_total_J", "IE_spring1_J", "IE_spring2_J"])

@@ -84,10 +84,10 @@ def test_one_spring_is_compared_as_its_oscillator_tells(
 @pytest.mark.parametrize(
     ("make", "reason"),
     [
-        (lambda t: np.sin(5 * t) ** 2 + 0.2, "does not come back to zero"),
-        (lambda t: (1.5 + np.sin(5 * t)) ** 2, "does not come back to zero"),
-        (lambda t: (0.8 + np.sin(5 * t)) ** 2, "swing about"),
-        (np.ones_like, "does not come back to zero"),
+        (lambda t: np.sin(5 * t) ** 2 + 0.2, "does not return to zero"),
+        (lambda t: (1.5 + np.sin(5 * t)) ** 2, "does not return to zero"),
+        (lambda t: (0.8 + np.sin(5 * t)) ** 2, "vibrate about"),
+        (np.ones_like, "does not return to zero"),
     ],
     ids=["plastic work", "preload", "half a preload", "constant"],
 )
@@ -172,7 +172,7 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
     (candidate,) = judge(situation, [Moment(0.18, "given", None)])
     assert (candidate.acceptable, candidate.residual, candidate.sign_match) == (False, None, None)
     assert "the level at td is below the noise of the record" in candidate.notes
-    assert any("no more than a solver errs" in note for note in candidate.notes)
+    assert any("is below the error of a solver" in note for note in candidate.notes)
     earlier = situation.at(chain.TD_PEAK)
     assert earlier.basis == "parts"
 
