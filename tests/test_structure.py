@@ -150,7 +150,8 @@ def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
 UNNEEDED = {
     f"d2rpick.{name}"
     for name in (
-        "choice.suggest_td", "vibration.part_signs", "vibration.envelope", "choice.lock_in_profile", "vibration.modes",
+        "choice.suggest_td", "choice.acceptable_windows", "choice.expectation", "vibration.of_parts",
+        "vibration.part_shares", "vibration.part_signs", "vibration.envelope", "choice.lock_in_profile", "vibration.modes",
         "vibration.fit_several", "flight.momentum", "choice.health", "choice.judged_card",
         "deck.printing.common", "report.figures", "report.page", "report.health", "histories.formats.fixed_text",
         "histories.formats.lsda",

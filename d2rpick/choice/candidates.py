@@ -15,7 +15,6 @@ import numpy as np
 from d2rpick.choice.objections import objections
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import Moment
-from d2rpick.vibration.part_shares import main_contributors
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -230,6 +229,8 @@ def _remarks(situation: Situation, reach: float, known: Measured | None, parts: 
         reason = situation.vibration.unknown or situation.vibration.undescribed
         yield f"sign, lock-in error and residual unknown: {reason}"
     if known and known.lock_in_error > measures.TOLERATED_GROWTH and parts:
+        from d2rpick.vibration.part_shares import main_contributors  # not above: a table has no parts
+
         yield f"mismatch of {main_contributors(parts)}"
     if known and known.residual_high > known.residual + _MUCH_HIGHER:
         yield f"residual up to {known.residual_high:.2g} if what the oscillator leaves over is a further mode"

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.choice.acceptable_windows import acceptable_windows
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
-from d2rpick.choice.expectation import Expectation, expectation
 from d2rpick.choice.ranking import best_of, over_limits, rank
 from d2rpick.choice.verify import verify_at
 from d2rpick.choice.warnings import Caution, cautions_of
@@ -15,6 +13,7 @@ from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate, Candidates
+    from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.health import Health
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
@@ -102,7 +101,7 @@ def suggest_at(situation: Situation, *, with_better: bool = True) -> Suggestion:
     if with_better and not better:
         cautions.append(Caution("no-better-td", "no peak of the energy in the flight has an acceptable tr"))
     recommended = Pair(best.tr, situation.td, best.residual) if best else None
-    expected = expectation(situation, best.energy if best else None)
+    expected = _expected(situation, best)
     windows = _windows(situation, candidates, best)
     return Suggestion(situation, candidates, recommended, better, tuple(cautions), expected=expected, windows=windows)
 
@@ -132,6 +131,15 @@ def find_better_pair(situation: Situation) -> Pair | None:
     return None
 
 
+def _expected(situation: Situation, best: Candidate | None) -> Expectation | None:
+    """What the level alone lets expect after td, where it is all there is."""
+    if situation.basis != "energy":
+        return None
+    from d2rpick.choice.expectation import expectation  # not above: an oscillator does without it
+
+    return expectation(situation, best.energy if best else None)
+
+
 def _windows(
     situation: Situation, candidates: Candidates, best: Candidate | None
 ) -> tuple[AcceptableWindow, ...] | None:
@@ -141,6 +149,8 @@ def _windows(
     start = situation.earliest_tr
     if start is None or not situation.in_flight:
         return ()
+    from d2rpick.choice.acceptable_windows import acceptable_windows  # not above: an oscillator does without it
+
     found = acceptable_windows(situation, candidates, best.tr if best else None)[0].tolist()
     return tuple(AcceptableWindow(low, high, (high - low) / (situation.td - start)) for low, high in found)
 

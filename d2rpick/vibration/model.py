@@ -117,11 +117,11 @@ class Evidence(NamedTuple):
 
 def model_at(history: History, td: float, evidence: Evidence) -> Vibration:
     """Give the best model that can be relied on at ``td``."""
-    from d2rpick.vibration.of_parts import OfParts
-
     whole, signed = energy_at(history, td, evidence), evidence.signed
     sunk = signed is not None and signed.sunk(td)
     if signed and not sunk:
+        from d2rpick.vibration.of_parts import OfParts  # not above: a table has no parts
+
         return OfParts(whole, signed)
     if isinstance(whole, OfModes):
         return replace(whole, doubts=(SUNK,)) if sunk else whole

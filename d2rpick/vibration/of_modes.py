@@ -10,7 +10,6 @@ import numpy as np
 
 from d2rpick.histories.crossings import find_crossings
 from d2rpick.vibration import measures
-from d2rpick.vibration.lock_in_profile import Profile
 from d2rpick.vibration.moments import Measured, Moment
 from d2rpick.vibration.of_energy import sampled_before
 from d2rpick.vibration.one_mode import Mode
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
+    from d2rpick.vibration.lock_in_profile import Profile
     from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.span import Span
@@ -120,6 +120,8 @@ class OfModes:
             return None
         step = 2 * np.pi / self.mode.fastest / _POINTS_PER_PERIOD
         count = max(3, int(np.ceil((self.td - self.span.start) / step)) + 1)
+        from d2rpick.vibration.lock_in_profile import Profile  # not above: one mode does without it
+
         return Profile.of(self.mode, np.linspace(self.span.start, self.td, count), self.td)
 
     def measured(self, times: Samples) -> list[Measured | None]:
