@@ -151,7 +151,8 @@ UNNEEDED = {
     f"d2rpick.{name}"
     for name in (
         "choice.suggest_td", "choice.acceptable_windows", "choice.expectation", "vibration.of_parts",
-        "vibration.part_shares", "vibration.part_signs", "vibration.envelope", "choice.lock_in_profile", "vibration.modes",
+        "vibration.part_shares", "vibration.part_signs", "vibration.envelope", "vibration.lock_in_profile",
+        "vibration.modes",
         "vibration.fit_several", "flight.momentum", "choice.health", "choice.judged_card",
         "deck.printing.common", "report.figures", "report.page", "report.health", "histories.formats.fixed_text",
         "histories.formats.lsda",
