@@ -63,8 +63,8 @@ def acceptable_windows(
         For each of ``tolerance_levels``: first and last time of each window, ascending [time].
     """
     levels = tolerance_levels(situation.settings.tolerance)
-    if situation.at_rest:  # any tr is right
-        return (np.array([[situation.earliest_tr, situation.td]]),) * len(levels)
+    if situation.at_rest:  # any tr before td is right
+        return (np.array([[situation.earliest_tr, np.nextafter(situation.td, -np.inf)]]),) * len(levels)
     grid = _grid(situation, candidates)
     widest, *finer = _windows_below(situation, grid, np.minimum(levels, _residual_left(situation)))
     judged = approve(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
