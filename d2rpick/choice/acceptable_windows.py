@@ -61,6 +61,8 @@ def acceptable_windows(situation: Situation, candidates: Candidates, recommended
         For each of ``tolerance_levels``: first and last time of each window, ascending [time].
     """
     levels = tolerance_levels(situation.settings.tolerance)
+    if situation.at_rest:  # any tr before td is right
+        return (np.array([[situation.earliest_tr, np.nextafter(situation.td, -np.inf)]]),) * len(levels)
     grid = _grid(situation, candidates)
     widest, *finer = _windows_below(situation, grid, np.minimum(levels, _residual_left(situation)))
     judged = approve(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
