@@ -57,9 +57,8 @@ class Situation:
 
     @property
     def earliest_tr(self) -> float | None:
-        """Start of the flight with the margin, or None when unknown [time]; no load comes before the record."""
-        start, margin = self.flight.start, self.settings.margin or 0.0
-        return start if start is None or start <= self.history.time[0] else start + margin
+        """Start of the flight with the margin, or None when unknown [time]."""
+        return None if self.flight.start is None else self.flight.start + (self.settings.margin or 0.0)
 
     @property
     def latest_td(self) -> float:

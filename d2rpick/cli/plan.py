@@ -15,10 +15,13 @@ from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.verify import Verdict
+    from d2rpick.choice.warnings import Caution
     from d2rpick.deck.printing.common import PrintedCard
 
 EXAMPLES = """\b
@@ -84,7 +87,7 @@ def command(
         earlier = reference.like(replace(asked, names=before).open(), asked.selection) if before else None
     windows = _windows(done) if done else ()
     plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
-    output.notes(reference.history.notes, plan.cautions)
+    output.notes(reference.history.notes, [*plan.cautions, *_of_done(done if prints else None)])
     _beside(plan, reference, options, output)
     checked, passed = _deck(plan, reference, options, every=every) if options["deck"] else ("", True)
     if checked and output_format != "table":
@@ -95,6 +98,17 @@ def command(
     text = write("plan", output_format, plan, Shown(ctx.meta["d2rpick.command"], every=every))
     output.result(f"{text}\n\n{checked}" if checked and output_format == "table" else text)
     return finish(ctx, objection=not (plan.supported and passed), exit_zero=exit_zero)
+
+
+def _of_done(name: str | None) -> Iterator[Caution]:
+    """Say that cards of the next windows alone do not make the run that was planned."""
+    from d2rpick.choice.warnings import Caution
+
+    if name is not None:
+        found = f"the cards hold the new windows only, not those of {name}"
+        yield Caution(
+            "done-windows-not-printed", f"{found}; keep both in the deck, else the parts are deformable there"
+        )
 
 
 def _check_usage(form: str, options: dict[str, Any], *, every: bool, done: str | None, before: tuple[str, ...]) -> None:

@@ -155,7 +155,7 @@ def quantity_note(channel: str) -> tuple[str, ...]:
     >>> quantity_note("boxIE_J")
     ()
     >>> quantity_note("ALLKE for Whole Model")
-    ("'ALLKE for Whole Model' is no internal energy by its name (ALLKE); it was taken as it is",)
+    ("'ALLKE for Whole Model' is not an internal energy by its name (ALLKE); it was used as it is",)
     """
     word = _OTHER.search(channel)
     if not word:

@@ -45,7 +45,6 @@ def test_every_argument_has_an_option_that_exists() -> None:
 def test_the_command_line_names_the_option_that_cures() -> None:
     assert with_options("`after` and `unknown`") == "--after and `unknown`"
     assert "--after 9 lies outside the record" in run("suggest", "--td", "0.064", "--after", "9", ENERGY).stderr
-    assert "; give --td or --td-window" in run("suggest", ENERGY).stderr
     assert "choose with --energy: " in run("suggest", "--td", "0.37", ROLLOVER).stderr
     assert "choose with --energy: " in run("study", "--td", "0.37", ROLLOVER).stdout
     assert "choose with `energy`: " in run("study", "--td", "0.37", "-f", "json", ROLLOVER).stdout

@@ -74,7 +74,12 @@ def test_what_cannot_be_written_is_refused_before_anything_is(tmp_path: Path) ->
         + END,
         "switch set 901",
     )
-    refused(tmp_path, HEAD + "*INCLUDE\nswitches.k\n" + END, "of the name 'switches.k'", {"switches.k": PARTS})
+    refused(
+        tmp_path,
+        HEAD + "*INCLUDE\nswitches.k\n" + END,
+        "with the name of the cards, 'switches.k'",
+        {"switches.k": PARTS},
+    )
     (tmp_path / "deep").mkdir()
     (tmp_path / "parts.k").write_text(PARTS)
     refused(tmp_path / "deep", HEAD + "*INCLUDE\n../parts.k\n" + END, "outside the folder")

@@ -242,7 +242,7 @@ def test_a_given_oscillator_that_does_not_fit_recommends_nothing() -> None:
     wrong = to_mode(replace(paper.OSCILLATOR, stiffness=1.05 * 660e3), 6.0)
     answer = suggest(paper.history(), paper.TD, Settings(oscillator=wrong))
     assert answer.recommended is None
-    assert any("prescribed oscillator" in note for c in answer.candidates for note in c.notes)
+    assert any("the oscillator that was asked for" in note for c in answer.candidates for note in c.notes)
 
 
 def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_has_not() -> None:

@@ -14,6 +14,7 @@ COMMANDS = {
     "verdict": ("verify", "--tr", "0.0135867", "--td", "0.0687534"),
     "overview": ("info",),
     "study": ("study", "--td", "0.064"),
+    "plan": ("plan",),
 }
 
 

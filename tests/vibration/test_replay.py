@@ -97,10 +97,10 @@ def test_an_oscillator_given_as_mode_has_its_energy() -> None:
 
 
 def test_times_must_follow_each_other() -> None:
-    with pytest.raises(RangeError, match="must follow"):
+    with pytest.raises(RangeError, match="must be in this order"):
         Replay(paper.OSCILLATOR, paper.START, 0.0, 0.08, 0.06)
 
 
 def test_an_overdamped_oscillator_has_no_mode() -> None:
-    with pytest.raises(RangeError, match="damps the oscillator beyond"):
+    with pytest.raises(RangeError, match="overdamps the oscillator"):
         to_mode(Oscillator(1.0, 1.0, 1.0, alpha=10.0), 1.0)

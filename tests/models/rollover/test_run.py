@@ -299,7 +299,7 @@ def test_times_of_a_scan_are_before_td_and_dense_in_the_trip() -> None:
     assert 0 < times[0] < times[-1] < 0.37
     assert sum(time < 0.086 for time in times) > 25
     assert scan_times(0.086, 0.0331)[0] == times[0]
-    with pytest.raises(RangeError, match=r"earliest that does is 0\.033"):
+    with pytest.raises(RangeError, match=r"earliest possible td is 0\.033"):
         scan_times(0.086, 0.0329)
 
 
@@ -309,7 +309,7 @@ def test_what_is_no_model_or_no_window_is_refused() -> None:
             Parameters(**wrong)
     with pytest.raises(RangeError, match="softer bars"):
         simulate(Parameters(stiffness=1e12), 100)
-    with pytest.raises(RangeError, match="follow each other"):
+    with pytest.raises(RangeError, match="must be in this order"):
         Window(0.2, 0.1)
     with pytest.raises(RangeError, match="end of the flight"):
         comparison_end(simulate(COARSE, 0.05), 0.06)
