@@ -304,3 +304,11 @@ def test_pairs_with_a_count_are_read(file: str) -> None:
     assert list(zip(history.time[:2].tolist(), history.energy[:2].tolist(), strict=True)) == [first, second]
     assert not history.notes
     assert history.complete
+
+
+def test_a_history_whose_part_variables_have_no_code_has_those_of_the_model() -> None:
+    file = "OpenRadioss__miniqa-OPTIONS-damp-new_test_v11-reference-FFO25SCBT01"
+    history = read_history([str(FOLDER.with_name("more-histories") / file)])
+    assert history.time.size == 11
+    assert (history.energy[0], history.energy[-1]) == pytest.approx((0.0, 0.001894467), rel=1e-6)
+    assert any("no variables of parts 1, 2" in note for note in history.notes)

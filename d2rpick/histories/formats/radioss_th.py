@@ -258,7 +258,8 @@ class _Records:
             codes = self._integers(self._count(variables))
             # A group of elements with a history is listed like a part, but without material and property.
             if material or properties:
-                if id_ in described or len(set(codes)) < len(codes):
+                known_codes = [code for code in codes if code]  # a solver may write 0 for every variable
+                if id_ in described or len(set(known_codes)) < len(known_codes):
                     raise self._broken("a part, and a variable of it, only once")
                 described[id_] = Part(id_, plain_text(record[_WIDTH : -4 * _WIDTH]))
                 known = ((_PART_VARIABLES.get(code), place) for place, code in enumerate(codes, start=values))
