@@ -28,6 +28,7 @@ _PROMPT = "$ d2rpick "  # lines of a card begin with "$ " too
 _SESSION = re.compile(r"^\$ (d2rpick (?:.*\\\n)*.*)\n((?:(?!\$ d2rpick ).*\n)*)", flags=re.MULTILINE)
 # The last digits of a number at full precision differ from machine to machine.
 _FULL_PRECISION = re.compile(r"\d+\.\d{13,}(?:e[+-]\d+)?")
+_NEXT_TO_NOTHING = re.compile(r"\b\d\.\d+e-(?:0[5-9]|[1-9]\d)\b")
 
 
 class Session(NamedTuple):
@@ -72,8 +73,9 @@ def printed(command: str) -> str:
 
 
 def rounded(text: str) -> str:
-    """Text with its numbers at full precision cut to what every machine gives."""
-    return _FULL_PRECISION.sub(lambda number: f"{float(number[0]):.12g}", text)
+    """Text with its numbers cut to what every machine gives: those at full precision, and errors next to nothing."""
+    text = _FULL_PRECISION.sub(lambda number: f"{float(number[0]):.12g}", text)
+    return _NEXT_TO_NOTHING.sub(lambda number: f"{float(number[0]):.3g}", text)
 
 
 def renewed(text: str) -> str:

@@ -27,7 +27,7 @@ _MOST_IDS: Final = 100_000
 _NAMES: Final = ("node", "merge", "swset", "step_cap", "end", "name")
 
 
-class Solver(click.ParamType[str]):
+class Solver(click.types.StringParamType):
     """Name of a solver whose input can be printed; the table of solvers is read when it is asked."""
 
     name = "solver"

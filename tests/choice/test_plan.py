@@ -83,7 +83,7 @@ def test_windows_keep_their_margin_and_follow_each_other(plan: Plan) -> None:
 def test_a_margin_that_is_given_overrules(reference: Reference) -> None:
     given = plan_of(reference, Settings(margin=0.02))
     assert {row.margin.time for row in given.rows} == {0.02}
-    assert given.rows[0].window == pytest.approx((0.0, given.rows[0].end - 0.02), abs=1e-9)  # no load before the record
+    assert given.rows[0].window == pytest.approx((0.02, given.rows[0].end - 0.02), abs=1e-9)
 
 
 def test_short_windows_are_left_out_with_the_reason(reference: Reference) -> None:
