@@ -83,9 +83,9 @@ def command(
     answer = suggest_of(reference, td_window if td is None else td, settings)
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
-        from d2rpick.report import figures
+        from d2rpick.report import figures, figures_choice
 
-        output.write(extras.plot, figures.render(figures.draw_suggestion(answer), extras.plot))
+        output.write(extras.plot, figures.render(figures_choice.draw_suggestion(answer), extras.plot))
     if extras.report:
         output.write(extras.report, text_bytes(with_options(_page(answer, run, options))))
     if output_format == "card":

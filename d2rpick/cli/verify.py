@@ -77,9 +77,9 @@ def command(
             answer = compare_with(answer, reference, reference.like(other, finished.selection))
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
-        from d2rpick.report import figures
+        from d2rpick.report import figures, figures_choice
 
-        output.write(extras.plot, figures.render(figures.draw_verdict(answer), extras.plot))
+        output.write(extras.plot, figures.render(figures_choice.draw_verdict(answer), extras.plot))
     if extras.report:
         output.write(extras.report, text_bytes(with_options(_page(answer, run, other, options))))
     text = write("verdict", output_format, answer, Shown(ctx.meta["d2rpick.command"]))

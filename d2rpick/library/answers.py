@@ -125,7 +125,7 @@ class Suggestion(Answer):
 
     def plot(self) -> Figure:
         """Draw the energy with its level at td, and the choice, as a matplotlib Figure."""
-        from d2rpick.report.figures import draw_suggestion
+        from d2rpick.report.figures_choice import draw_suggestion
 
         return draw_suggestion(self._core)
 
@@ -180,7 +180,7 @@ class Verdict(Answer):
 
     def plot(self) -> Figure:
         """Draw the energy with its level at td, and the pair, as a matplotlib Figure."""
-        from d2rpick.report.figures import draw_verdict
+        from d2rpick.report.figures_choice import draw_verdict
 
         return draw_verdict(self._core)
 

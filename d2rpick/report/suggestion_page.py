@@ -19,15 +19,15 @@ _MOST_ROWS = 20
 
 def drawn(answer: Suggestion) -> dict[str, tuple[str, str]]:
     """Draw the figures of the page, wide and narrow."""
-    from d2rpick.report import figures
+    from d2rpick.report import figures, figures_choice
 
     found = {
         "Internal energy with its level at td, and the choice": figures.both_widths(
-            figures.draw_suggestion, answer, "choice"
+            figures_choice.draw_suggestion, answer, "choice"
         )
     }
     if answer.clearly_better:
-        found["The better pair"] = figures.both_widths(figures.draw_better, answer, "better")
+        found["The better pair"] = figures.both_widths(figures_choice.draw_better, answer, "better")
     return found
 
 

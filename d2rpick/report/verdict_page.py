@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 def drawn(answer: Verdict) -> dict[str, tuple[str, str]]:
     """Draw the figure of the page, wide and narrow."""
-    from d2rpick.report import figures
+    from d2rpick.report import figures, figures_choice
 
     caption = "Internal energy with its level at td, and the pair"
-    return {caption: figures.both_widths(figures.draw_verdict, answer, "pair")}
+    return {caption: figures.both_widths(figures_choice.draw_verdict, answer, "pair")}
 
 
 def as_page(answer: Verdict, record: page.Record) -> str:
