@@ -11,6 +11,12 @@ if TYPE_CHECKING:
 
 # Shown beyond each end of the flight, as a share of it: enough to see load and landing begin.
 _BEYOND = 0.06
+# Beyond this ratio of the highest energy to the level, the level would vanish on a linear axis; a logarithmic one ends
+# at this part of the level.
+LOGARITHMIC = 20.0
+BELOW_LEVEL = 100.0
+# Room above and below the curve, as a share of its height.
+_ROOM = 0.08
 # By this share of a flight its ends may be off: the load or the landing may stand there already.
 _UNSURE = 0.01
 
@@ -27,6 +33,28 @@ class View(NamedTuple):
     high: float
     highest: float
     cut: str
+
+
+class Scale(NamedTuple):
+    """Lowest and highest value in sight, with some room [energy]; ``logarithmic``: how the axis between them runs."""
+
+    low: float
+    high: float
+    logarithmic: bool
+
+
+def scale_of(low: float, high: float, level: float) -> Scale:
+    """Give the scale that shows values from ``low`` to ``high``, and a ``level`` on which the eye must rest [energy].
+
+    Examples
+    --------
+    >>> scale_of(1.0, 2.0, 1.5), scale_of(0.0, 1000.0, 1.0).logarithmic
+    (Scale(low=0.92, high=2.08, logarithmic=False), True)
+    """
+    if level > 0 and high > LOGARITHMIC * level:
+        return Scale(max(low, level / BELOW_LEVEL), high * LOGARITHMIC**_ROOM, logarithmic=True)
+    room = _ROOM * (high - low or abs(high) or 1.0)
+    return Scale(low - room, high + room, logarithmic=False)
 
 
 def view_of(situation: Situation, tr: float | None = None) -> View:

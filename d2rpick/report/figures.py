@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
 
+from d2rpick.choice.view import BELOW_LEVEL, LOGARITHMIC
 from d2rpick.errors import FormatError
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from d2rpick.choice.view import Scale
+
 FORMATS = ("png", "svg", "pdf")
 # Okabe and Ito's palette: told apart with any colour vision.
 REFERENCE, SWITCHED, GOOD, FLIGHT = "#000000", "#d55e00", "#009e73", "#56b4e9"
@@ -26,13 +29,8 @@ REFERENCE, SWITCHED, GOOD, FLIGHT = "#000000", "#d55e00", "#009e73", "#56b4e9"
 SIZES: Final = {False: (10.0, 4.0, 6.5), True: (4.2, 3.9, 6.6)}
 # Share of the axes that the label of a switch time takes up, at most.
 LABEL: Final = {False: 0.14, True: 0.3}
-# Beyond this ratio of the highest energy to the level, the level would vanish on a linear axis.
-_LOGARITHMIC = 20.0
-_DECADES_BELOW_LEVEL = 2.0
 # Of a name from a file, what fits into a legend; in full it stands in the result.
 _LONGEST_NAME = 28
-# Room above and below the curve, as a share of its height.
-_ROOM = 0.08
 
 
 def format_of(name: str) -> str:
@@ -64,6 +62,8 @@ def svg_element(figure: Figure, prefix: str) -> str:
     element = content.getvalue()
     element = element[element.index("<svg") :]
     element = re.sub(r' (?:width|height)="[\d.]+pt"', "", element, count=2)  # the page says how wide
+    # a hundredth of a point is finer than any screen
+    element = re.sub(r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), element)
     element = re.sub(r"<style.*?</style>", "", element, flags=re.DOTALL)
     return re.sub(r'(?<= id=")|(?<=href="#)|(?<=url\(#)', prefix, element)
 
@@ -86,38 +86,28 @@ def _any_letters() -> Iterator[None]:
 
 def show_level(axes: Axes, level: float, highest: float) -> None:
     """Make the axis logarithmic where the level would vanish on a linear one."""
-    if level > 0 and highest > _LOGARITHMIC * level:
+    if level > 0 and highest > LOGARITHMIC * level:
         axes.set_yscale("log")
-        axes.set_ylim(bottom=level / 10**_DECADES_BELOW_LEVEL)
+        axes.set_ylim(bottom=level / BELOW_LEVEL)
 
 
-def show_span(
-    axes: Axes, span: tuple[float, float], heights: tuple[float, float], level: float, cut: tuple[str, float]
-) -> None:
-    """Show of a curve the times in ``span``; what is higher than ``heights`` is cut, with a mark.
+def show_span(axes: Axes, span: tuple[float, float], scale: Scale, cut: tuple[str, float]) -> None:
+    """Show of a curve the times in ``span``; what is higher than the scale is cut, with a mark.
 
     Parameters
     ----------
     axes : Axes
     span : (float, float)
         First and last time in sight [time].
-    heights : (float, float)
-        Lowest and highest value that is to be seen.
-    level : float
-        What must not vanish at the foot of the axis.
+    scale : Scale
     cut : (str, float)
         What stands highest in the span, and how high: the mark names it where it is cut.
     """
     axes.set_xlim(*span)
-    low, high = heights
-    show_level(axes, level, high)
-    if axes.get_yscale() == "log":
-        axes.set_ylim(max(axes.get_ylim()[0], low), high * _LOGARITHMIC**_ROOM)
-    else:
-        room = _ROOM * (high - low or abs(high) or 1.0)
-        axes.set_ylim(low - room, high + room)
+    axes.set_yscale("log" if scale.logarithmic else "linear")
+    axes.set_ylim(scale.low, scale.high)
     what, highest = cut
-    if what and highest > axes.get_ylim()[1]:
+    if what and highest > scale.high:
         axes.annotate(
             f"{what}, up to {highest:.4g} \N{UPWARDS ARROW}", (1, 1), xycoords="axes fraction", xytext=(-6, -6),
             textcoords="offset points", ha="right", va="top", fontsize="small",

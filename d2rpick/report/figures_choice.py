@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 from matplotlib.figure import Figure
 
 from d2rpick.choice.replayed import replayed_motion
-from d2rpick.choice.view import view_of
+from d2rpick.choice.view import scale_of, view_of
+from d2rpick.histories.outline import outline
 from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SIZES, SWITCHED, finish, mark_times, plain, show_span
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 # Up to so many candidates are told apart as marks; beyond, what is acceptable is a band.
 _FEW: Final = 20
+# Stretches of the curve, each with its lowest and highest energy: more than a screen has columns for.
+_STRETCHES: Final = 600
 # Share of the axes at their foot in which the band lies, clear of the curve.
 _BAND: Final = 0.045
 
@@ -60,12 +63,12 @@ def _draw(
     width, one, two = SIZES[narrow]
     figure = Figure(figsize=(width, two if motion else one), layout="constrained")
     panels = list(figure.subplots(2 if motion else 1, 1, sharex=True, squeeze=False)[:, 0])
-    _draw_energy(panels[0], situation, candidates, bands)
+    seen = view_of(situation, tr)
+    _draw_energy(panels[0], situation, seen, candidates, bands)
     if motion:
         _draw_motion(panels[1], motion)
     unit = situation.history.time_unit
     panels[-1].set_xlabel(f"time [{unit}]" if unit else "time")
-    seen = view_of(situation, tr)
     for panel in panels:
         finish(panel, legend=not narrow)
     _show(panels[0], situation, seen)
@@ -79,19 +82,24 @@ def _draw(
 def _show(axes: Axes, situation: Situation, seen: View) -> None:
     """Show the flight; the level belongs to it, also where td lies beyond."""
     level = situation.energy_td
-    heights = min(seen.low, level), max(seen.high, level)
-    show_span(axes, (seen.start, seen.end), heights, level, (seen.cut, seen.highest))
+    scale = scale_of(min(seen.low, level), max(seen.high, level), level)
+    show_span(axes, (seen.start, seen.end), scale, (seen.cut, seen.highest))
 
 
 def _draw_energy(
-    axes: Axes, situation: Situation, candidates: Sequence[Candidate], bands: Sequence[tuple[float, float]]
+    axes: Axes,
+    situation: Situation,
+    seen: View,
+    candidates: Sequence[Candidate],
+    bands: Sequence[tuple[float, float]],
 ) -> None:
     history, level, flight, span = situation.history, situation.energy_td, situation.flight, situation.evidence.span
+    drawn = outline(*history.between(seen.start, seen.end), stretches=_STRETCHES)
     if flight.start is not None:
         known = span.end if span else situation.td  # without a contact, as far as it was seen
         end = known if flight.end is None else flight.end
         axes.axvspan(flight.start, end, color=FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
-    axes.plot(history.time, history.energy, color=REFERENCE, linewidth=1, label=plain(history.channel))
+    axes.plot(*drawn, color=REFERENCE, linewidth=1, label=plain(history.channel))
     axes.axhline(level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
     for number, band in enumerate(bands):
         label = "_" if number else "acceptable tr"

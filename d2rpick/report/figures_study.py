@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from d2rpick.choice.view import scale_of
 from d2rpick.report.figures import GOOD, REFERENCE, SIZES, SWITCHED, finish, mark_times, plain, show_span
 from d2rpick.studies.outliers import outliers, short_names
 from d2rpick.studies.study import runs_of
@@ -121,7 +122,7 @@ def _show(axes: Axes, answer: Study, drawn: Sequence[Row]) -> None:
     inner, seen = (np.concatenate([levels, *_energies(curves, *window)]) for window in ((early, answer.td), span))
     # the lowest level stays in sight beside the middle one
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
-    show_span(axes, span, (float(inner.min()), float(inner.max())), level, ("highest run", float(seen.max())))
+    show_span(axes, span, scale_of(float(inner.min()), float(inner.max()), level), ("highest run", float(seen.max())))
 
 
 def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[Samples]:

@@ -10,6 +10,7 @@ from d2rpick.choice.judged_card import judged_card
 from d2rpick.choice.verify import verify_at
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.errors import D2RPickError
+from d2rpick.report.explorer import scripts, styles
 from d2rpick.report.health import measures_of
 from d2rpick.report.html import Markup, document, pairs, resource, section, table, tag
 from d2rpick.report.situation import heading
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
     from d2rpick.histories.source import Source
+    from d2rpick.report.explorer import Explorer
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Record:
 
     ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the
     options of ``card`` that judge by the same history.  ``figures`` are SVG elements by caption, for a wide and for a
-    narrow page, with ids of their own.  ``request`` says how the card is printed.
+    narrow page, with ids of their own.  ``request`` says how the card is printed; ``explorer`` makes the page live.
     """
 
     run: Run
@@ -42,12 +44,14 @@ class Record:
     figures: Mapping[str, tuple[str, str]]
     request: CardRequest
     switched: Run | None = None
+    explorer: Explorer | None = None
 
 
-def run_page(run: Run, sections: Iterable[Markup]) -> str:
-    """Write a page about one run."""
+def run_page(run: Run, sections: Iterable[Markup], explored: Explorer | None = None) -> str:
+    """Write a page about one run; with what can be ``explored`` it runs a script."""
     name = next((database.title for database in run.databases if database.title), "") or run.name
-    return document(f"Switch times: {name}", *sections, signed=("chosen by", "date", "signature"))
+    needed = {"styles": styles(), "scripts": scripts()} if explored else {}
+    return document(f"Switch times: {name}", *sections, signed=("chosen by", "date", "signature"), **needed)
 
 
 def pair(title: str, times: tuple[float, float], residual: float | None, history: History, class_: str) -> Markup:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from d2rpick.report import page
+from d2rpick.report.explorer import explorer
 from d2rpick.report.html import Markup, drawings, pairs, remarks, section, table, tag
 from d2rpick.report.suggestion import HEAD, outlook, rows
 
@@ -33,11 +34,13 @@ def drawn(answer: Suggestion) -> dict[str, tuple[str, str]]:
 
 def as_page(answer: Suggestion, record: page.Record) -> str:
     """Write the page."""
-    return page.run_page(record.run, _sections(answer, record))
+    return page.run_page(record.run, _sections(answer, record), record.explorer)
 
 
 def _sections(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
     yield _choice(answer)
+    if record.explorer:
+        yield explorer(record.explorer)
     yield drawings(record.figures)
     yield section("Candidates", *_candidates(answer))
     yield page.parts(answer.chosen)
