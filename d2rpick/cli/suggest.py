@@ -8,12 +8,14 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
+from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.cli.wording import in_words, with_options
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
+    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.opening import Run
 
@@ -87,7 +89,7 @@ def command(
 
         output.write(extras.plot, figures.render(figures_choice.draw_suggestion(answer), extras.plot))
     if extras.report:
-        output.write(extras.report, text_bytes(with_options(_page(answer, run, options))))
+        output.write(extras.report, text_bytes(with_options(_page(answer, reference, options))))
     if output_format == "card":
         return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
     text = write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit))
@@ -111,13 +113,17 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
         raise click.UsageError("-f card needs --part, the parts to switch (Radioss: --node, their main nodes)")
 
 
-def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
-    """Draw the figures, wide and narrow, and write the page around them."""
+def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> str:
+    """Draw the figures, wide and narrow, explore the flight, and write the page around them."""
+    from d2rpick.choice.explored import explored_around
     from d2rpick.report.page import Record
     from d2rpick.report.suggestion_page import as_page, drawn
 
+    run = reference.run
     request = card_request(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), request))
+    explorer = explorer_of([explored_around(reference, answer.situation, answer.td_window)])
+    judging = shared.judging(options)
+    return as_page(answer, Record(run, shared.repeat(), judging, drawn(answer), request, explorer=explorer))
 
 
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:

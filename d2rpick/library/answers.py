@@ -75,10 +75,7 @@ class Answer:
         raise NotImplementedError
 
     def _record(self, figures: dict[str, tuple[str, str]]) -> Record:
-        from d2rpick.choice.judged_card import CardRequest
-        from d2rpick.report.page import Record
-
-        return Record(self.run.files, ("d2rpick", *self.command), (), figures, CardRequest())
+        return page_record(self.run, self.command, figures)
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,6 +333,14 @@ def selection_for(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
     if names and run.chosen.energy:
         raise ValueError("parts and the energy that was named when the run was read exclude each other")
     return run.chosen._replace(parts=names, flying=arguments.part_names("flying", flying))
+
+
+def page_record(run: Run, command: Sequence[str], figures: dict[str, tuple[str, str]]) -> Record:
+    """Give what a page shows besides the answer that ``command`` repeats."""
+    from d2rpick.choice.judged_card import CardRequest
+    from d2rpick.report.page import Record
+
+    return Record(run.files, ("d2rpick", *command), (), figures, CardRequest())
 
 
 def written(path: arguments.Path, page: str) -> Path:

@@ -38,10 +38,15 @@ def as_page(answer: Suggestion, record: page.Record) -> str:
 
 
 def _sections(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
-    yield _choice(answer)
+    yield choice(answer)
     if record.explorer:
         yield explorer(record.explorer)
     yield drawings(record.figures)
+    yield from rest(answer, record)
+
+
+def rest(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
+    """Give the sections below the figures."""
     yield section("Candidates", *_candidates(answer))
     yield page.parts(answer.chosen)
     yield from page.evidence(answer.situation, answer.health, record)
@@ -49,7 +54,8 @@ def _sections(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
         yield page.solver_input(answer.situation, (answer.recommended.tr, answer.recommended.td), record)
 
 
-def _choice(answer: Suggestion) -> Markup:
+def choice(answer: Suggestion) -> Markup:
+    """Give the section above the figures: the pairs, large, and what to know of them."""
     better = answer.clearly_better
     if answer.recommended:
         cards = [_pair(answer, "Recommended", answer.recommended, class_="card chosen")]

@@ -15,6 +15,7 @@ COMMANDS = {
     "overview": ("info",),
     "study": ("study", "--td", "0.064"),
     "plan": ("plan",),
+    "trade_off": ("explore", "--steps", "5"),
 }
 
 
