@@ -10,7 +10,20 @@ from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
     from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.plan import Plan
     from d2rpick.choice.situation import Situation
+
+# td of a flight in a plan of many: a curve of fewer points tells little.
+_LEAST = 40
+
+
+def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
+    """Find what other td cost than those of a plan, for each of its flights; its grids are the coarser the more."""
+    answers = [row.answer for row in plan.rows if row.answer and row.window]
+    reference = reference._replace(history=plan.history)
+    steps = max(STEPS // max(len(answers), 1), _LEAST)
+    found = (explored_around(reference, one.situation, one.td_window, steps=steps) for one in answers)
+    return tuple(one for one in found if one)
 
 
 def explored_around(

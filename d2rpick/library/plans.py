@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.library import arguments
-from d2rpick.library.answers import selection_for, written
+from d2rpick.library.answers import explorer_of, selection_for, written
 from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import command_line
+from d2rpick.library.repeat import asking, command_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -39,6 +39,7 @@ class Plan:
     all_windows: tuple[tuple[float, float], ...]
     warnings: tuple[Caution, ...]
     command: tuple[str, ...] = field(repr=False)
+    _asking: tuple[str, ...] = field(repr=False)
     _core: Core = field(repr=False)
 
     @property
@@ -78,9 +79,13 @@ class Plan:
 
     def report(self, path: arguments.Path) -> Path:
         """Write the plan to one HTML page that needs no network; an existing file is replaced."""
+        from d2rpick.choice.explored import explored_flights
+        from d2rpick.choice.of_run import Reference
         from d2rpick.report.plan_page import as_page
 
-        return written(path, as_page(self._core, self.run.files, ("d2rpick", *self.command), None))
+        found = explored_flights(Reference(self.run.files, self._core.history), self._core)
+        explorer = explorer_of(found, self._asking)
+        return written(path, as_page(self._core, self.run.files, ("d2rpick", *self.command), None, explorer))
 
 
 def plan(
@@ -146,5 +151,6 @@ def plan(
         all_windows=core.windows(every=True),
         warnings=core.cautions,
         command=command_line("plan", own, run, selection, choosing),
+        _asking=asking(run, selection, choosing),
         _core=core,
     )
