@@ -27,7 +27,7 @@ def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
 
 
 def explored_around(
-    reference: Reference, situation: Situation, window: tuple[float, float] | None = None, *, steps: int = STEPS
+    reference: Reference, situation: Situation, window: tuple[float, float] | None = None, *, steps: int | None = None
 ) -> TradeOff | None:
     """Find what other td cost than that of a situation.
 
@@ -38,8 +38,8 @@ def explored_around(
         What the record tells about the td that was asked for or chosen.
     window : (float, float), optional
         Where td was looked for [time].  Default: the flight that td lies in.
-    steps : int
-        So many td on an even grid.
+    steps : int, optional
+        So many td on an even grid.  Default: as many as a curve needs.
 
     Returns
     -------
@@ -50,8 +50,7 @@ def explored_around(
     if window is None and flight.start is None:
         return None
     try:
-        return explore_of(
-            reference, situation.settings, window or bounds(situation.history, flight), td=situation.td, steps=steps
-        )
+        span = window or bounds(situation.history, flight)
+        return explore_of(reference, situation.settings, span, td=situation.td, steps=steps or STEPS)
     except RangeError:  # the window holds no state
         return None

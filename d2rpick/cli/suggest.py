@@ -116,14 +116,16 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
 def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> str:
     """Draw the figures, wide and narrow, explore the flight, and write the page around them."""
     from d2rpick.choice.explored import explored_around
+    from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import Record
     from d2rpick.report.suggestion_page import as_page, drawn
 
     run = reference.run
-    request = card_request(run, options, answer.situation.history)
+    request, pair = card_request(run, options, answer.situation.history), answer.recommended
+    card = input_for(answer.situation, pair.tr, request) if pair else None
     explorer = explorer_of([explored_around(reference, answer.situation, answer.td_window)])
     judging = shared.judging(options)
-    return as_page(answer, Record(run, shared.repeat(), judging, drawn(answer), request, explorer=explorer))
+    return as_page(answer, Record(run, shared.repeat(), judging, drawn(answer), card, explorer=explorer))
 
 
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:

@@ -92,11 +92,13 @@ def command(
 def _page(answer: Verdict, reference: Reference, switched: Run | None, options: dict[str, Any]) -> str:
     """Draw the figure, wide and narrow, explore the flight, and write the page around it."""
     from d2rpick.choice.explored import explored_around
+    from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import Record
     from d2rpick.report.verdict_page import as_page, drawn
 
     run = reference.run
     request = card_request(run, options, answer.situation.history)
+    card = input_for(answer.situation, answer.candidate.tr, request) if answer.verified else None
     explorer = explorer_of([explored_around(reference, answer.situation)])
     judging = shared.judging(options)
-    return as_page(answer, Record(run, shared.repeat(), judging, drawn(answer), request, switched, explorer))
+    return as_page(answer, Record(run, shared.repeat(), judging, drawn(answer), card, switched, explorer))

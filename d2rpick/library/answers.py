@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.choice import verify as judgement
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.health import Health
+    from d2rpick.choice.judged_card import SolverInput
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.suggest import Pair
     from d2rpick.choice.trade_off import TradeOff
@@ -77,13 +78,20 @@ class Answer:
         """Give the JSON document of the command line."""
         raise NotImplementedError
 
-    def _record(self, figures: dict[str, tuple[str, str]], td_window: tuple[float, float] | None = None) -> Record:
+    def _record(
+        self,
+        figures: dict[str, tuple[str, str]],
+        tr: float | None,
+        td_window: tuple[float, float] | None = None,
+    ) -> Record:
         from d2rpick.choice.explored import explored_around
+        from d2rpick.choice.judged_card import CardRequest, input_for
         from d2rpick.choice.of_run import Reference
 
         reference = Reference(self.run.files, self.situation.history)
-        found = explored_around(reference, self.situation, td_window)
-        return page_record(self.run, self.command, figures, explorer_of([found], self._asking))
+        explorer = explorer_of([explored_around(reference, self.situation, td_window)], self._asking)
+        card = None if tr is None else input_for(self.situation, tr, CardRequest())
+        return page_record(self.run, self.command, figures, card, explorer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +146,8 @@ class Suggestion(Answer):
         """Write the answer to one HTML page that needs no network; an existing file is replaced."""
         from d2rpick.report.suggestion_page import as_page, drawn
 
-        page = as_page(self._core, self._record(drawn(self._core), self._core.td_window))
+        pair = self.recommended
+        page = as_page(self._core, self._record(drawn(self._core), pair.tr if pair else None, self._core.td_window))
         return written(path, page)
 
 
@@ -193,7 +202,7 @@ class Verdict(Answer):
         """Write the verdict to one HTML page that needs no network; an existing file is replaced."""
         from d2rpick.report.verdict_page import as_page, drawn
 
-        return written(path, as_page(self._core, self._record(drawn(self._core))))
+        return written(path, as_page(self._core, self._record(drawn(self._core), self.tr if self.verified else None)))
 
 
 def suggest(
@@ -354,13 +363,16 @@ def explorer_of(found: Iterable[TradeOff | None], asking: Sequence[str]) -> Expl
 
 
 def page_record(
-    run: Run, command: Sequence[str], figures: dict[str, tuple[str, str]], explorer: Explorer | None
+    run: Run,
+    command: Sequence[str],
+    figures: dict[str, tuple[str, str]],
+    card: SolverInput | None,
+    explorer: Explorer | None,
 ) -> Record:
     """Give what a page shows besides the answer that ``command`` repeats."""
-    from d2rpick.choice.judged_card import CardRequest
     from d2rpick.report.page import Record
 
-    return Record(run.files, ("d2rpick", *command), (), figures, CardRequest(), explorer=explorer)
+    return Record(run.files, ("d2rpick", *command), (), figures, card, explorer=explorer)
 
 
 def written(path: arguments.Path, page: str) -> Path:

@@ -83,15 +83,13 @@ class Exploration:
 
     def report(self, path: arguments.Path) -> Path:
         """Write the answer to one HTML page that needs no network; an existing file is replaced."""
+        from d2rpick.choice.judged_card import CardRequest, input_for
         from d2rpick.report.trade_off_page import as_page, drawn
 
-        return written(
-            path,
-            as_page(
-                self._core,
-                page_record(self.run, self.command, drawn(self._core), explorer_of([self._core], self._asking)),
-            ),
-        )
+        core = self._core
+        pair, explorer = core.suggestion.recommended, explorer_of([core], self._asking)
+        card = input_for(core.suggestion.situation, pair.tr, CardRequest()) if pair else None
+        return written(path, as_page(core, page_record(self.run, self.command, drawn(core), card, explorer)))
 
 
 def explore(

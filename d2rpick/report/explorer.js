@@ -169,8 +169,9 @@
 
   function buildAll() {
     Object.keys(kinds).filter((name) => name !== "motion" || flight.motion).forEach(build);
+    find(".energy p").textContent = flight.caption;
     const place = find(".motion");
-    place.hidden = !flight.motion;
+    if (place) place.hidden = !flight.motion;
     if (!flight.motion) {
       charts.motion?.destroy();
       delete charts.motion;

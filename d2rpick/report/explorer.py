@@ -68,8 +68,7 @@ def explorer(shown: Explorer) -> Markup:
         _controls(shown.trade_offs),
         tag(
             "div",
-            _column(*_over_time(windows=any(row["windows"] for flight in flights for row in flight["rows"]))),
-            _column(_chart("trade", _CAPTION, _TRADE), _values(flights)),
+            *_columns(flights, any(row["windows"] for flight in flights for row in flight["rows"])),
             class_="panels",
         ),
         tag("h3", "To repeat this"),
@@ -126,14 +125,19 @@ def _values(flights: Sequence[Mapping[str, Any]]) -> Markup:
     return tag("div", *shown, class_="now")
 
 
-def _column(*content: Markup) -> Markup:
-    return tag("div", *content, class_="column")
-
-
-def _over_time(*, windows: bool) -> Iterator[Markup]:
-    yield _chart("energy", "Internal energy in the flight", _ENERGY if windows else _ENERGY[:-1])
-    yield _chart("whole", "The whole record; shaded: what is shown above", ())
-    yield _chart("motion", "Deformation of the oscillator behind the record", _MOTION)
+def _columns(flights: Sequence[Mapping[str, Any]], windows: bool) -> Iterator[Markup]:
+    """Charts and values in two columns; on a narrow page the style puts them below each other in another order."""
+    left = [
+        _chart("energy", "Internal energy in the flight", _ENERGY if windows else _ENERGY[:-1]),
+        _chart("whole", "The whole record; shaded: what is shown above", ()),
+    ]
+    right, values = [_chart("trade", _CAPTION, _TRADE)], _values(flights)
+    if any(flight["motion"] for flight in flights):
+        left.append(_chart("motion", "Deformation of the oscillator behind the record", _MOTION))
+        right.append(values)
+    else:
+        left.append(values)
+    yield from (tag("div", *column, class_="column") for column in (left, right))
 
 
 def _chart(name: str, caption: str, key: Iterable[tuple[str, str]]) -> Markup:
@@ -156,7 +160,9 @@ def _flight(found: TradeOff) -> dict[str, Any]:
     inner = history.between(seen.start, seen.end)
     time, energy = outline(*inner, stretches=_STRETCHES)
     unit = history.time_unit
+    cut = f"; cut at the top: the {seen.cut}, up to {seen.highest:.4g}" if seen.highest > scale.high else ""
     return {
+        "caption": f"Internal energy in the flight{cut}",
         "time": f"time [{unit}]" if unit else "time",
         "error": error_name(found.offers),
         "view": [seen.start, seen.end],

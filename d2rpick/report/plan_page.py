@@ -10,7 +10,7 @@ from d2rpick.report.explorer import explorer
 from d2rpick.report.figures import svg_element
 from d2rpick.report.figures_plan import draw_plan
 from d2rpick.report.html import Markup, drawings, pairs, remarks, resource, section, table, tag
-from d2rpick.report.plan import HEAD, heading, outlook, rows
+from d2rpick.report.plan import HEAD, heading, outlook, quality, rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -65,5 +65,5 @@ def _sections(
 
 def _window(row: Planned, plan: Plan) -> Markup:
     assert row.window is not None
-    residual = row.candidate.residual if row.candidate else None
-    return page.pair(f"Flight {row.number}", row.window, residual, plan.history, "card chosen")
+    told = [quality(row) or ""]
+    return page.pair(f"Flight {row.number}", row.window, told, plan.history, "card chosen")

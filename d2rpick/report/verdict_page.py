@@ -37,7 +37,7 @@ def _sections(answer: Verdict, record: page.Record) -> Iterator[Markup]:
     situation, candidate = answer.situation, answer.candidate
     times = candidate.tr, situation.td
     class_ = "card chosen" if answer.verified else "card refused"
-    shown = page.pair(word(answer).capitalize(), times, candidate.residual, situation.history, class_)
+    shown = page.pair(word(answer).capitalize(), times, [page.left_over(candidate.residual)], situation.history, class_)
     yield tag("section", tag("div", shown, class_="choice"), remarks(answer.cautions, answer.reasons))
     if record.explorer:
         yield explorer(record.explorer)
@@ -48,7 +48,7 @@ def _sections(answer: Verdict, record: page.Record) -> Iterator[Markup]:
         yield _switched(answer.switched, record.switched.files if record.switched else ())
     yield from page.evidence(situation, answer.health, record)
     if answer.verified:
-        yield page.solver_input(situation, times, record)
+        yield page.solver_input(times, record)
 
 
 def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
