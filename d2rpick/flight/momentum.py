@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows, lasting_window
+from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, Remembered, all_windows, lasting_window
 from d2rpick.histories.samples import integral
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float) -> FreeFlight
     if noise > TOLERANCE * extent:
         return None
     fit = FreeFall(time, momentum)
-    window = lasting_window(fit, td, extent, noise)
+    window = lasting_window(Remembered(fit), td, extent, noise)
     if window is None:
         return None
     first, last = window
