@@ -40,7 +40,7 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     passes = (turns >= 2) & (level > _ROUNDING * np.abs(history.energy).max())
     near = np.where(passes, min(tolerance, EQUALLY_GOOD), tolerance) + _ROUNDING
     entered = time[np.maximum(_reached(energy, level, near) - 1, 0)]  # or since, but after the state before
-    return np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0)
+    return np.asarray(np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0))
 
 
 def _reached(energy: Samples, level: Samples, near: Samples) -> Samples:
@@ -51,4 +51,4 @@ def _reached(energy: Samples, level: Samples, near: Samples) -> Samples:
     low, high = (np.maximum(level, 0.0) * np.maximum(1 + sign * near, 0.0) ** 2 for sign in (-1, 1))
     lowest, highest = np.minimum.accumulate(energy), np.maximum.accumulate(energy)
     fallen = energy.size - np.searchsorted(lowest[::-1], high, side="right")
-    return np.maximum(fallen, np.searchsorted(highest, low, side="left"))
+    return np.asarray(np.maximum(fallen, np.searchsorted(highest, low, side="left")))
