@@ -44,6 +44,11 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         "value": lambda report, answer, _: report.as_value(answer),
     },
     "plan": {**_PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
+    "trade_off": {
+        **_PLAIN,
+        "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
+        "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
+    },
     "verdict": _PLAIN,
     "overview": _PLAIN,
     "study": {
