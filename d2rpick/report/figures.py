@@ -35,7 +35,7 @@ STRETCHES: Final = 400
 _LONGEST_NAME = 28
 
 
-def format_of(name: str) -> str:
+def picture_format(name: str) -> str:
     """Tell the format that the suffix of ``name`` asks for; FormatError unless it is png, svg or pdf."""
     form = PurePath(name).suffix.lower().lstrip(".")
     if form not in FORMATS:
@@ -45,7 +45,7 @@ def format_of(name: str) -> str:
 
 def render(figure: Figure, name: str) -> bytes:
     """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for, always the same."""
-    content, form = io.BytesIO(), format_of(name)
+    content, form = io.BytesIO(), picture_format(name)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
     with mpl.rc_context({"svg.hashsalt": "d2rpick"}), _any_letters():
         figure.savefig(content, format=form, dpi=150, metadata=undated)
