@@ -55,7 +55,7 @@ def _sections(
     reasons = pairs([(f"flight {row.number}", row.reason) for row in plan.rows if row.reason])
     yield section("Flights", table("Flights", HEAD[1:], [row[1:] for row in rows(plan)]), reasons)
     if card:
-        yield section("For the solver's input", tag("pre", card))
+        yield section("For the solver's input", tag("pre", card, tabindex="0"))
     what, _, text = heading(plan).partition(" ")
     notes = [("note", note) for note in plan.history.notes]
     yield section("What was read", pairs([(what, text.strip()), *page.digests(run.files), *notes]))

@@ -42,13 +42,18 @@ def _sections(answer: Verdict, record: page.Record) -> Iterator[Markup]:
     if record.explorer:
         yield explorer(record.explorer)
     yield drawings(record.figures)
-    yield section("Measures", pairs((name.replace("_", " "), short(one)) for name, one in of_verdict(answer).items()))
+    yield section("Measures", pairs(_measures(answer)))
     yield page.parts(candidate)
     if answer.switched:
         yield _switched(answer.switched, record.switched.files if record.switched else ())
     yield from page.evidence(situation, answer.health, record)
     if answer.verified:
         yield page.solver_input(times, record)
+
+
+def _measures(answer: Verdict) -> Iterator[tuple[str, str]]:
+    """What is known of the pair."""
+    yield from ((name.replace("_", " "), short(one)) for name, one in of_verdict(answer).items() if one is not None)
 
 
 def _switched(found: Comparison, files: Iterable[Source]) -> Markup:

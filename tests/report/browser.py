@@ -11,6 +11,7 @@ import pytest
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
+from selenium.webdriver.support.wait import WebDriverWait
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -63,6 +64,16 @@ class Browser:
     def value(self, name: str) -> str:
         """What the interactive part says under a name."""
         return str(self.find(f'[data-value="{name}"]').get_property("textContent"))
+
+    def spoken(self, roles: set[str]) -> list[dict[str, Any]]:
+        """Elements with these roles as a screen reader finds them; it is told of them a little later."""
+
+        def found(_: webdriver.Chrome) -> list[dict[str, Any]]:
+            nodes = self.ask("Accessibility.getFullAXTree")["nodes"]
+            used = [node for node in nodes if node["role"]["value"] in roles and not node["ignored"]]
+            return used if {node["role"]["value"] for node in used} == roles else []
+
+        return WebDriverWait(self.driver, timeout=20).until(found)
 
     def cut(self) -> list[str]:
         """What is cut at the right edge, and whether the page is wider than the screen."""
