@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.report import page
 from d2rpick.report.html import Markup, drawings, pairs, remarks, section, table, tag
-from d2rpick.report.suggestion import HEAD, outlook, rows
+from d2rpick.report.suggestion import HEAD, headline, outlook, rows, verdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -55,13 +55,18 @@ def choice(answer: Suggestion) -> Markup:
     """Give the section above the figures: the pairs, large, and what to know of them."""
     better = answer.clearly_better
     if answer.recommended:
-        cards = [_pair(answer, "Recommended", answer.recommended, class_="card chosen")]
+        cards = [_pair(answer, headline(answer).capitalize(), answer.recommended, class_="card chosen")]
     else:
         nothing = tag("p", "No tr can be recommended for this td.")
         cards = [tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")]
     if better:
         cards.append(_pair(answer, "Better pair: td at the nearest peak", better, class_="card"))
-    return tag("section", tag("div", *cards, class_="choice"), remarks(answer.cautions), pairs(outlook(answer)))
+    return tag(
+        "section",
+        tag("div", *cards, class_="choice"),
+        pairs((*verdict(answer)[1:], *outlook(answer))),
+        remarks(answer.cautions),
+    )
 
 
 def _pair(answer: Suggestion, title: str, pair: Pair, class_: str) -> Markup:
