@@ -288,10 +288,10 @@ def repeat() -> list[str]:
         if context.get_parameter_source(name) is source
     ]
     variables = [f"{name}={os.environ[name]}" for name in names]
-    command, *rest = context.meta["d2rpick.command"]
-    replaces = not context.params["overwrite"] and any(context.params.get(name) for name in _WRITTEN)
-    rest = ["--overwrite", *rest] if replaces else rest
-    return [*(["env", *variables] if variables else []), "d2rpick", command, *rest]
+    words = list(context.meta["d2rpick.command"])
+    if not context.params["overwrite"] and any(context.params.get(name) for name in _WRITTEN):
+        words.insert(words.index("--") if "--" in words else len(words), "--overwrite")
+    return [*(["env", *variables] if variables else []), "d2rpick", *words]
 
 
 # Options that write files, which the same command would find the next time.

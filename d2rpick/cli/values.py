@@ -77,15 +77,18 @@ class PartNames(Names):
     """Numbers and titles of parts, for the shell to complete from the history that was typed before."""
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
-        """Offer the parts of the run, and the words for several; nothing where it cannot be read."""
+        """Offer the parts of the files that were typed before, and the words for several."""
+        from pathlib import Path
+
         from click.shell_completion import CompletionItem
 
         from d2rpick.errors import D2RPickError
         from d2rpick.histories.opening import open_run
 
+        words = ctx.meta.get("d2rpick.command", ())[1:]  # click has read no argument yet when an option is completed
         offered = [("flying", "parts that fly together"), ("all", "every part that has energy")]
         try:
-            parts = open_run(ctx.params.get("history") or ()).parts
+            parts = open_run([word for word in words if Path(word).exists()]).parts
         except (D2RPickError, OSError, IndexError):
             parts = ()
         offered = [*((str(part.id), part.title) for part in parts), *((p.title, str(p.id)) for p in parts), *offered]

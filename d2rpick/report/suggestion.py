@@ -40,9 +40,9 @@ def as_table(answer: Suggestion, limit: int) -> str:
 
 
 def as_markdown(answer: Suggestion, limit: int) -> str:
-    """The verdict, and the candidates as a Markdown table below it."""
+    """The candidates as a Markdown table, and the verdict below it."""
     lines = [f"{name}: {text}" for name, text in (*verdict(answer), *outlook(answer))]
-    return "\n\n".join([*lines, tables.as_markdown(HEAD, rows(answer, limit))])
+    return "\n\n".join([tables.as_markdown(HEAD, rows(answer, limit)), *lines])
 
 
 def as_csv(answer: Suggestion) -> str:
@@ -109,9 +109,9 @@ def verdict(answer: Suggestion) -> list[tuple[str, str]]:
 
 
 def _saved(best: Candidate) -> str:
-    rigid = f"the parts are rigid for {best.rigid_time:.6g}, {best.rigid_fraction:.0%} of the record"
+    rigid = f"rigid for {best.rigid_fraction:.0%} of the record, {best.rigid_time:.6g}"
     share = best.run_time_share
-    return rigid if share is None else f"{rigid}; the run takes about {share:.0%} of the reference's time"
+    return rigid if share is None else f"{rigid}; run time about {share:.0%} of the reference's"
 
 
 def _sure(best: Candidate, quality: Quality) -> str:
