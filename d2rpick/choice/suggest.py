@@ -72,6 +72,17 @@ class Suggestion(NamedTuple):
         return None if place is None else self.candidates[place]
 
     @property
+    def acceptable_windows(self) -> tuple[tuple[float, float], ...]:
+        """First and last acceptable tr of each window of them, on any basis [time]."""
+        if self.windows is not None:
+            return tuple((one.start, one.end) for one in self.windows)
+        from d2rpick.choice.acceptable_windows import acceptable_windows  # not above: a table does without it
+
+        best = self.recommended
+        found = acceptable_windows(self.situation, self.candidates, best.tr if best else None)[0].tolist()
+        return tuple((start, end) for start, end in found)
+
+    @property
     def quality(self) -> Quality | None:
         """How good the recommended pair is; None without one."""
         best = self.chosen

@@ -6,12 +6,15 @@ from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.margin import margin_before_contact
 from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, rank
+from d2rpick.choice.reach_back import longest_rigid_times
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import SOURCES, witnesses
@@ -167,10 +170,12 @@ def _by_level(situation: Situation, window: tuple[float, float], look: Look) -> 
 
 
 def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice]:
-    """Give acceptable choices, the latest td first, as long as an earlier one may be longer."""
-    start, longest = situation.earliest_tr, 0.0
-    for td in sorted(times, reverse=True):
-        if start is None or td - start <= longest:
+    """Give acceptable choices, the td that may be longest first, as long as another one may be longer."""
+    tds, longest = np.fromiter(times, np.float64), 0.0
+    most = longest_rigid_times(situation, tds)
+    order = np.lexsort((-tds, -most))
+    for td, possible in zip(tds[order].tolist(), most[order].tolist(), strict=True):
+        if possible <= 0 or possible < longest:
             return
         for pair in _acceptable([situation.at(td)]):
             longest = max(longest, pair[1].rigid_time)

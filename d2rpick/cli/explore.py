@@ -8,6 +8,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
+from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.cli.wording import in_words, with_options
@@ -93,8 +94,11 @@ def command(
 
 def _page(found: TradeOff, run: Run, options: dict[str, Any]) -> str:
     """Draw the figures, wide and narrow, and write the page around them."""
+    from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import Record
     from d2rpick.report.trade_off_page import as_page, drawn
 
     request = card_request(run, options, found.situation.history)
-    return as_page(found, Record(run, shared.repeat(), shared.judging(options), drawn(found), request))
+    pair, judging = found.suggestion.recommended, shared.judging(options)
+    card = input_for(found.suggestion.situation, pair.tr, request) if pair else None
+    return as_page(found, Record(run, shared.repeat(), judging, drawn(found), card, explorer=explorer_of([found])))

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.library import arguments
-from d2rpick.library.answers import page_record, selection_for, written
+from d2rpick.library.answers import explorer_of, page_record, selection_for, written
 from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import command_line
+from d2rpick.library.repeat import asking, command_line
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -40,6 +40,7 @@ class Exploration:
     step: Offer | None = field(repr=False)
     warnings: tuple[Caution, ...]
     command: tuple[str, ...] = field(repr=False)
+    _asking: tuple[str, ...] = field(repr=False)
     _core: TradeOff = field(repr=False)
 
     @property
@@ -82,9 +83,13 @@ class Exploration:
 
     def report(self, path: arguments.Path) -> Path:
         """Write the answer to one HTML page that needs no network; an existing file is replaced."""
+        from d2rpick.choice.judged_card import CardRequest, input_for
         from d2rpick.report.trade_off_page import as_page, drawn
 
-        return written(path, as_page(self._core, page_record(self.run, self.command, drawn(self._core))))
+        core = self._core
+        pair, explorer = core.suggestion.recommended, explorer_of([core], self._asking)
+        card = input_for(core.suggestion.situation, pair.tr, CardRequest()) if pair else None
+        return written(path, as_page(core, page_record(self.run, self.command, drawn(core), card, explorer)))
 
 
 def explore(
@@ -149,5 +154,6 @@ def explore(
         step=core.step,
         warnings=core.cautions,
         command=command_line("explore", (*times, "--steps", str(count)), run, selection, choosing),
+        _asking=asking(run, selection, choosing),
         _core=core,
     )

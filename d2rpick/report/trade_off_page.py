@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from d2rpick.report import page, suggestion_page
+from d2rpick.report.explorer import explorer
 from d2rpick.report.html import drawings, remarks, section, table, tag
 from d2rpick.report.trade_off import HEAD, answer, rows
 
@@ -29,12 +30,14 @@ def drawn(found: TradeOff) -> dict[str, tuple[str, str]]:
 
 def as_page(found: TradeOff, record: page.Record) -> str:
     """Write the page."""
-    return page.run_page(record.run, _sections(found, record))
+    return page.run_page(record.run, _sections(found, record), record.explorer)
 
 
 def _sections(found: TradeOff, record: page.Record) -> Iterator[Markup]:
     yield suggestion_page.choice(found.suggestion)
     yield tag("section", tag("p", answer(found)), remarks(found.cautions))
+    if record.explorer:
+        yield explorer(record.explorer)
     yield drawings(record.figures)
     best = [one for one in found.offers if one.unbeaten]
     marked = next((i for i, one in enumerate(best) if one.recommended), None)
