@@ -120,7 +120,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
         start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
-    health = assess(balance, window, locked)
+    health = assess(balance, window, locked, td)
     return answer._replace(health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
 
 

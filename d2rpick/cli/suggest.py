@@ -49,6 +49,7 @@ Examples:
 @shared.history_options
 @shared.choosing_options
 @card_options
+@shared.MIN_QUALITY
 @shared.output_options(*FORMATS["suggestion"], "card")
 @click.pass_context
 def command(
@@ -57,6 +58,7 @@ def command(
     td: float | None,
     td_window: tuple[float, float] | None,
     limit: int,
+    min_quality: str | None,
     output_format: str,
     exit_zero: bool,
     **options: Any,
@@ -90,11 +92,13 @@ def command(
         output.write(extras.plot, figures.render(figures_choice.draw_suggestion(answer), extras.plot))
     if extras.report:
         output.write(extras.report, text_bytes(with_options(_page(answer, reference, options))))
+    poor = shared.falls_short(answer.quality, min_quality)
     if output_format == "card":
-        return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
+        passed = _card(answer, run, options, output)
+        return finish(ctx, objection=not passed or poor, exit_zero=exit_zero)
     text = write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit))
     output.result(in_words(text, output_format))
-    return finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
+    return finish(ctx, objection=answer.recommended is None or poor, exit_zero=exit_zero)
 
 
 def _only_in_environment(ctx: click.Context, option: str, *, overruled_by: str) -> bool:

@@ -56,11 +56,12 @@ class _Verify(click.Command):
 @shared.history_options
 @shared.choosing_options
 @card_options
+@shared.MIN_QUALITY
 @shared.output_options(*FORMATS["verdict"])
 @click.pass_context
 def command(
-    ctx: click.Context, /, tr: float, td: float, switched: tuple[str, ...], output_format: str, exit_zero: bool,
-    **options: Any,
+    ctx: click.Context, /, tr: float, td: float, switched: tuple[str, ...], min_quality: str | None, output_format: str,
+    exit_zero: bool, **options: Any,
 ) -> None:  # fmt: skip
     """Judge one pair of switch times against the HISTORY of a run without switching."""
     from d2rpick.choice.of_run import Reference, compare_with, verify_of
@@ -86,7 +87,8 @@ def command(
         output.write(extras.report, text_bytes(with_options(_page(answer, reference, other, options))))
     text = write("verdict", output_format, answer, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))
-    finish(ctx, objection=not answer.verified, exit_zero=exit_zero)
+    poor = not answer.verified or shared.falls_short(answer.quality, min_quality)
+    finish(ctx, objection=poor, exit_zero=exit_zero)
 
 
 def _page(answer: Verdict, reference: Reference, switched: Run | None, options: dict[str, Any]) -> str:

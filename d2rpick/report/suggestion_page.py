@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from d2rpick.report import page
 from d2rpick.report.explorer import explorer
 from d2rpick.report.html import Markup, drawings, pairs, remarks, section, table, tag
-from d2rpick.report.suggestion import HEAD, outlook, rows
+from d2rpick.report.suggestion import HEAD, headline, outlook, rows
 from d2rpick.report.tables import known
 
 if TYPE_CHECKING:
@@ -70,12 +70,10 @@ def _recommended(answer: Suggestion) -> Markup:
     if pair is None or quality is None:
         nothing = tag("p", "No tr can be recommended for this td.")
         return tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")
-    poor = quality.grade == "poor"
-    title = "Best of a bad td" if poor else "Recommended"
     told = ["; ".join(quality.reasons)] * bool(quality.reasons) + [page.left_over(pair.residual, answer.expected)]
     told[0] = f"{quality.grade}: {told[0]}"
-    class_ = "card refused" if poor else "card chosen"
-    return page.pair(title, (pair.tr, pair.td), told, answer.situation.history, class_)
+    class_ = "card refused" if quality.grade == "poor" else "card chosen"
+    return page.pair(headline(answer).capitalize(), (pair.tr, pair.td), told, answer.situation.history, class_)
 
 
 def _candidates(answer: Suggestion) -> Iterator[Markup]:
