@@ -48,10 +48,11 @@
       below: (chart) => band(chart, "flight", ...flight.flight),
       above: (chart) => {
         mark(chart, "good", 1, (context, at, _, box) => {
-          const columns = 4 * row.windows.length, width = (at(flight.view[1]) - at(flight.view[0])) / columns;
-          for (let i = 0; i < columns; i += 1) {
-            const marked = parseInt(row.windows[i >> 2], 16) & (8 >> (i & 3));
-            if (marked) context.fillRect(at(flight.view[0]) + i * width, box.top + 0.95 * box.height, width, 0.05 * box.height);
+          const columns = 4 * row.windows.length, left = at(flight.view[0]), width = (at(flight.view[1]) - left) / columns;
+          const marked = (i) => i < columns && (parseInt(row.windows[i >> 2], 16) & (8 >> (i & 3))) !== 0;
+          for (let from = 0, to = 0; from < columns; from = to + 1) {
+            for (to = from; marked(to); to += 1);
+            context.fillRect(left + from * width, box.top + 0.95 * box.height, (to - from) * width, 0.05 * box.height);
           }
         });
         mark(chart, "switched", 1.5, (context, _, height, box) => {

@@ -65,5 +65,5 @@ def _sections(
 
 def _window(row: Planned, plan: Plan) -> Markup:
     assert row.window is not None
-    told = [quality(row) or ""]
+    told = tag("p", f"{quality(row)}; {page.rigid_for(row.window, plan.history)}")
     return page.pair(f"Flight {row.number}", row.window, told, plan.history, "card chosen")
