@@ -73,6 +73,11 @@ class Drift:
         inside = (tr >= self.time[0]) & (tr <= self.time[-1]) & (self.time[0] <= td <= self.time[-1])
         return np.where(inside, np.linalg.norm(there[:-1] - there[-1], axis=1), np.nan)
 
+    @property
+    def name(self) -> str:
+        """Title of the part, or its number."""
+        return self.part.title or f"part {self.part.id}"
+
     @cached_property
     def limit(self) -> float:
         """From which error on the body is out of place [length]."""

@@ -79,6 +79,10 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     if best and best.run_time_share is not None:
         rigid = f"rigid for {best.rigid_fraction:.0%} of the record"
         lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's, {rigid}"))
+    if best and best.position_error is not None:
+        lines.append(
+            ("position", f"off by {best.position_error:.2g} at td: {best.position_error_part} is frozen elsewhere")
+        )
     if answer.longer and answer.recommended:
         lines.append(("longer", given_up(answer.longer, answer.recommended)))
     expected = answer.expected
