@@ -213,7 +213,7 @@ def drift_in_flight(history: History, flight: Flight, parts: Sequence[Part] | No
         return None
     flying = {part.id for part in flight.parts}
     wanted = {momenta.parts[i].id for i in momenta.chosen} if parts is None else {part.id for part in parts}
-    members = [i for i, part in enumerate(momenta.parts) if part.id in flying & wanted]
+    members = [i for i in momenta.moving if momenta.parts[i].id in flying & wanted]  # the ground does not fly
     start, end = (
         bound if seen is None else seen for bound, seen in zip(momenta.time[[0, -1]], flight[:2], strict=True)
     )
