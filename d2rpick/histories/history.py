@@ -184,7 +184,8 @@ class History:
 
     ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.
     Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
-    in them was taken for the energy, ``parts`` whose energy it is, None for the whole model.  ``complete``
+    in them was taken for the energy, ``parts`` whose energy it is, None for the whole model;
+    ``springs`` are those of them whose energy is left out.  ``complete``
     is False when a file stopped inside a state; ``notes`` say in plain sentences what was left out or assumed.
     ``files`` are the contents that were read.
     Where the energy is a sum, ``part_names`` (k,) and ``part_energies`` (n, k) are its terms that are not always zero.
@@ -198,6 +199,7 @@ class History:
     format: str
     channel: str
     parts: tuple[Part, ...] | None = None
+    springs: tuple[Part, ...] = ()
     time_precision: Precision = EXACT
     energy_precision: Precision = EXACT
     time_unit: str = ""
