@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -263,8 +262,7 @@ def _channels(given: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
     return tuple(pairs)
 
 
-@dataclass(frozen=True)
-class Reading:
+class Reading(NamedTuple):
     """What is read, and how: the options of ``history_options``."""
 
     names: tuple[str, ...]
@@ -284,8 +282,7 @@ class Reading:
         return open_run(self.names, self.selection, self.input_format)
 
 
-@dataclass(frozen=True)
-class Extras:
+class Extras(NamedTuple):
     """What is written beside the result: a figure, and a page with the options that judge by the same history."""
 
     plot: str | None
