@@ -121,6 +121,11 @@ _FLYING = click.option(
 
 # What of them says how to read a history and how to judge by it.
 _JUDGING = ("input_format", "time", "energy", "flying", "channel", "after", "margin", "tolerance")
+# What of the options of ``suggest`` a td is judged by.
+_ASKING = (
+    *("part", *_JUDGING, "max_kinetic_share", "max_residual", "stiffness", "mass", "frame_mass", "beta", "alpha", "v0"),
+    *("fit_window", "no_verify", "strict", "cost_share", "step_ratio"),
+)
 
 
 def history_options(function: Decorated) -> Decorated:
@@ -316,6 +321,28 @@ def judging(options: dict[str, Any]) -> list[str]:
     given = [name for name in names if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT]
     pairs = [(name, value) for name in ("history", *given) for value in _each(options[name])]
     return [text for name, value in pairs for text in (f"--{_dashed(name)}", str(value))]
+
+
+def asking() -> tuple[list[str], list[str]]:
+    """Give the command line that asks for the pair of a td by the same history, in front of td and behind it."""
+    context = click.get_current_context()
+    given = [
+        text
+        for option in context.command.params
+        if option.name in _ASKING
+        and context.get_parameter_source(option.name) is not click.core.ParameterSource.DEFAULT
+        for text in _typed(option, context.params[option.name])
+    ]
+    return ["d2rpick", "suggest", "--td"], [*given, *context.params["history"]]
+
+
+def _typed(option: click.Parameter, value: Any) -> list[str]:
+    """Write an option with its value as it would be typed."""
+    name = max(option.opts, key=len)
+    if value is True:
+        return [name]
+    given = value if option.multiple else [value]
+    return [text for one in given for text in (name, *map(str, _each(one)))]
 
 
 def repeat() -> list[str]:

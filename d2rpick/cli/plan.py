@@ -9,18 +9,16 @@ import click
 from d2rpick.cli import options as shared
 from d2rpick.cli import plan_deck
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
+from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.verify import Verdict
-    from d2rpick.choice.warnings import Caution
     from d2rpick.deck.printing.common import PrintedCard
 
 EXAMPLES = """\b
@@ -44,7 +42,8 @@ Examples:
 )
 @click.option(
     "--done", metavar="FILE", type=shared.FILE,
-    help="Windows in which HISTORY was switched, a line 'tr td' for each as -f value prints them: plan those after.",
+    help="Windows in which HISTORY was switched, a line 'tr td' for each: plan those after.  -f value, -f card and "
+    "--write-deck hold both, as the next run needs them.",
 )  # fmt: skip
 @click.option(
     "--before", metavar="HISTORY", multiple=True, type=shared.FILE,
@@ -81,12 +80,12 @@ def command(
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
-        output = Output.of(options, *run.sources, *([done] if done else []), *before)
+        output = Output.of(options, *run.sources, *(name for name in (done, *before) if name not in (None, "-")))
         reference = Reference(run, energy_of(run, options, prints=prints))
         earlier = reference.like(asked._replace(names=before).open(), asked.selection) if before else None
     windows = _windows(done) if done else ()
     plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
-    output.notes(reference.history.notes, [*plan.cautions, *_of_done(done if prints else None)])
+    output.notes(reference.history.notes, plan.cautions)
     _beside(plan, reference, options, output)
     checked, passed = _deck(plan, reference, options, every=every) if options["deck"] else ("", True)
     if checked and output_format != "table":
@@ -97,17 +96,6 @@ def command(
     text = write("plan", output_format, plan, Shown(ctx.meta["d2rpick.command"], every=every))
     output.result(f"{text}\n\n{checked}" if checked and output_format == "table" else text)
     return finish(ctx, objection=not (plan.supported and passed), exit_zero=exit_zero)
-
-
-def _of_done(name: str | None) -> Iterator[Caution]:
-    """Say that cards of the next windows alone do not make the run that was planned."""
-    from d2rpick.choice.warnings import Caution
-
-    if name is not None:
-        found = f"the cards hold the new windows only, not those of {name}"
-        yield Caution(
-            "done-windows-not-printed", f"{found}; keep both in the deck, else the parts are deformable there"
-        )
 
 
 def _check_usage(form: str, options: dict[str, Any], *, every: bool, done: str | None, before: tuple[str, ...]) -> None:
@@ -138,11 +126,13 @@ def _beside(plan: Plan, reference: Reference, options: dict[str, Any], output: O
 
         output.write(options["plot"], figures.render(draw_plan(plan), options["plot"]))
     if options["report"]:
+        from d2rpick.choice.explored import explored_flights
         from d2rpick.report.plan_page import as_page
 
         found = _judged(plan, reference, options, every=False)
         card = found[0].text if found else None
-        output.write(options["report"], text_bytes(as_page(plan, reference.run, shared.repeat(), card)))
+        explorer = explorer_of(explored_flights(reference, plan))
+        output.write(options["report"], text_bytes(as_page(plan, reference.run, shared.repeat(), card, explorer)))
 
 
 def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool) -> tuple[str, bool]:
@@ -152,7 +142,7 @@ def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: b
     found = _judged(plan, reference, options, every=every)
     if found is None:
         raise click.UsageError(need_ids(card_request(reference.run, options, plan.history), plan.history))
-    return plan_deck.write_and_check(found[0], reference.run, plan.settings, options)
+    return plan_deck.write_and_check(found[0], plan, reference.run, options)
 
 
 def _card(plan: Plan, reference: Reference, options: dict[str, Any], output: Output, *, every: bool) -> bool:
@@ -172,14 +162,9 @@ def _card(plan: Plan, reference: Reference, options: dict[str, Any], output: Out
 def _judged(
     plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool
 ) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
-    """Write the cards and judge them as printed; None without a window, or where nobody says whom to switch."""
-    from functools import partial
+    """Write the cards of the next run and judge them; None without a new window, or nobody to switch."""
+    from d2rpick.choice.judged_card import card_of_plan
 
-    from d2rpick.choice.judged_card import judged_card
-    from d2rpick.choice.of_run import verify_of
-
-    windows = plan.windows(every=every)
-    if not windows:
+    if not plan.windows(every=every):
         return None
-    judge = partial(verify_of, reference._replace(history=plan.history), settings=plan.settings)
-    return judged_card(windows, plan.history, judge, card_request(reference.run, options, plan.history))
+    return card_of_plan(plan, reference.run, card_request(reference.run, options, plan.history), every=every)

@@ -9,7 +9,7 @@ import click
 from d2rpick.cli import options as shared
 
 if TYPE_CHECKING:
-    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.plan import Plan
     from d2rpick.deck.printing.common import PrintedCard
     from d2rpick.histories.opening import Run
 
@@ -51,7 +51,7 @@ def for_deck(options: dict[str, Any]) -> dict[str, Any]:
     return {**options, "solver": options["solver"] or "radioss", "name": name}
 
 
-def write_and_check(card: PrintedCard, run: Run, settings: Settings, options: dict[str, Any]) -> tuple[str, bool]:
+def write_and_check(card: PrintedCard, plan: Plan, run: Run, options: dict[str, Any]) -> tuple[str, bool]:
     """Write the copy, and check it by the history.
 
     Returns
@@ -61,17 +61,16 @@ def write_and_check(card: PrintedCard, run: Run, settings: Settings, options: di
     passed : bool
         Whether no finding is an error.
     """
-    from pathlib import Path
-
     from d2rpick.deck.writing import write_deck
-    from d2rpick.report import findings
+    from d2rpick.report.findings import Checks, as_table
     from d2rpick.rules import Severity, check_deck, configuration_for
     from d2rpick.rules.configuration import Configuration
     from d2rpick.rules.judgement import HistoryJudge
 
     written = write_deck(options["deck"], card, options["write_deck"], overwrite=options["overwrite"])
-    judge = HistoryJudge(run, shared.selection({**options, "part": ()}), settings)
+    done = card.windows[: len(plan.done)]  # as printed
+    judge = HistoryJudge(run, shared.selection({**options, "part": ()}), plan.settings, done)
     checked = check_deck(written[0], configuration_for(written[0], Configuration()), judge)
     listed = [f"written  {name}" for name in written]
-    text = "\n".join([*listed, "", findings.as_table([checked], Path.cwd(), [])])
+    text = "\n".join([*listed, "", as_table(Checks([checked]))])
     return text, all(one.severity is not Severity.ERROR for one in checked.findings)

@@ -8,12 +8,14 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
+from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.cli.wording import in_words, with_options
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
+    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.opening import Run
 
@@ -83,11 +85,11 @@ def command(
     answer = suggest_of(reference, td_window if td is None else td, settings)
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
-        from d2rpick.report import figures
+        from d2rpick.report import figures, figures_choice
 
-        output.write(extras.plot, figures.render(figures.draw_suggestion(answer), extras.plot))
+        output.write(extras.plot, figures.render(figures_choice.draw_suggestion(answer), extras.plot))
     if extras.report:
-        output.write(extras.report, text_bytes(with_options(_page(answer, run, options))))
+        output.write(extras.report, text_bytes(with_options(_page(answer, reference, options))))
     if output_format == "card":
         return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
     text = write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit))
@@ -111,13 +113,19 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
         raise click.UsageError("-f card needs --part, the parts to switch (Radioss: --node, their main nodes)")
 
 
-def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
-    """Draw the figures, wide and narrow, and write the page around them."""
+def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> str:
+    """Draw the figures, wide and narrow, explore the flight, and write the page around them."""
+    from d2rpick.choice.explored import explored_around
+    from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import Record
     from d2rpick.report.suggestion_page import as_page, drawn
 
-    request = card_request(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), request))
+    run = reference.run
+    request, pair = card_request(run, options, answer.situation.history), answer.recommended
+    card = input_for(answer.situation, pair.tr, request) if pair else None
+    explorer = explorer_of([explored_around(reference, answer.situation, answer.td_window)])
+    judging = shared.judging(options)
+    return as_page(answer, Record(run, shared.repeat(), judging, drawn(answer), card, explorer=explorer))
 
 
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:

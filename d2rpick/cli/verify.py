@@ -8,12 +8,14 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
+from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.cli.wording import in_words, with_options
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
+    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.verify import Verdict
     from d2rpick.histories.opening import Run
 
@@ -76,20 +78,26 @@ def command(
             answer = compare_with(answer, reference, reference.like(other, finished.selection))
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
-        from d2rpick.report import figures
+        from d2rpick.report import figures, figures_choice
 
-        output.write(extras.plot, figures.render(figures.draw_verdict(answer), extras.plot))
+        output.write(extras.plot, figures.render(figures_choice.draw_verdict(answer), extras.plot))
     if extras.report:
-        output.write(extras.report, text_bytes(with_options(_page(answer, run, other, options))))
+        output.write(extras.report, text_bytes(with_options(_page(answer, reference, other, options))))
     text = write("verdict", output_format, answer, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))
     finish(ctx, objection=not answer.verified, exit_zero=exit_zero)
 
 
-def _page(answer: Verdict, run: Run, switched: Run | None, options: dict[str, Any]) -> str:
-    """Draw the figure, wide and narrow, and write the page around it."""
+def _page(answer: Verdict, reference: Reference, switched: Run | None, options: dict[str, Any]) -> str:
+    """Draw the figure, wide and narrow, explore the flight, and write the page around it."""
+    from d2rpick.choice.explored import explored_around
+    from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import Record
     from d2rpick.report.verdict_page import as_page, drawn
 
+    run = reference.run
     request = card_request(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), request, switched))
+    card = input_for(answer.situation, answer.candidate.tr, request) if answer.verified else None
+    explorer = explorer_of([explored_around(reference, answer.situation)])
+    judging = shared.judging(options)
+    return as_page(answer, Record(run, shared.repeat(), judging, drawn(answer), card, switched, explorer))

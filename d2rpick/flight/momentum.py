@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, Remembered, all_windows, lasting_window
-from d2rpick.histories.samples import integral
+from d2rpick.histories.samples import bent, integral
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -147,17 +147,9 @@ class FreeFall:
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
         """What is not straight of momentum and impulse, and the alpha >= 0 that explains the one by the other."""
         states = slice(first, last + 1)
-        p, impulse = np.hsplit(_bent(self.time[states], self._both[states]), 2)
+        p, impulse = np.hsplit(bent(self.time[states], self._both[states]), 2)
         power = float(np.sum(impulse**2))
         return p, impulse, max(0.0, -float(np.sum(impulse * p)) / power) if power > 0 else 0.0
-
-
-def _bent(time: Samples, values: Samples) -> Samples:
-    """Give what is left of each column after a straight line."""
-    t = time - time.sum() / time.size
-    centred = values - values.sum(axis=0) / time.size
-    centred -= t[:, np.newaxis] * (t @ centred / (t @ t))
-    return np.asarray(centred)
 
 
 def _sets(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
@@ -178,8 +170,8 @@ def _attached(momenta: Momenta, chosen: Sequence[int], moving: Sequence[int], td
     look = np.flatnonzero(back)[:: max(1, int(back.sum()) // _LOOK_STATES)]
     if look.size < FEWEST:
         return
-    bent = _bent(time[look], momenta.values[look].reshape(look.size, -1))
-    rests = bent.reshape(look.size, -1, 3).transpose(1, 0, 2).reshape(momenta.values.shape[1], -1)
+    rests = bent(time[look], momenta.values[look].reshape(look.size, -1))
+    rests = rests.reshape(look.size, -1, 3).transpose(1, 0, 2).reshape(momenta.values.shape[1], -1)
     total = rests[list(chosen)].sum(axis=0)
     left = [i for i in moving if i not in chosen]
     for _ in range(min(_MOST_ATTACHED, len(left))):

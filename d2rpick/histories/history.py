@@ -151,7 +151,7 @@ class Balance:
     precision: Precision = EXACT
 
 
-class Evidence(Protocol):
+class FlightEvidence(Protocol):
     """What tells when the parts fly, beside their energy."""
 
     @property
@@ -159,15 +159,20 @@ class Evidence(Protocol):
         """Momenta of the parts, then of the whole model, as far as they are written."""
 
     @property
+    def masses(self) -> Samples | None:
+        """Masses of the parts whose momenta are known, in their order, NaN where unknown; None where none are."""
+
+    @property
     def balance(self) -> Balance | None:
         """Energies of the whole model; None where none are written beside the internal energy."""
 
 
 class Given(NamedTuple):
-    """Evidence at hand."""
+    """Evidence of the flight at hand."""
 
     momenta: tuple[Momenta, ...] = ()
     balance: Balance | None = None
+    masses: Samples | None = None
 
 
 NO_EVIDENCE = Given()
@@ -198,7 +203,7 @@ class History:
     time_unit: str = ""
     part_names: tuple[str, ...] = ()
     part_energies: Samples | None = None
-    evidence: Evidence = NO_EVIDENCE
+    evidence: FlightEvidence = NO_EVIDENCE
     complete: bool = True
     notes: tuple[str, ...] = ()
     files: tuple[Source, ...] = ()
@@ -234,6 +239,11 @@ class History:
     def momenta(self) -> tuple[Momenta, ...]:
         """Momenta of the parts, then of the whole model, as far as they are known."""
         return self.evidence.momenta
+
+    @property
+    def masses(self) -> Samples | None:
+        """Masses of the parts whose momenta are known, NaN where unknown; None where none are known [mass]."""
+        return self.evidence.masses
 
     @property
     def balance(self) -> Balance | None:

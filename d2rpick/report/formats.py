@@ -42,11 +42,30 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         "value": lambda report, answer, _: report.as_value(answer),
     },
     "plan": {**_PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
+    "trade_off": {
+        **_PLAIN,
+        "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
+        "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
+    },
     "verdict": _PLAIN,
     "overview": _PLAIN,
     "study": {
         **_PLAIN,
         "ndjson": lambda report, answer, shown: "\n".join([*shown.lines, report.as_last_line(answer, shown.command)]),
+    },
+    "reproduction": {**_PLAIN, "csv": lambda report, answer, _: report.as_csv(answer.rows)},
+    "rollover": {
+        **_PLAIN,
+        "markdown": lambda report, answer, _: report.as_markdown(answer.outcomes),
+        "csv": lambda report, answer, _: report.as_csv(answer.outcomes),
+    },
+    "findings": {
+        "table": lambda report, answer, _: report.as_table(answer),
+        "json": lambda report, answer, shown: report.as_json(answer, shown.command),
+        "ndjson": lambda report, answer, shown: report.as_ndjson(answer, shown.command),
+        "github": lambda report, answer, _: report.as_github(answer),
+        "junit": lambda report, answer, _: report.as_junit(answer),
+        "sarif": lambda report, answer, _: report.as_sarif(answer),
     },
 }
 

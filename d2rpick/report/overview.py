@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.health import cautions_of_health
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.health import HEAD as HEALTH_HEAD
@@ -15,18 +14,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.overview import Overview
-    from d2rpick.choice.warnings import Caution
     from d2rpick.flight.window import FreeFlight
 
 SCHEMA = "d2rpick/info/1"
 _PARTS_HEAD = ("part", "title", "highest internal energy")
 # Keys of the JSON output with a single value.
 _PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "time_unit", "complete")
-
-
-def cautions(overview: Overview) -> tuple[Caution, ...]:
-    """What to know of the health of the run."""
-    return tuple(cautions_of_health(overview.health)) if overview.health else ()
 
 
 def as_table(overview: Overview) -> str:
@@ -73,7 +66,7 @@ def as_json(overview: Overview, command: Sequence[str]) -> str:
             "schema": SCHEMA,
             "tool_version": __version__,
             "command": list(command),
-            "warnings": keys.of_warnings(cautions(overview)),
+            "warnings": keys.of_warnings(overview.cautions),
             "source": overview.source,
             "format": overview.format,
             "version": overview.version,

@@ -61,7 +61,12 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
             "acceptable_windows": None
             if answer.windows is None
             else [
-                {"start": w.start, "end": w.end, "share": w.share, "recommended": holds(w, recommended)}
+                {
+                    "start": w.start,
+                    "end": w.end,
+                    "share": w.share,
+                    "recommended": holds(w, recommended.tr if recommended else None),
+                }
                 for w in answer.windows
             ],
             "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
@@ -74,7 +79,8 @@ def as_json(answer: Suggestion, command: Sequence[str]) -> str:
 
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     """What can be expected of the recommended pair, a name and a sentence each."""
-    lines = [("acceptable", acceptable(answer))] if answer.windows else []
+    chosen = answer.recommended.tr if answer.recommended else None
+    lines = [("acceptable", acceptable(answer.windows, chosen))] if answer.windows else []
     best = answer.chosen
     if best and best.run_time_share is not None:
         rigid = f"rigid for {best.rigid_fraction:.0%} of the record"
@@ -101,19 +107,18 @@ def given_up(longer: Pair, chosen: Pair) -> str:
     return f"{times}, with {what}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
 
 
-def acceptable(answer: Suggestion) -> str:
+def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
     """The windows of acceptable tr: the one with the recommended tr, the longest others, and what they share."""
-    windows, pair = answer.windows or (), answer.recommended
-    named = sorted(windows, key=lambda one: (not holds(one, pair), one.start - one.end))[:_NAMED]
+    named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[:_NAMED]
     share = sum(one.share for one in windows)
-    shown = [f"{w.start:.6g} to {w.end:.6g} ({w.share:.1%}{', recommended' * holds(w, pair)})" for w in named]
+    shown = [f"{w.start:.6g} to {w.end:.6g} ({w.share:.1%}{', recommended' * holds(w, tr)})" for w in named]
     more = f" and {len(windows) - len(named)} shorter windows" if len(windows) > len(named) else ""
     return f"every tr from {'; '.join(shown)}{more}; in all {share:.0%} of the flight up to td"
 
 
-def holds(window: AcceptableWindow, pair: Pair | None) -> bool:
+def holds(window: AcceptableWindow, tr: float | None) -> bool:
     """Whether the recommended tr lies in a window."""
-    return pair is not None and window.start <= pair.tr <= window.end
+    return tr is not None and window.start <= tr <= window.end
 
 
 def as_value(answer: Suggestion) -> str:

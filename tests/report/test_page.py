@@ -13,18 +13,22 @@ import sys
 from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROOT, run
 from tests.shared import shared
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
 NASTY = '<script>alert("1")</script>&<b>'
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 QUIET = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking"]
 LEGS = ("rollover_referenceT01.gz", "rollover_r100_T01.gz", "rollover_r100_T02.gz", "rollover_r100_T03.gz")
-VOID = {"meta", "br", "hr", "link"}
+VOID = {"meta", "br", "hr", "link", "input"}
 
 
 class Page(HTMLParser):
@@ -68,6 +72,14 @@ def page_of(folder: Path, *args: str, command: str = "suggest", code: int = 0, s
     assert result.exit_code == code, result.stderr
     assert not result.stderr
     return Page((folder / "report.html").read_text("utf-8"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_steps() -> Iterator[None]:
+    """Explore few td: what a page shows of each is the same."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("d2rpick.choice.explored.STEPS", 8)
+        yield
 
 
 @pytest.fixture(scope="module")
