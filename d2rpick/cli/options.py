@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from functools import wraps
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -222,8 +221,7 @@ def _channels(given: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
     return tuple(pairs)
 
 
-@dataclass(frozen=True)
-class Reading:
+class Reading(NamedTuple):
     """What is read, and how: the options of ``history_options``."""
 
     names: tuple[str, ...]
@@ -243,8 +241,7 @@ class Reading:
         return open_run(self.names, self.selection, self.input_format)
 
 
-@dataclass(frozen=True)
-class Extras:
+class Extras(NamedTuple):
     """What is written beside the result: a figure, and a page with the options that judge by the same history."""
 
     plot: str | None

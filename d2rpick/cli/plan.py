@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -83,7 +82,7 @@ def command(
         run = asked.open()
         output = Output.of(options, *run.sources, *(name for name in (done, *before) if name not in (None, "-")))
         reference = Reference(run, energy_of(run, options, prints=prints))
-        earlier = reference.like(replace(asked, names=before).open(), asked.selection) if before else None
+        earlier = reference.like(asked._replace(names=before).open(), asked.selection) if before else None
     windows = _windows(done) if done else ()
     plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
     output.notes(reference.history.notes, plan.cautions)

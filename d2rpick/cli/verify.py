@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -69,7 +68,7 @@ def command(
     prints = prints_card(options, output_format)
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
     extras = shared.Extras.of(options)
-    finished = replace(shared.Reading.of(options), names=switched) if switched else None
+    finished = shared.Reading.of(options)._replace(names=switched) if switched else None
     with reading(asked.names, quiet=asked.quiet):
         run, other = asked.open(), finished.open() if finished else None
         output = Output.of(options, *run.sources, *(other.sources if other else ()))

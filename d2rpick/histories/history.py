@@ -223,7 +223,7 @@ class History:
                 raise HistoryError(
                     f"{where}: {name} of state {bad[0] + 1} is {values[bad[0]]}, a finite number was expected"
                 )
-        if np.any(np.diff(time) <= 0):
+        if np.any(time[1:] <= time[:-1]):
             state = int(np.argmax(np.diff(time) <= 0)) + 1
             raise HistoryError(f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}")
         if self.part_energies is not None:
@@ -356,6 +356,13 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
 
 
 def _frozen(values: ArrayLike) -> Samples:
+    """Copy what could change."""
+    if (
+        isinstance(values, np.ndarray)
+        and values.dtype == np.float64
+        and not (values.flags.writeable or values.base is not None)
+    ):
+        return values
     copy = np.array(values, dtype=np.float64)
     copy.flags.writeable = False
     return copy

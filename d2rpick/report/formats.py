@@ -5,9 +5,8 @@ A result is a module of this folder, imported when it is written: ``--help`` lis
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -15,8 +14,7 @@ if TYPE_CHECKING:
     Writer = Callable[[Any, Any, "Shown"], str]
 
 
-@dataclass(frozen=True)
-class Shown:
+class Shown(NamedTuple):
     """What a form may show beside the answer: the command that was given, how many rows, lines written before.
 
     ``every``: all windows of a plan, not only the supported ones.
