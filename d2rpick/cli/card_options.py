@@ -27,7 +27,7 @@ _MOST_IDS: Final = 100_000
 _NAMES: Final = ("node", "merge", "swset", "step_cap", "end", "name")
 
 
-class Solver(click.types.StringParamType):
+class SolverName(click.types.StringParamType):
     """Name of a solver whose input can be printed; the table of solvers is read when it is asked."""
 
     name = "solver"
@@ -59,7 +59,7 @@ def card_options(function: shared.Decorated) -> shared.Decorated:
     """How a card is printed; collected by ``card_request``."""
     options = (
         click.option(
-            "--solver", type=Solver(),
+            "--solver", type=SolverName(),
             help="Solver whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]",
         ),
         click.option(

@@ -61,10 +61,8 @@ def write_and_check(card: PrintedCard, run: Run, settings: Settings, options: di
     passed : bool
         Whether no finding is an error.
     """
-    from pathlib import Path
-
     from d2rpick.deck.writing import write_deck
-    from d2rpick.report import findings
+    from d2rpick.report.findings import Checks, as_table
     from d2rpick.rules import Severity, check_deck, configuration_for
     from d2rpick.rules.configuration import Configuration
     from d2rpick.rules.judgement import HistoryJudge
@@ -73,5 +71,5 @@ def write_and_check(card: PrintedCard, run: Run, settings: Settings, options: di
     judge = HistoryJudge(run, shared.selection({**options, "part": ()}), settings)
     checked = check_deck(written[0], configuration_for(written[0], Configuration()), judge)
     listed = [f"written  {name}" for name in written]
-    text = "\n".join([*listed, "", findings.as_table([checked], Path.cwd(), [])])
+    text = "\n".join([*listed, "", as_table(Checks([checked]))])
     return text, all(one.severity is not Severity.ERROR for one in checked.findings)

@@ -151,7 +151,7 @@ class Balance:
     precision: Precision = EXACT
 
 
-class Evidence(Protocol):
+class FlightEvidence(Protocol):
     """What tells when the parts fly, beside their energy."""
 
     @property
@@ -164,7 +164,7 @@ class Evidence(Protocol):
 
 
 class Given(NamedTuple):
-    """Evidence at hand."""
+    """Evidence of the flight at hand."""
 
     momenta: tuple[Momenta, ...] = ()
     balance: Balance | None = None
@@ -198,7 +198,7 @@ class History:
     time_unit: str = ""
     part_names: tuple[str, ...] = ()
     part_energies: Samples | None = None
-    evidence: Evidence = NO_EVIDENCE
+    evidence: FlightEvidence = NO_EVIDENCE
     complete: bool = True
     notes: tuple[str, ...] = ()
     files: tuple[Source, ...] = ()

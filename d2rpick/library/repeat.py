@@ -31,6 +31,8 @@ def _selected(selection: Selection) -> Iterator[str]:
     for option, values in (("energy", selection.energy), ("part", selection.parts), ("flying", selection.flying)):
         for value in values:
             yield from (f"--{option}", value)
+    for quantity, channel in selection.channels:
+        yield from ("--channel", f"{quantity}={channel}")
 
 
 def _options(choosing: Choosing) -> Iterator[str]:

@@ -48,7 +48,7 @@ _SIZES = {False: (10.0, 4.0, 6.5), True: (4.2, 3.9, 6.6)}
 _LABEL = {False: 0.14, True: 0.3}
 
 
-def format_of(name: str) -> str:
+def picture_format(name: str) -> str:
     """Tell the format that the suffix of ``name`` asks for; FormatError unless it is png, svg or pdf."""
     form = PurePath(name).suffix.lower().lstrip(".")
     if form not in FORMATS:
@@ -58,7 +58,7 @@ def format_of(name: str) -> str:
 
 def render(figure: Figure, name: str) -> bytes:
     """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for, always the same."""
-    content, form = io.BytesIO(), format_of(name)
+    content, form = io.BytesIO(), picture_format(name)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
     with mpl.rc_context({"svg.hashsalt": "d2rpick"}), _any_letters():
         figure.savefig(content, format=form, dpi=150, metadata=undated)

@@ -50,6 +50,20 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         **_PLAIN,
         "ndjson": lambda report, answer, shown: "\n".join([*shown.lines, report.as_last_line(answer, shown.command)]),
     },
+    "reproduction": {**_PLAIN, "csv": lambda report, answer, _: report.as_csv(answer.rows)},
+    "rollover": {
+        **_PLAIN,
+        "markdown": lambda report, answer, _: report.as_markdown(answer.outcomes),
+        "csv": lambda report, answer, _: report.as_csv(answer.outcomes),
+    },
+    "findings": {
+        "table": lambda report, answer, _: report.as_table(answer),
+        "json": lambda report, answer, shown: report.as_json(answer, shown.command),
+        "ndjson": lambda report, answer, shown: report.as_ndjson(answer, shown.command),
+        "github": lambda report, answer, _: report.as_github(answer),
+        "junit": lambda report, answer, _: report.as_junit(answer),
+        "sarif": lambda report, answer, _: report.as_sarif(answer),
+    },
 }
 
 

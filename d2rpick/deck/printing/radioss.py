@@ -34,7 +34,7 @@ _SOLVER = (
 )
 
 
-class Leg(NamedTuple):
+class EngineFile(NamedTuple):
     """An engine run: its number, its end, and whether the bodies are rigid in it; ``cap`` is its largest step."""
 
     number: int
@@ -73,17 +73,17 @@ def cards(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] =
     return PrintedCard(text, windows, files)
 
 
-def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[Leg]:
+def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[EngineFile]:
     """Give the engine runs that the windows ask for; a window from 0 on needs none before it."""
     cap = step_cap or float(f"{min(td - tr for tr, td in windows) / _CAP_SHARE:.2g}")
     stops = [(time, rigid) for tr, td in windows for time, rigid in ((tr, False), (td, True)) if time > 0]
     if len(stops) >= _MOST_LEGS:
         raise DeckError(f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected")
     numbered = enumerate([*stops, (end, False)], start=1)
-    return [Leg(number, stop, rigid, cap if rigid else None) for number, (stop, rigid) in numbered]
+    return [EngineFile(number, stop, rigid, cap if rigid else None) for number, (stop, rigid) in numbered]
 
 
-def _engine(leg: Leg, name: str, listed: Sequence[str]) -> Iterator[str]:
+def _engine(leg: EngineFile, name: str, listed: Sequence[str]) -> Iterator[str]:
     yield f"/RUN/{name}/{leg.number}"
     yield f"{leg.stop!r:>20}"
     yield "/RBODY/ON" if leg.rigid else "/RBODY/OFF"
