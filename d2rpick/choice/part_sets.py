@@ -105,7 +105,7 @@ def parts_of(
     model: CostModel | None,
     *,
     given: Sequence[int] = (),
-    times: Times | None = None,
+    times: Times | float | None = None,
     printed: Mapping[int, tuple[float, str]] | None = None,
 ) -> Parts:
     """Judge every part of a run, and compare sets of them.
@@ -120,8 +120,9 @@ def parts_of(
         The deck with its cost; without it the cost and most verdicts stay open.
     given : sequence of int
         A set to be compared too.
-    times : (float, float), optional
-        tr and td of the comparison [time].  Default: td in the longest flight, for each set with the tr of ``suggest``.
+    times : (float, float) or float, optional
+        tr and td of the comparison, or td alone [time].  Default: td at the end of the longest flight, for each set
+        with the tr of ``suggest``.
     printed : mapping, optional
         Smallest steps by part that the solver printed, with their source.
 

@@ -90,13 +90,6 @@ class Run:
         return Momenta(holder.part_time, values, holder.parts, holder.precisions(())[1], ())
 
     @cached_property
-    def masses(self) -> Samples | None:
-        """TEMPORARY until merged."""
-        with suppress(FormatError):
-            return np.median(self._of_holder("mass", self.parts), axis=0)
-        return None
-
-    @cached_property
     def _whole_momentum(self) -> Momenta | None:
         """Momentum of the whole model, or its velocity, which is the same but for the mass; None if not written."""
         from d2rpick.histories.balance_terms import velocity_of

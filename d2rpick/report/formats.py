@@ -44,6 +44,7 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         "value": lambda report, answer, _: report.as_value(answer),
     },
     "plan": {**_PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
+    "parts": {**_PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
     "verdict": _PLAIN,
     "overview": _PLAIN,
     "study": {
