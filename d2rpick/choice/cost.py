@@ -62,6 +62,25 @@ class Weights:
             raise ConfigurationError(f"rigid_node is {self.rigid_node:g}, a number of at least 0 was expected")
 
 
+def saved_share(weights: Weights, total: float, rigid: float, nodes: int) -> float:
+    """Share of a step that is saved while elements of the cost ``rigid`` are off, c above [-]; at least 0.
+
+    Parameters
+    ----------
+    weights : Weights
+    total, rigid : float
+        Cost of all elements, and of those that are rigid, in the unit of the weights.
+    nodes : int
+        Of the rigid bodies.
+
+    Examples
+    --------
+    >>> saved_share(Weights({"BT": 1.0}, element_share=0.9, rigid_node=0.0), 100.0, 50.0, 60)
+    0.45
+    """
+    return max(0.0, (rigid - weights.rigid_node * nodes) * weights.element_share / total) if total else 0.0
+
+
 class Amount(NamedTuple):
     """Cost of some elements in the unit of the weights, and the formulations whose weight is not known."""
 
@@ -105,9 +124,8 @@ class CostModel:
         within = self.inventory.elements_within(parts)
         rigid = _sum(self._of(part, counts) for part, counts in within.items())
         total = self.total
-        bodies = self.weights.rigid_node * self.inventory.rigid_nodes(set(parts) - self._rigid)
-        saved = (rigid.cost - bodies) * self.weights.element_share / total.cost if total.cost else 0.0
-        return self._share(rigid, max(0.0, saved))
+        nodes = self.inventory.rigid_nodes(set(parts) - self._rigid)
+        return self._share(rigid, saved_share(self.weights, total.cost, rigid.cost, nodes))
 
     @property
     def assumed(self) -> tuple[str, ...]:

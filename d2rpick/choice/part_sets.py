@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+import numpy as np
+
 from d2rpick.choice.cost import CostModel, Share
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
 from d2rpick.choice.part_facts import facts_of
@@ -12,13 +14,13 @@ from d2rpick.choice.part_steps import steps_of
 from d2rpick.choice.part_verdicts import rows_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import FormatError, RangeError
+from d2rpick.flight.position_error import drift_of
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.part_facts import RunFacts
     from d2rpick.choice.part_steps import Steps
@@ -26,25 +28,25 @@ if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.switched_run import Times
     from d2rpick.deck.inventory.model import Inventory
-    from d2rpick.histories.history import Part
+    from d2rpick.histories.history import History, Part
     from d2rpick.histories.run import Run
 
-RECOMMENDED: Final = "recommended"
 # Savings that differ by less cannot be told apart: the cost model is right within some points.
 _LIKE: Final = 0.01
 # The heaviest parts that together have this share of the mass of all that may be switched.
 _HEAVY: Final = 0.5
+_SEVERAL: Final = "several rigid bodies: how far each is out of place is not predicted"
 _NO_ANGLE: Final = "no file of a run tells how its parts turn; the angle error is not known"
 
 
 @dataclass(frozen=True)
 class PartSet:
-    """A set of parts as one rigid body, what it saves and what it does; None with a word in ``reasons`` where unknown.
+    """A set of parts, what it saves and what it does; None with a word in ``reasons`` where unknown.
 
-    ``bodies`` are its parts by the nodes they share.  ``cost_share`` is what is saved of a step while it is rigid [-],
-    ``step_growth`` how much the step may grow then [-], infinite where nothing deformable keeps it; predictions take
-    that of the settings.  ``window`` is (tr, td) in the longest flight [time], ``rigid_fraction`` its share of the
-    record [-].
+    ``bodies`` are the rigid bodies that its parts make, ``cost_share`` is what they save of a step [-].
+    ``step_growth`` is how much the step may grow then [-], infinite where nothing deformable keeps it; predictions
+    take that of the settings.  ``window`` is (tr, td) in the longest flight [time], ``rigid_fraction`` its share of
+    the record [-].
     """
 
     name: str
@@ -134,10 +136,12 @@ def parts_of(
     inventory = model.inventory if model else None
     steps = steps_of(inventory, printed or {})
     rows = rows_of(facts, model, steps)
+    flight = None if facts.longest is None else facts.flights[facts.longest]
+    comparison = _Comparison(run, settings, model, rows, steps, flight)
     sets: list[PartSet] = []
     for one in _sets(rows, inventory, given):
         td = next((other.window[1] for other in sets if other.window), None)  # the same for all, to be compared
-        sets.append(_compared(one, run, settings, model, rows, steps, times or td))
+        sets.append(comparison.of(one, times or td))
     found = tuple(_with_recommendation(sets))
     cautions = tuple(_cautions(facts, model, rows, found))
     return Parts(run, inventory, model.weights if model else None, settings, facts, rows, found, cautions)
@@ -194,70 +198,82 @@ def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
     return [row for row in movable if row.id in found]
 
 
-def _compared(
-    one: PartSet, run: Run, settings: Settings, model: CostModel | None, rows: Sequence[PartRow], steps: Steps,
-    times: Times | float | None,
-) -> PartSet:  # fmt: skip
-    reasons: list[str] = []
-    if model:
-        one, reason = _with_cost(one, model, rows, steps)
-        reasons += [reason] if reason else []
-    one, reason = _with_window(one, run, settings, times)
-    reasons += [reason] if reason else []
-    if one.rigid_fraction is not None and one.cost_share is not None:
-        one = replace(one, run_time_share=run_time_share(one.rigid_fraction, one.cost_share, settings.step_ratio))
-    return replace(one, reasons=tuple(reasons))
+@dataclass(frozen=True)
+class _Comparison:
+    """What all sets are compared by."""
 
+    run: Run
+    settings: Settings
+    model: CostModel | None
+    rows: Sequence[PartRow]
+    steps: Steps
+    flight: tuple[float, float] | None
 
-def _with_cost(one: PartSet, model: CostModel, rows: Sequence[PartRow], steps: Steps) -> tuple[PartSet, str | None]:
-    inventory, share = model.inventory, model.saved(one.parts)
-    within = {part: sum(counts.values()) for part, counts in inventory.elements_within(one.parts).items()}
-    whole = {part: sum(counts.values()) for part, counts in inventory.counts.items()}
-    total = sum(whole.values())
-    rigid = {part for part, count in within.items() if count == whole[part]}
-    computed = [row.id for row in rows if row.elements and row.kind not in ("rigid", "void")]
-    mass = [row.mass for row in rows if row.id in whole and (row.flight is None or row.flight.flies is not False)]
-    own = [row.mass for row in rows if row.id in one.parts]
-    return replace(
-        one,
-        elements=sum(within.values()),
-        element_fraction=sum(within.values()) / total if total else None,
-        mass_fraction=_ratio(own, mass),
-        cost_share=share.value,
-        step_growth=steps.growth({*one.parts, *rigid}, computed),
-    ), share.reason
+    def of(self, one: PartSet, times: Times | float | None) -> PartSet:
+        """Complete a set, in a window, or in that for a td."""
+        reasons = [self.model and self.model.saved(one.parts).reason]
+        one = self._with_cost(one, self.model) if self.model else one
+        try:
+            one = self._with_window(one, times)
+        except (FormatError, RangeError) as error:
+            reasons.append(str(error))
+        if one.rigid_fraction is not None and one.cost_share is not None:
+            share = run_time_share(one.rigid_fraction, one.cost_share, self.settings.step_ratio)
+            one = replace(one, run_time_share=share)
+        return replace(one, reasons=tuple(reason for reason in (*reasons, *one.reasons) if reason))
 
+    def _with_cost(self, one: PartSet, model: CostModel) -> PartSet:
+        inventory = model.inventory
+        within = {part: counts.total() for part, counts in inventory.elements_within(one.parts).items()}
+        whole = {part: counts.total() for part, counts in inventory.counts.items()}
+        rigid = {part for part, count in within.items() if count == whole[part]}
+        computed = [row.id for row in self.rows if row.elements and row.kind not in ("rigid", "void")]
+        return replace(
+            one,
+            elements=sum(within.values()),
+            element_fraction=sum(within.values()) / sum(whole.values()) if whole else None,
+            mass_fraction=self._mass_fraction(one.parts),
+            cost_share=model.saved(one.parts).value,
+            step_growth=self.steps.growth({*one.parts, *rigid}, computed),
+        )
 
-def _ratio(some: Sequence[float | None], every: Sequence[float | None]) -> float | None:
-    if any(mass is None for mass in every) or not sum(mass or 0.0 for mass in every):
-        return None
-    return sum(mass or 0.0 for mass in some) / sum(mass or 0.0 for mass in every)
+    def _mass_fraction(self, parts: Sequence[int]) -> float | None:
+        """Share of the mass of all parts that fly; None where one is not known."""
+        masses = {row.id: row.mass for row in self.rows if row.flight and row.flight.flies}
+        known = {part: mass for part, mass in masses.items() if mass is not None}
+        if len(known) < len(masses) or not set(parts) <= known.keys() or not sum(known.values()):
+            return None
+        return sum(known[part] for part in parts) / sum(known.values())
 
-
-def _with_window(one: PartSet, run: Run, settings: Settings, times: Times | float | None) -> tuple[PartSet, str | None]:
-    """Find when the set may be rigid, and how far it is out of place then."""
-    try:
-        reference = Reference.of(run, Selection(parts=tuple(map(str, one.parts))))
+    def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
+        """Find when the set may be rigid; RangeError with the reason where it may not."""
+        reference = Reference.of(self.run, Selection(parts=tuple(map(str, one.parts))))
         if isinstance(times, tuple):
-            found: tuple[Times, Candidate | None] = times, verify_of(reference, *times, settings).candidate
+            verify_of(reference, *times, self.settings)  # objects to times outside the record
+            tr, td = times
         else:
-            answer = suggest_of(reference, times, settings, with_better=False)
+            answer = suggest_of(reference, times, self.settings, with_better=False)
             if answer.recommended is None:
                 why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
-                return one, "; ".join(why) or "no tr can be recommended"
-            best = next((row for row in answer.candidates if row.recommended), None)
-            found = (answer.recommended.tr, answer.recommended.td), best
-    except (FormatError, RangeError) as error:
-        return one, str(error)
-    (tr, td), best = found
-    time = reference.history.time
-    one = replace(one, window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0]))
-    return _with_position(one, best), None
+                raise RangeError("; ".join(why) or "no tr can be recommended")
+            tr, td = answer.recommended.tr, answer.recommended.td
+        time = reference.history.time
+        one = replace(one, window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0]))
+        return self._with_position(one, reference.history, tr, td)
 
-
-def _with_position(one: PartSet, best: Candidate | None) -> PartSet:
-    """Take the position error of the pair."""
-    return one
+    def _with_position(self, one: PartSet, history: History, tr: float, td: float) -> PartSet:
+        """Find how far the body is out of place at td since its parts moved against each other before."""
+        momenta = next((momenta for momenta in history.momenta if momenta.parts is not None), None)
+        if momenta is None or momenta.parts is None or history.masses is None or self.flight is None:
+            return one
+        if len(one.bodies) > 1:
+            return replace(one, reasons=(_SEVERAL,))
+        members = [at for at, part in enumerate(momenta.parts) if part.id in one.parts]
+        drift = drift_of(momenta, history.masses, members, self.flight)
+        error = float(drift.errors(np.array([tr]), td)[0]) if drift else np.nan
+        if drift is None or np.isnan(error):
+            return one
+        return replace(one, position_error=error, position_limit=drift.limit, position_part=drift.part)
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:

@@ -193,7 +193,7 @@ def _landing_alone(rows: Sequence[PartRow]) -> int | None:
 
 def _merged(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
     """Let parts that share nodes be one rigid body: the first by number leads, the others merge with it."""
-    bodies = inventory.bodies([row.id for row in rows if row.verdict == SWITCH])
+    bodies = inventory.groups([row.id for row in rows if row.verdict == SWITCH])
     lead = {part: body[0] for body in bodies for part in body[1:]}
     for row in rows:
         if row.id in lead:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 COMMANDS: Final = (
-    "suggest", "plan", "parts", "verify", "replay", "info", "extract", "card", "check", "rule", "study",
+    "suggest", "plan", "parts", "calibrate", "verify", "replay", "info", "extract", "card", "check", "rule", "study",
     "reproduce", "rollover",
 )  # fmt: skip
 COULD_NOT_RUN: Final = 2

@@ -15,13 +15,10 @@ from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.verify import Verdict
-    from d2rpick.choice.warnings import Caution
     from d2rpick.deck.printing.common import PrintedCard
 
 EXAMPLES = """\b
@@ -45,7 +42,8 @@ Examples:
 )
 @click.option(
     "--done", metavar="FILE", type=shared.FILE,
-    help="Windows in which HISTORY was switched, a line 'tr td' for each as -f value prints them: plan those after.",
+    help="Windows in which HISTORY was switched, a line 'tr td' for each: plan those after.  -f value, -f card and "
+    "--write-deck hold both, as the next run needs them.",
 )  # fmt: skip
 @click.option(
     "--before", metavar="HISTORY", multiple=True, type=shared.FILE,
@@ -83,7 +81,7 @@ def command(
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
-        output = Output.of(options, *run.sources, *([done] if done else []), *before)
+        output = Output.of(options, *run.sources, *(name for name in (done, *before) if name not in (None, "-")))
         model = deck_cost.model_of(options)
         options = deck_cost.with_recommended(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
@@ -92,7 +90,7 @@ def command(
     windows = _windows(done) if done else ()
     plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
     plan = plan._replace(cautions=(*plan.cautions, *unknown))
-    output.notes(reference.history.notes, [*plan.cautions, *_of_done(done if prints else None)])
+    output.notes(reference.history.notes, plan.cautions)
     _beside(plan, reference, options, output)
     checked, passed = _deck(plan, reference, options, every=every) if options["write_deck"] else ("", True)
     if checked and output_format != "table":
@@ -103,17 +101,6 @@ def command(
     text = write("plan", output_format, plan, Shown(ctx.meta["d2rpick.command"], every=every))
     output.result(f"{text}\n\n{checked}" if checked and output_format == "table" else text)
     return finish(ctx, objection=not (plan.supported and passed), exit_zero=exit_zero)
-
-
-def _of_done(name: str | None) -> Iterator[Caution]:
-    """Say that cards of the next windows alone do not make the run that was planned."""
-    from d2rpick.choice.warnings import Caution
-
-    if name is not None:
-        found = f"the cards hold the new windows only, not those of {name}"
-        yield Caution(
-            "done-windows-not-printed", f"{found}; keep both in the deck, else the parts are deformable there"
-        )
 
 
 def _check_usage(form: str, options: dict[str, Any], *, every: bool, done: str | None, before: tuple[str, ...]) -> None:
@@ -158,7 +145,7 @@ def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: b
     found = _judged(plan, reference, options, every=every)
     if found is None:
         raise click.UsageError(need_ids(card_request(reference.run, options, plan.history), plan.history))
-    return plan_deck.write_and_check(found[0], reference.run, plan.settings, options)
+    return plan_deck.write_and_check(found[0], plan, reference.run, options)
 
 
 def _card(plan: Plan, reference: Reference, options: dict[str, Any], output: Output, *, every: bool) -> bool:
@@ -178,14 +165,9 @@ def _card(plan: Plan, reference: Reference, options: dict[str, Any], output: Out
 def _judged(
     plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool
 ) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
-    """Write the cards and judge them as printed; None without a window, or where nobody says whom to switch."""
-    from functools import partial
+    """Write the cards of the next run and judge them; None without a new window, or nobody to switch."""
+    from d2rpick.choice.judged_card import card_of_plan
 
-    from d2rpick.choice.judged_card import judged_card
-    from d2rpick.choice.of_run import verify_of
-
-    windows = plan.windows(every=every)
-    if not windows:
+    if not plan.windows(every=every):
         return None
-    judge = partial(verify_of, reference._replace(history=plan.history), settings=plan.settings)
-    return judged_card(windows, plan.history, judge, card_request(reference.run, options, plan.history))
+    return card_of_plan(plan, reference.run, card_request(reference.run, options, plan.history), every=every)

@@ -10,7 +10,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.deck_cost import cost_options
 
 if TYPE_CHECKING:
-    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.plan import Plan
     from d2rpick.deck.printing.common import PrintedCard
     from d2rpick.histories.opening import Run
 
@@ -43,7 +43,7 @@ def for_deck(options: dict[str, Any]) -> dict[str, Any]:
     return {**options, "solver": options["solver"] or "radioss", "name": name}
 
 
-def write_and_check(card: PrintedCard, run: Run, settings: Settings, options: dict[str, Any]) -> tuple[str, bool]:
+def write_and_check(card: PrintedCard, plan: Plan, run: Run, options: dict[str, Any]) -> tuple[str, bool]:
     """Write the copy, and check it by the history.
 
     Returns
@@ -60,7 +60,8 @@ def write_and_check(card: PrintedCard, run: Run, settings: Settings, options: di
     from d2rpick.rules.judgement import HistoryJudge
 
     written = write_deck(options["deck"], card, options["write_deck"], overwrite=options["overwrite"])
-    judge = HistoryJudge(run, shared.selection({**options, "part": ()}), settings)
+    done = card.windows[: len(plan.done)]  # as printed
+    judge = HistoryJudge(run, shared.selection({**options, "part": ()}), plan.settings, done)
     checked = check_deck(written[0], configuration_for(written[0], Configuration()), judge)
     listed = [f"written  {name}" for name in written]
     text = "\n".join([*listed, "", as_table(Checks([checked]))])

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows, lasting_window
-from d2rpick.histories.samples import integral
+from d2rpick.histories.samples import bent, integral
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -134,16 +134,9 @@ class FreeFall:
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
         """What is not straight of momentum and impulse, and the alpha >= 0 that explains the one by the other."""
         states = slice(first, last + 1)
-        p, impulse = (_bent(self.time[states], values[states]) for values in (self.momentum, self.integral))
+        p, impulse = (bent(self.time[states], values[states]) for values in (self.momentum, self.integral))
         power = float(np.sum(impulse**2))
         return p, impulse, max(0.0, -float(np.sum(impulse * p)) / power) if power > 0 else 0.0
-
-
-def _bent(time: Samples, values: Samples) -> Samples:
-    """Give what is left of each column after a straight line."""
-    t = time - time.mean()
-    centred = values - values.mean(axis=0)
-    return np.asarray(centred - np.outer(t, t @ centred / (t @ t)))
 
 
 def _sets(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
@@ -164,8 +157,8 @@ def _attached(momenta: Momenta, chosen: Sequence[int], moving: Sequence[int], td
     look = np.flatnonzero(back)[:: max(1, int(back.sum()) // _LOOK_STATES)]
     if look.size < FEWEST:
         return
-    bent = _bent(time[look], momenta.values[look].reshape(look.size, -1))
-    rests = bent.reshape(look.size, -1, 3).transpose(1, 0, 2).reshape(momenta.values.shape[1], -1)
+    rests = bent(time[look], momenta.values[look].reshape(look.size, -1))
+    rests = rests.reshape(look.size, -1, 3).transpose(1, 0, 2).reshape(momenta.values.shape[1], -1)
     total = rests[list(chosen)].sum(axis=0)
     left = [i for i in moving if i not in chosen]
     for _ in range(min(_MOST_ATTACHED, len(left))):

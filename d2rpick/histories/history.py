@@ -159,6 +159,10 @@ class FlightEvidence(Protocol):
         """Momenta of the parts, then of the whole model, as far as they are written."""
 
     @property
+    def masses(self) -> Samples | None:
+        """Masses of the parts whose momenta are known, in their order, NaN where unknown; None where none are."""
+
+    @property
     def balance(self) -> Balance | None:
         """Energies of the whole model; None where none are written beside the internal energy."""
 
@@ -168,6 +172,7 @@ class Given(NamedTuple):
 
     momenta: tuple[Momenta, ...] = ()
     balance: Balance | None = None
+    masses: Samples | None = None
 
 
 NO_EVIDENCE = Given()
@@ -234,6 +239,11 @@ class History:
     def momenta(self) -> tuple[Momenta, ...]:
         """Momenta of the parts, then of the whole model, as far as they are known."""
         return self.evidence.momenta
+
+    @property
+    def masses(self) -> Samples | None:
+        """Masses of the parts whose momenta are known, NaN where unknown; None where none are known [mass]."""
+        return self.evidence.masses
 
     @property
     def balance(self) -> Balance | None:

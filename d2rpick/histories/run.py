@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.source import Source
 
 _AXES = ("x_momentum", "y_momentum", "z_momentum")
+_VELOCITIES = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
 _CENTRES = ("x_center", "y_center", "z_center")
 
 
@@ -88,6 +89,26 @@ class Run:
         except FormatError:
             return None  # it cannot say what flies together
         return Momenta(holder.part_time, values, holder.parts, holder.precisions(())[1], ())
+
+    @cached_property
+    def masses(self) -> Samples | None:
+        """Masses of the parts whose momenta are written, in their order, NaN where unknown [mass].
+
+        As written, or momentum over velocity along the axis with most momentum; None where neither is.
+        """
+        momenta = self._part_momenta
+        if momenta is None or momenta.parts is None:
+            return None
+        with suppress(FormatError):
+            return np.median(self._of_holder("mass", momenta.parts), axis=0)
+        axis = int(np.abs(momenta.values).sum(axis=(0, 1)).argmax())
+        try:
+            velocity, momentum = self._of_holder(_VELOCITIES[axis], momenta.parts), momenta.values[:, :, axis]
+        except FormatError:
+            return None
+        square, product = (velocity**2).sum(axis=0), (velocity * momentum).sum(axis=0)
+        massless = ~momentum.any(axis=0) & ~velocity.any(axis=0)
+        return np.where(massless, 0.0, np.divide(product, square, out=np.full(square.shape, np.nan), where=square > 0))
 
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
@@ -234,6 +255,11 @@ class _Written:
     def momenta(self) -> tuple[Momenta, ...]:
         """Momenta of the parts, then of the whole model."""
         return self._run.momenta(self._chosen, self._flying)
+
+    @cached_property
+    def masses(self) -> Samples | None:
+        """Masses of the parts."""
+        return self._run.masses
 
     @cached_property
     def balance(self) -> Balance | None:

@@ -45,6 +45,7 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
     },
     "plan": {**_PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
     "parts": {**_PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
+    "calibration": {**_PLAIN, "toml": lambda report, answer, _: report.as_toml(answer)},
     "verdict": _PLAIN,
     "overview": _PLAIN,
     "study": {

@@ -247,7 +247,7 @@ def outlook(found: Parts) -> list[tuple[str, str]]:
     if best is None:
         lines.append(("recommended", "no set"))
     else:
-        bodies = "one rigid body" if len(best.bodies) == 1 else f"{len(best.bodies)} groups that share no nodes"
+        bodies = "one rigid body" if len(best.bodies) == 1 else f"{len(best.bodies)} rigid bodies"
         ids = ",".join(map(str, best.parts))
         lines.append(("recommended", f"{best.name}: --part {ids} ({bodies})"))
         lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's"))

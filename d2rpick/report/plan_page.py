@@ -31,7 +31,7 @@ def as_page(plan: Plan, run: Run, command: Sequence[str], card: str | None) -> s
     command : sequence of str
         Arguments that repeat the answer.
     card : str or None
-        Solver input for the supported windows, where it is known whom it switches.
+        Solver input for the next run, where it is known whom it switches.
     """
     return page.run_page(run, _sections(plan, run, command, card))
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
 
 NO_NODE: Final = -1
+_ONE_BODY: Final = 0.75  # share of the nodes of some parts from which on one group of them is the body
 _DENSE: Final = 50_000_000  # up to this id a table of all ids is small enough
 DISCRETE: Final = frozenset({"spring", "seatbelt"})  # kinds of elements that are not switched by part
 
@@ -149,7 +150,18 @@ class Inventory:
         return {part: frozenset(others) for part, others in found.items()}
 
     def bodies(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
-        """Groups of these parts that share nodes, directly or not: each makes one rigid body."""
+        """Rigid bodies that these parts make: one where most of their nodes hang together, else a body per group.
+
+        The parts of a car with an engine on its mounts are one body; an engine, a battery and wheels alone are several.
+        """
+        groups = self.groups(parts)
+        largest = max((self.rigid_nodes(group) for group in groups), default=0)
+        if len(groups) > 1 and largest >= _ONE_BODY * self.rigid_nodes(parts):
+            return (tuple(sorted(parts)),)
+        return groups
+
+    def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
+        """Groups of these parts that share nodes, directly or not."""
         left, found = set(parts), []
         while left:
             waiting, body = [min(left)], set[int]()
@@ -167,12 +179,20 @@ class Inventory:
         return int(np.count_nonzero(self._mask(parts)))
 
     def elements_within(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
-        """Numbers of elements by part and kind that are rigid once these parts are one rigid body.
+        """Numbers of elements by part and kind that are rigid once these parts are rigid bodies.
 
-        Radioss puts off every element whose nodes all lie in the body; LS-DYNA puts off those of the parts.
+        Radioss puts off every element whose nodes all lie in a body; LS-DYNA puts off those of the parts.
         """
         if self.solver != "radioss":
             return {part: self.counts[part] for part in parts if part in self.counts}
+        found: dict[int, Counter[str]] = {}
+        for body in self.bodies(parts):
+            for part, counts in self._inside(body).items():
+                found[part] = found.get(part, Counter()) + counts
+        return found
+
+    def _inside(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
+        """Numbers of elements whose nodes all lie in these parts."""
         inside = np.append(self._mask(parts), True)  # the last stands for NO_NODE
         found: dict[int, Counter[str]] = {}
         for elements in self.elements:
