@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 EXAMPLES = """\b
 Examples:
   d2rpick parts sample_data/rollover_box.matsum
-  d2rpick parts --deck sample_data/box_0000.rad sample_data/rolloverT01.gz
-  d2rpick parts --deck sample_data/box_0000.rad -f json sample_data/rolloverT01.gz
-  d2rpick parts --deck sample_data/box_0000.rad --report parts.html sample_data/rolloverT01.gz
+  d2rpick parts --deck sample_data/rollover_box.k sample_data/rollover_box.matsum
+  d2rpick parts --deck sample_data/rollover_box.k -f json sample_data/rollover_box.matsum
+  d2rpick parts --deck sample_data/rollover_box.k --report parts.html sample_data/rollover_box.matsum
 """
 
 

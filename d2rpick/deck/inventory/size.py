@@ -22,8 +22,14 @@ if TYPE_CHECKING:
     from d2rpick.deck.inventory.model import Inventory, Material, PartData, Places, Reals
 
 _PIECE: Final = 1 << 14
-_FACES: Final = ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-_TETRAHEDRA: Final = ((0, 1, 3, 4), (1, 2, 3, 6), (1, 3, 4, 6), (1, 4, 5, 6), (3, 4, 6, 7))  # that fill a brick
+_FACES: Final = (
+    (0, 3, 2, 1),
+    (4, 5, 6, 7),
+    (0, 1, 5, 4),
+    (1, 2, 6, 5),
+    (2, 3, 7, 6),
+    (3, 0, 4, 7),
+)  # seen from outside
 _SURFACES: Final = frozenset({"shell", "triangle"})
 _LINES: Final = frozenset({"beam", "truss"})
 _VOLUMES: Final = frozenset({"solid", "tetrahedron", "thick shell"})
@@ -156,10 +162,16 @@ def _bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     for column in range(1, 8):
         eight[:, column] = np.where(eight[:, column] == NO_NODE, eight[:, column - 1], eight[:, column])
     corners = coordinates[eight]
-    volume = np.abs(sum(_sixth(corners, one) for one in _TETRAHEDRA))
+    volume = np.abs(sum(_below(corners, face) for face in _FACES))
     faces = np.stack([_area(corners[:, list(face)]) for face in _FACES])
     factor = np.where(_is_tetrahedron(eight), 3.0, 1.0)
     return np.asarray(volume), factor * volume / faces.max(axis=0)
+
+
+def _below(corners: Reals, face: tuple[int, int, int, int]) -> Reals:
+    """Volumes between the first corner and a face, with sign: together those of the brick, also where nodes repeat."""
+    a, b, c, d = face
+    return _sixth(corners, (0, a, b, c)) + _sixth(corners, (0, a, c, d))
 
 
 def _is_tetrahedron(nodes: Places) -> Places:
