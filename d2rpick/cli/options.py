@@ -352,8 +352,8 @@ def settings(options: dict[str, Any]) -> Settings:
     if len(chosen) > 1:
         raise click.UsageError(f"{chosen[0]} and {chosen[1]} exclude each other")
     cost_share, step_ratio = options.get("cost_share"), options.get("step_ratio")
-    if step_ratio is not None and cost_share is None:
-        raise click.UsageError("--step-ratio needs --cost-share too: the run time needs both")
+    if step_ratio is not None and cost_share is None and not options.get("deck"):
+        raise click.UsageError("--step-ratio needs --cost-share or --deck too: the run time needs both")
     if window and not window[0] < window[1]:
         raise click.UsageError(f"--fit-window {window[0]:g} {window[1]:g} is empty; give the lower time first")
     return Settings(

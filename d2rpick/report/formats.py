@@ -48,6 +48,8 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
     },
+    "parts": {**_PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
+    "calibration": {**_PLAIN, "toml": lambda report, answer, _: report.as_toml(answer)},
     "verdict": _PLAIN,
     "overview": _PLAIN,
     "study": {
