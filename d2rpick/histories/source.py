@@ -24,7 +24,7 @@ _LIKENESS = 0.8
 _NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
 
 # What solvers call their databases in the folder of a run.
-_DATABASE = re.compile(r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?")
+_DATABASE = r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?"  # compiled where it is needed
 
 
 class Source(NamedTuple):
@@ -101,7 +101,7 @@ def _files(name: str) -> Sequence[str]:
 
 
 def _databases(folder: Path) -> list[str]:
-    matches = {file: _DATABASE.fullmatch(file.name) for file in sorted(folder.iterdir()) if file.is_file()}
+    matches = {file: re.fullmatch(_DATABASE, file.name) for file in sorted(folder.iterdir()) if file.is_file()}
     found = {file: match["root"] for file, match in matches.items() if match}
     if not found:
         raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; give the file")

@@ -110,7 +110,7 @@ def verdict(answer: Suggestion) -> list[tuple[str, str]]:
             ("keeps", _kept(answer, best)),
             ("quality", _sure(best, quality)),
         ]
-    return [*found, ("better pair", _better(answer, better))] if better else found
+    return [*found, ("better pair", f"{_times(better)}: {better_about(answer, better)}")] if better else found
 
 
 def _saved(best: Candidate) -> str:
@@ -138,16 +138,15 @@ def _kept(answer: Suggestion, best: Candidate) -> str:
     return "unknown"
 
 
-def _better(answer: Suggestion, better: Pair) -> str:
-    """The better pair, and what is better about it."""
+def better_about(answer: Suggestion, better: Pair) -> str:
+    """What is better about the better pair."""
     own = answer.recommended
-    pair = f"tr = {better.tr:.6g}, td = {better.td:.6g}"
     if own is None:
-        return f"{pair}: there an acceptable tr exists"
+        return "there an acceptable tr exists"
     if better.residual is not None and own.residual is not None:
-        return f"{pair}: residual {tables.measure(better.residual)} instead of {tables.measure(own.residual)}"
+        return f"residual {tables.measure(better.residual)} instead of {tables.measure(own.residual)}"
     level, here = answer.situation.vibration.energy(better.td), answer.situation.energy_td
-    return f"{pair}: at that td {level / here - 1:.0%} more of the energy is there to be locked in"
+    return f"at that td {level / here - 1:.0%} more of the energy is there to be locked in"
 
 
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:
@@ -157,6 +156,10 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     best = answer.chosen
     if best and best.run_time_share is not None:
         lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's"))
+    if best and best.position_error is not None:
+        lines.append(
+            ("position", f"off by {best.position_error:.2g} at td: {best.position_error_part} is frozen elsewhere")
+        )
     if answer.longer and answer.recommended:
         lines.append(("longer", given_up(answer.longer, answer.recommended)))
     expected = answer.expected
@@ -220,4 +223,8 @@ def _pair(pair: Pair | None) -> str:
     if pair is None:
         return "none"
     residual = "" if pair.residual is None else f", residual {tables.measure(pair.residual)}"
-    return f"tr = {pair.tr:.6g}, td = {pair.td:.6g}{residual}"
+    return f"{_times(pair)}{residual}"
+
+
+def _times(pair: Pair) -> str:
+    return f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"
