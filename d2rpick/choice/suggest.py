@@ -8,7 +8,7 @@ from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, over_limits, rank
 from d2rpick.choice.verify import verify_at
-from d2rpick.choice.warnings import Caution, cautions_of
+from d2rpick.choice.warnings import Caution, cautions_of, out_of_place
 from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
@@ -122,7 +122,9 @@ def suggest_at(situation: Situation, *, with_better: bool = True) -> Suggestion:
         candidates = candidates.recommending(best.rank - 1)
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
-    if not best:
+    if best:
+        cautions += out_of_place(situation, best.position_error)
+    else:
         cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
     if with_better and not better:
         cautions.append(Caution("no-better-td", "no peak of the energy in the flight has an acceptable tr"))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from d2rpick.choice.candidates import Candidate, judge
 from d2rpick.choice.examine import examine
 from d2rpick.choice.ranking import keeps, kept, over_limits
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of
+from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of, out_of_place
 from d2rpick.errors import RangeError
 from d2rpick.vibration.moments import Moment
 
@@ -75,7 +75,7 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
         td_ok=td_ok,
         verified=keeps(situation, candidate),
         reasons=reasons,
-        cautions=tuple(cautions_of(situation)),
+        cautions=(*cautions_of(situation), *out_of_place(situation, candidate.position_error)),
     )
 
 

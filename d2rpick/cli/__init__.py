@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 COMMANDS: Final = (
-    "suggest", "explore", "plan", "verify", "replay", "info", "extract", "card", "check", "rule", "study", "reproduce",
-    "rollover",
+    "suggest", "explore", "plan", "parts", "calibrate", "verify", "replay", "info", "extract", "card", "check", "rule",
+    "study", "reproduce", "rollover",
 )  # fmt: skip
 COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from functools import wraps
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -222,8 +221,7 @@ def _channels(given: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
     return tuple(pairs)
 
 
-@dataclass(frozen=True)
-class Reading:
+class Reading(NamedTuple):
     """What is read, and how: the options of ``history_options``."""
 
     names: tuple[str, ...]
@@ -243,8 +241,7 @@ class Reading:
         return open_run(self.names, self.selection, self.input_format)
 
 
-@dataclass(frozen=True)
-class Extras:
+class Extras(NamedTuple):
     """What is written beside the result: a figure, and a page with the options that judge by the same history."""
 
     plot: str | None
@@ -355,8 +352,8 @@ def settings(options: dict[str, Any]) -> Settings:
     if len(chosen) > 1:
         raise click.UsageError(f"{chosen[0]} and {chosen[1]} exclude each other")
     cost_share, step_ratio = options.get("cost_share"), options.get("step_ratio")
-    if step_ratio is not None and cost_share is None:
-        raise click.UsageError("--step-ratio needs --cost-share too: the run time needs both")
+    if step_ratio is not None and cost_share is None and not options.get("deck"):
+        raise click.UsageError("--step-ratio needs --cost-share or --deck too: the run time needs both")
     if window and not window[0] < window[1]:
         raise click.UsageError(f"--fit-window {window[0]:g} {window[1]:g} is empty; give the lower time first")
     return Settings(

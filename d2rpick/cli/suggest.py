@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from d2rpick.cli import deck_cost
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.explorer import explorer_of
@@ -46,6 +47,7 @@ Examples:
     show_default=True,
     help="Number of rows in the table; json and csv have all.",
 )
+@deck_cost.cost_options
 @shared.history_options
 @shared.choosing_options
 @card_options
@@ -83,8 +85,12 @@ def command(
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
         output = Output.of(options, *run.sources)
+        model = deck_cost.model_of(options)
+        options = deck_cost.with_recommended(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
     answer = suggest_of(reference, td_window if td is None else td, settings)
+    answer = answer._replace(cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
         from d2rpick.report import figures, figures_choice

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from d2rpick.cli import deck_cost
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
 from d2rpick.cli.explorer import explorer_of
@@ -53,6 +53,7 @@ class _Verify(click.Command):
     type=shared.FILE,
     help="Compare a finished switched run with the reference; takes all names up to the next option.",
 )
+@deck_cost.cost_options
 @shared.history_options
 @shared.choosing_options
 @card_options
@@ -69,15 +70,20 @@ def command(
     prints = prints_card(options, output_format)
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
     extras = shared.Extras.of(options)
-    finished = replace(shared.Reading.of(options), names=switched) if switched else None
     with reading(asked.names, quiet=asked.quiet):
-        run, other = asked.open(), finished.open() if finished else None
+        run = asked.open()
+        model = deck_cost.model_of(options)
+        options = deck_cost.with_recommended(run, options, settings, model)
+        finished = shared.Reading.of(options)._replace(names=switched) if switched else None
+        other = finished.open() if finished else None
         output = Output.of(options, *run.sources, *(other.sources if other else ()))
         reference = Reference(run, energy_of(run, options, prints=prints))
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
     answer = verify_of(reference, tr, td, settings)
     if other and finished:
         with reading(finished.names, quiet=asked.quiet):
             answer = compare_with(answer, reference, reference.like(other, finished.selection))
+    answer = answer._replace(cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
         from d2rpick.report import figures, figures_choice

@@ -184,7 +184,8 @@ class History:
 
     ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.
     Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
-    in them was taken for the energy, ``parts`` whose energy it is, None for the whole model.  ``complete``
+    in them was taken for the energy, ``parts`` whose energy it is, None for the whole model;
+    ``springs`` are those of them whose energy is left out.  ``complete``
     is False when a file stopped inside a state; ``notes`` say in plain sentences what was left out or assumed.
     ``files`` are the contents that were read.
     Where the energy is a sum, ``part_names`` (k,) and ``part_energies`` (n, k) are its terms that are not always zero.
@@ -198,6 +199,7 @@ class History:
     format: str
     channel: str
     parts: tuple[Part, ...] | None = None
+    springs: tuple[Part, ...] = ()
     time_precision: Precision = EXACT
     energy_precision: Precision = EXACT
     time_unit: str = ""
@@ -221,7 +223,7 @@ class History:
                 raise HistoryError(
                     f"{where}: {name} of state {bad[0] + 1} is {values[bad[0]]}, a finite number was expected"
                 )
-        if np.any(np.diff(time) <= 0):
+        if np.any(time[1:] <= time[:-1]):
             state = int(np.argmax(np.diff(time) <= 0)) + 1
             raise HistoryError(f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}")
         if self.part_energies is not None:
@@ -354,6 +356,13 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
 
 
 def _frozen(values: ArrayLike) -> Samples:
+    """Copy what could change."""
+    if (
+        isinstance(values, np.ndarray)
+        and values.dtype == np.float64
+        and not (values.flags.writeable or values.base is not None)
+    ):
+        return values
     copy = np.array(values, dtype=np.float64)
     copy.flags.writeable = False
     return copy

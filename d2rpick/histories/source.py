@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 
 STDIN = "-"
 _GZIP = b"\x1f\x8b"
+# Files of a folder often share their suffix, and have it in common with any name that has it.
+_LIKENESS = 0.8
 _NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
 
 # What solvers call their databases in the folder of a run.
-_DATABASE = re.compile(r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?")
+_DATABASE = r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?"  # compiled where it is needed
 
 
 class Source(NamedTuple):
@@ -99,7 +101,7 @@ def _files(name: str) -> Sequence[str]:
 
 
 def _databases(folder: Path) -> list[str]:
-    matches = {file: _DATABASE.fullmatch(file.name) for file in sorted(folder.iterdir()) if file.is_file()}
+    matches = {file: re.fullmatch(_DATABASE, file.name) for file in sorted(folder.iterdir()) if file.is_file()}
     found = {file: match["root"] for file, match in matches.items() if match}
     if not found:
         raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; give the file")
@@ -142,7 +144,7 @@ def _meant(name: str) -> str:
         beside = os.listdir(folder or ".")  # noqa: PTH208  not pathlib: start-up
     except OSError:
         return ""
-    return near_miss(wanted, beside)
+    return near_miss(wanted, beside, _LIKENESS)
 
 
 def _unpacked(name: str, packed: bytes | OnDisk) -> Source:

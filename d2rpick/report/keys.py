@@ -75,6 +75,8 @@ CANDIDATE: Final[Mapping[str, Callable[[Candidate], Any]]] = {
     "run_time_share": lambda c: c.run_time_share,
     "same_swing": lambda c: c.same_swing,
     "residual_high": lambda c: c.residual_high,
+    "position_error": lambda c: c.position_error,
+    "position_error_part": lambda c: c.position_error_part,
 }
 
 
@@ -87,6 +89,7 @@ def of_candidate(candidate: Candidate) -> dict[str, Any]:
 MEASURES: Final = (
     *("energy", "energy_ratio", "level_error", "sign_match", "lock_in_error", "residual", "residual_high"),
     *("part_mismatch", "timing_tolerance", "rigid_time", "rigid_fraction", "run_time_share"),
+    *("position_error", "position_error_part"),
 )
 
 

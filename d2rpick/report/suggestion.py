@@ -156,6 +156,10 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     best = answer.chosen
     if best and best.run_time_share is not None:
         lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's"))
+    if best and best.position_error is not None:
+        lines.append(
+            ("position", f"off by {best.position_error:.2g} at td: {best.position_error_part} is frozen elsewhere")
+        )
     if answer.longer and answer.recommended:
         lines.append(("longer", given_up(answer.longer, answer.recommended)))
     expected = answer.expected
