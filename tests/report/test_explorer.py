@@ -219,7 +219,7 @@ def test_nothing_is_cut_with_and_without_scripts(paper: Path, box: Path, browser
             assert browser.shown("#explorer") == scripts
             assert browser.shown("figure.drawn") == (not scripts)
             assert browser.shown(".sign")
-            assert browser.shown(".hint") == (width < 640)
+            assert browser.shown(".hint") == (width < 960)
     assert browser.complaints() == []
 
 

@@ -107,6 +107,15 @@ def test_only_what_belongs_to_the_page_takes_effect(paper: Page) -> None:
     assert "The MIT License" in paper.scripts[0]
 
 
+def test_without_a_flight_nothing_can_be_explored_and_no_script_runs(tmp_path: Path) -> None:
+    table = tmp_path / "growing.csv"
+    table.write_text("time,internal_energy\n" + "".join(f"{i / 10},{i * i}\n" for i in range(40)))
+    page = page_of(tmp_path, "--td", "2.5", "--no-verify", str(table), code=1)
+    assert not page.scripts
+    assert not page.data
+    assert "script-src 'none'" in html.unescape(page.source)
+
+
 def test_ids_are_unique_and_all_that_is_referred_to_is_there(paper: Page) -> None:
     assert len(paper.ids) == len({*paper.ids})
     assert {target[1:] for target in paper.targets} <= {*paper.ids}
