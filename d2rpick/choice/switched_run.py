@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from d2rpick.choice.rigid_parts import FEWEST, kinetic_energies, rigid_parts, with_energy
 from d2rpick.choice.warnings import Caution
-from d2rpick.errors import FormatError, RangeError
+from d2rpick.errors import RangeError
 from d2rpick.flight.energy_alone import round_off
 from d2rpick.histories.history import Given
-from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,14 +20,9 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.of_run import Reference
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History, Part, Samples
+    from d2rpick.histories.history import History, Part
 
     Times = tuple[float, float]
-
-# Of a part that is deformable fewer states follow each other without kinetic energy, or with one internal energy.
-_FEWEST: Final = 12
-# An internal energy that changes by less is one value: solvers write single precision.
-_SAME: Final = 1e-6
 
 
 class Done(NamedTuple):
@@ -132,26 +127,20 @@ def _around(history: History, flights: Sequence[Flight], tr: float, td: float) -
 
 def _check_rigid(reference: Reference, tr: float, td: float) -> None:
     """Raise RangeError where no part was rigid in a window, as far as single parts tell."""
-    history, parts = reference.history, _deformable(reference)
-    time = history.time
-    inside = window(time, np.nextafter(tr, td), np.nextafter(td, tr))
-    inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))  # switched at the first step after tr
-    if not parts or len(time[inside]) < _FEWEST:
+    run, history, parts = *reference, _deformable(reference)
+    rigid = rigid_parts(run, parts, history.time, tr, td)
+    if rigid is None or rigid.any():
         return
-    energies, kinetic = reference.run.part_energies(parts)[inside], _kinetic(reference, parts)
-    if float(np.abs(energies).max()) <= round_off(history):
+    if float(np.abs(history.between(tr, td)[1]).max(initial=0.0)) <= round_off(history):
         return  # a free fall looks the same
-    still = np.ptp(energies, axis=0) <= _SAME * np.abs(energies).max(axis=0)
-    absent = (kinetic[inside] == 0).all(axis=0) if kinetic is not None else np.zeros(len(parts), dtype=bool)
-    if not (still | absent).any():
-        where = f"{', '.join(history.source)}: the parts deform from {tr:.6g} to {td:.6g}"
-        raise RangeError(f"{where}, a window that is said to be done; give the run that was switched so")
+    where = f"{', '.join(history.source)}: the parts deform from {tr:.6g} to {td:.6g}"
+    raise RangeError(f"{where}, a window that is said to be done; give the run that was switched so")
 
 
 def _absent_times(reference: Reference) -> tuple[Times, ...]:
     """Times in which parts have no kinetic energy although the run moves: a rigid body has it instead."""
     parts, balance = _deformable(reference), reference.history.balance
-    kinetic = _kinetic(reference, parts) if parts else None
+    kinetic = kinetic_energies(reference.run, parts) if parts else None
     if kinetic is None or balance is None or balance.kinetic is None:
         return ()
     time = reference.history.time
@@ -164,24 +153,10 @@ def _stretches(states: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last of states that follow each other."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]])))
     pairs = edges.reshape(-1, 2)
-    return [(int(a), int(b) - 1) for a, b in pairs if b - a >= _FEWEST]
+    return [(int(a), int(b) - 1) for a, b in pairs if b - a >= FEWEST]
 
 
 def _deformable(reference: Reference) -> tuple[Part, ...]:
     """Give the chosen parts, or all, that have internal energy at the times of the history."""
     run, history = reference.run, reference.history
-    parts = history.parts or run.parts
-    if not parts:
-        return ()
-    energies = run.part_energies(parts)
-    if len(energies) != history.time.size:
-        return ()
-    return tuple(part for part, energy in zip(parts, energies.T, strict=True) if energy.any())
-
-
-def _kinetic(reference: Reference, parts: Sequence[Part]) -> Samples | None:
-    """Kinetic energies of parts, shape (n, parts); None where they are not written."""
-    try:
-        return reference.run.part_kinetic_energies(parts)
-    except FormatError:
-        return None
+    return with_energy(run, history.parts or run.parts, history)
