@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
 
@@ -33,8 +33,7 @@ _MUCH_HIGHER = 0.1
 _SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(NamedTuple):
     """One tr for the td of a situation; fields are the keys of the JSON output, None where nothing can be said.
 
     Times in the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction``

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.choice.of_run import Reference, verify_of
+from d2rpick.choice.verify import verify_at
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
 from d2rpick.deck.printing.common import Printing
+from d2rpick.errors import D2RPickError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from d2rpick.choice.plan import Plan
+    from d2rpick.choice.situation import Situation
     from d2rpick.choice.verify import Verdict
     from d2rpick.deck.printing.common import PrintedCard, Times
     from d2rpick.histories.history import History
+    from d2rpick.histories.run import Run
 
 
 @dataclass(frozen=True)
@@ -33,19 +40,67 @@ class CardRequest:
         return self.solver or solver_of(history.format), replace(self.printing, part=ids, end=end)
 
 
+class SolverInput(NamedTuple):
+    """Solver input for a pair of times: its ``text``, or ``refusal``, why it cannot be printed.
+
+    Both are None where nobody says whom it switches; ``solver`` is the one that it is for in any case.
+    """
+
+    solver: str
+    text: str | None = None
+    refusal: str | None = None
+
+
+def input_for(situation: Situation, tr: float, request: CardRequest) -> SolverInput:
+    """Print the card of ``tr`` and the td of a situation, judged as it is printed."""
+    solver, _ = request.of(situation.history)
+
+    def judge(early: float, late: float) -> Verdict:
+        return verify_at(situation.at(late), early)
+
+    try:
+        found = judged_card([(tr, situation.td)], situation.history, judge, request)
+    except D2RPickError as error:
+        return SolverInput(solver, refusal=str(error))
+    return SolverInput(solver, found[0].text if found else None)
+
+
 def judged_card(
-    windows: Sequence[Times], history: History, judge: Callable[[float, float], Verdict], request: CardRequest
+    windows: Sequence[Times],
+    history: History,
+    judge: Callable[[float, float], Verdict],
+    request: CardRequest,
+    done: Sequence[Times] = (),
 ) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
     """Print the card of windows, let ``judge`` judge each tr and td as printed, and print it with what it found.
 
+    ``done`` are windows in which the run was switched already: they are printed too, and cannot be judged by it.
     None where nobody says whom the card switches: the chosen parts, or main nodes for a solver that asks for these.
     """
     solver, printing = request.of(history)
     if not getattr(printing, SOLVERS[solver].SWITCHES):
         return None
-    plain = cards(windows, printing, solver)
-    verdicts = tuple(judge(tr, td) for tr, td in plain.windows)
-    return cards(windows, printing, solver, tuple(_remarks(verdicts))), verdicts
+    every = sorted((*done, *windows))
+    plain = cards(every, printing, solver)
+    verdicts = tuple(judge(*times) for asked, times in zip(every, plain.windows, strict=True) if asked not in done)
+    remarks = (*_of_done(done, history), *_remarks(verdicts))
+    return cards(every, printing, solver, remarks), verdicts
+
+
+def card_of_plan(
+    plan: Plan, run: Run, request: CardRequest, *, every: bool = False
+) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
+    """Print the card of the run that a plan leads to, its new windows judged; None also where none is new."""
+    new = plan.windows(every=every)
+    judge = partial(verify_of, Reference(run, plan.history), settings=plan.settings)
+    return judged_card(new, plan.history, judge, request, plan.done) if new else None
+
+
+def _of_done(done: Sequence[Times], history: History) -> Iterator[str]:
+    """Say which windows were not judged, and why."""
+    if done:
+        windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
+        yield f"{', '.join(history.source)} was rigid from {windows}: done, and not judged again."
 
 
 def _remarks(verdicts: Sequence[Verdict]) -> Iterator[str]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
     from d2rpick.histories.history import History, Part, Track
     from d2rpick.histories.run import Run
+    from d2rpick.vibration.fits import Fits
 
 _DEFAULT = Selection()
 
@@ -53,11 +54,17 @@ def read(names: Sequence[str], selection: Selection = _DEFAULT, input_format: st
 
 
 def suggest_of(
-    reference: Reference, td: float | tuple[float, float] | None, settings: Settings, *, with_better: bool = True
+    reference: Reference,
+    td: float | tuple[float, float] | None,
+    settings: Settings,
+    *,
+    with_better: bool = True,
+    fits: Fits | None = None,
 ) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window (low, high) or, for None, in the longest flight [time].
 
-    ``with_better`` False: for a given td no better one is looked for.
+    ``with_better`` False: for a given td no better one is looked for.  ``fits`` are those of an earlier look at the
+    record with the same settings.
 
     Raises
     ------
@@ -71,8 +78,8 @@ def suggest_of(
     if isinstance(td, tuple):
         from d2rpick.choice.suggest_td import suggest_in_window
 
-        return _with_health(suggest_in_window(reference.history, td, settings), reference.run)
-    answer = suggest_at(examine(reference.history, td, settings), with_better=with_better)
+        return _with_health(suggest_in_window(reference.history, td, settings, fits), reference.run)
+    answer = suggest_at(examine(reference.history, td, settings, fits), with_better=with_better)
     return _with_health(answer, reference.run)
 
 
@@ -115,7 +122,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
         start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
-    health = assess(balance, window, locked)
+    health = assess(balance, window, locked, td)
     return answer._replace(health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
 
 

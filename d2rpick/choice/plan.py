@@ -90,7 +90,7 @@ class Planned:
 class Plan(NamedTuple):
     """Answer of ``plan``: all flights in the order of time, and what to be aware of.
 
-    ``min_rigid``: shorter windows are left out [time].
+    ``min_rigid``: shorter windows are left out [time].  ``done`` are the windows in which the run was switched.
     """
 
     history: History
@@ -98,6 +98,7 @@ class Plan(NamedTuple):
     min_rigid: float
     rows: tuple[Planned, ...]
     cautions: tuple[Caution, ...]
+    done: tuple[Times, ...] = ()
 
     @property
     def supported(self) -> tuple[Planned, ...]:
@@ -108,6 +109,14 @@ class Plan(NamedTuple):
         """Give (tr, td) of the supported windows, or of ``every`` one that is not done [time]."""
         wanted = ("supported", "re-plan") if every else ("supported",)
         return tuple(row.window for row in self.rows if row.status in wanted and row.window)
+
+    def next_run(self, *, every: bool = False) -> tuple[Times, ...]:
+        """Give (tr, td) of the run to be computed next: the windows that are done and the new ones, in order [time].
+
+        None where nothing is new.  The next run starts at the beginning again, so it needs both.
+        """
+        new = self.windows(every=every)
+        return (*self.done, *new) if new else ()
 
     @property
     def rigid_time(self) -> float:
@@ -164,9 +173,10 @@ def plan_of(
     history, found, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
     flights = flights_of(history, settings)
-    known = done_windows(history, flights, found, before and flights_of(before.history, settings))
+    earlier = before and flights_of(switched_history(before, ())[0], settings)  # it may have been switched itself
+    known = done_windows(history, flights, found, earlier)
     rows = tuple(_with_status(list(_rows(reference, flights, settings, shortest, known)), known))
-    return Plan(history, settings, shortest, rows, (*cautions, *_cautions(rows, known)))
+    return Plan(history, settings, shortest, rows, (*cautions, *_cautions(rows, known)), found)
 
 
 def _rows(
@@ -212,10 +222,11 @@ def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
 
 def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Planned]:
     """Let windows after the first that locks in energy, or after a landing while rigid, wait for another run."""
-    wrong = next((one for one in known if one.landed_rigid), None)
-    why = (
-        f"the run landed at {wrong.landing:.6g} while it was rigid; plan the windows from there again" if wrong else ""
-    )
+    wrong = next((one for one in known if one.rigid_in_contact), None)
+    why = ""
+    if wrong:
+        window = f"the window {wrong.tr:.6g} to {wrong.td:.6g}"
+        why = f"the run was rigid in a contact in {window}; plan the windows from there again"
     for row in rows:
         if row.status == "supported" and why:
             yield replace(row, status="re-plan", reason=why)
@@ -240,8 +251,11 @@ def _blocked(rows: Sequence[Planned]) -> Iterator[Caution]:
 def _cautions(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Caution]:
     """What to be aware of in all windows, once each."""
     for one in known:
-        if one.landed_rigid:
-            yield Caution("landed-rigid", f"the window {one.tr:.6g} to {one.td:.6g}: {one.told}")
+        window = f"the window {one.tr:.6g} to {one.td:.6g}: {one.told}"
+        if one.rigid_in_contact:
+            yield Caution("landed-rigid", window)
+        elif one.flight is None:
+            yield Caution("done-without-flight", window)
     windows = [row for row in rows if row.status == "supported" and row.answer]
     for row in windows:
         for caution in row.answer.cautions if row.answer else ():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,11 @@ if TYPE_CHECKING:
 
     Times = tuple[float, float]
 
+# Evidence that tells the start of a flight to some states; the energy alone gives time away there.
+_SHARP: Final = ("momentum", "contact-energy", "energy-balance")
+# A flight that begins so many output intervals after tr has begun with the window: its start is known no better.
+_SAME_STATES: Final = 3
+
 
 class Done(NamedTuple):
     """A window in which a run was switched: the flight that it lies in, when that landed, and when it should have.
@@ -41,8 +46,20 @@ class Done(NamedTuple):
 
     @property
     def landed_rigid(self) -> bool:
-        """Whether the contact came while the parts were rigid."""
+        """Whether the contact that ends the flight came while the parts were rigid."""
         return self.landing is not None and self.landing < self.td
+
+    @property
+    def took_off(self) -> float | None:
+        """When a contact ended in which the parts were rigid from tr on; None where the flight had begun [time]."""
+        if self.flight is None or self.flight.start is None or self.flight.source not in _SHARP:
+            return None
+        return self.flight.start if self.flight.start - self.tr > _SAME_STATES * self.step else None
+
+    @property
+    def rigid_in_contact(self) -> bool:
+        """Whether a contact began or ended while the parts were rigid: nothing after it is what was planned."""
+        return self.landed_rigid or self.took_off is not None
 
     @property
     def moved(self) -> float | None:
@@ -52,6 +69,10 @@ class Done(NamedTuple):
     @property
     def told(self) -> str:
         """What became of it, for people."""
+        if self.flight is None:
+            return "no flight is seen there"
+        if self.took_off is not None:
+            return f"took off at {self.took_off:.6g}, {self.took_off - self.tr:.3g} after tr: rigid in the contact"
         if self.landing is None:
             return "no landing was seen after it"
         if self.landed_rigid:
@@ -96,7 +117,13 @@ def switched_history(
         _check_rigid(reference, tr, td)
     absent = _absent_times(reference)
     more = tuple(one for one in absent if not any(tr < one[1] and one[0] < td for tr, td in done))
-    cautions = [Caution("rigid-times", f"the parts were rigid from {a:.6g} to {b:.6g}: taken as done") for a, b in more]
+    cautions = [
+        Caution(
+            "rigid-times",
+            f"the parts were rigid from {a:.6g} to {b:.6g}, give or take an output interval: taken as done",
+        )
+        for a, b in more
+    ]
     if absent:
         whole = tuple(one for one in history.momenta if one.parts is None)
         history = replace(history, evidence=Given(whole, history.balance))

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from d2rpick.cli import deck_cost, plan_deck
 from d2rpick.cli import options as shared
-from d2rpick.cli import plan_deck
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
+from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.verify import Verdict
-    from d2rpick.choice.warnings import Caution
     from d2rpick.deck.printing.common import PrintedCard
 
 EXAMPLES = """\b
@@ -45,7 +42,8 @@ Examples:
 )
 @click.option(
     "--done", metavar="FILE", type=shared.FILE,
-    help="Windows in which HISTORY was switched, a line 'tr td' for each as -f value prints them: plan those after.",
+    help="Windows in which HISTORY was switched, a line 'tr td' for each: plan those after.  -f value, -f card and "
+    "--write-deck hold both, as the next run needs them.",
 )  # fmt: skip
 @click.option(
     "--before", metavar="HISTORY", multiple=True, type=shared.FILE,
@@ -77,19 +75,24 @@ def command(
     from d2rpick.choice.plan import plan_of
 
     _check_usage(output_format, options, every=every, done=done, before=before)
-    options = plan_deck.for_deck(options)
-    prints = prints_card(options, "card" if options["deck"] else output_format)
+    form = "card" if options["write_deck"] else output_format
+    options = plan_deck.for_deck(options) if form == "card" else options
+    prints = prints_card(options, form)
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
-        output = Output.of(options, *run.sources, *([done] if done else []), *before)
+        output = Output.of(options, *run.sources, *(name for name in (done, *before) if name not in (None, "-")))
+        model = deck_cost.model_of(options)
+        options = deck_cost.with_recommended(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
-        earlier = reference.like(replace(asked, names=before).open(), asked.selection) if before else None
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
+        earlier = reference.like(asked._replace(names=before).open(), asked.selection) if before else None
     windows = _windows(done) if done else ()
     plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
-    output.notes(reference.history.notes, [*plan.cautions, *_of_done(done if prints else None)])
+    plan = plan._replace(cautions=(*plan.cautions, *unknown))
+    output.notes(reference.history.notes, plan.cautions)
     _beside(plan, reference, options, output)
-    checked, passed = _deck(plan, reference, options, every=every) if options["deck"] else ("", True)
+    checked, passed = _deck(plan, reference, options, every=every) if options["write_deck"] else ("", True)
     if checked and output_format != "table":
         click.echo(checked, err=True)
     if output_format == "card":
@@ -100,25 +103,14 @@ def command(
     return finish(ctx, objection=not (plan.supported and passed), exit_zero=exit_zero)
 
 
-def _of_done(name: str | None) -> Iterator[Caution]:
-    """Say that cards of the next windows alone do not make the run that was planned."""
-    from d2rpick.choice.warnings import Caution
-
-    if name is not None:
-        found = f"the cards hold the new windows only, not those of {name}"
-        yield Caution(
-            "done-windows-not-printed", f"{found}; keep both in the deck, else the parts are deformable there"
-        )
-
-
 def _check_usage(form: str, options: dict[str, Any], *, every: bool, done: str | None, before: tuple[str, ...]) -> None:
     """Raise UsageError where options make no sense together, before a file is opened."""
-    if every and form not in ("value", "card") and not options["deck"]:
+    if every and form not in ("value", "card") and not options["write_deck"]:
         raise click.UsageError("--all belongs to -f value, -f card and --write-deck; other forms hold every window")
     plan_deck.check_usage(options["deck"], options["write_deck"])
     if before and done is None:
         raise click.UsageError("--before compares the landings of a switched run; name its windows with --done")
-    if (form == "card" or options["deck"]) and not (options["part"] or options["node"]):
+    if (form == "card" or options["write_deck"]) and not (options["part"] or options["node"]):
         what = "-f card" if form == "card" else "--write-deck"
         raise click.UsageError(f"{what} needs --part, the parts that are switched (Radioss: --node, their main nodes)")
 
@@ -139,11 +131,13 @@ def _beside(plan: Plan, reference: Reference, options: dict[str, Any], output: O
 
         output.write(options["plot"], figures.render(draw_plan(plan), options["plot"]))
     if options["report"]:
+        from d2rpick.choice.explored import explored_flights
         from d2rpick.report.plan_page import as_page
 
         found = _judged(plan, reference, options, every=False)
         card = found[0].text if found else None
-        output.write(options["report"], text_bytes(as_page(plan, reference.run, shared.repeat(), card)))
+        explorer = explorer_of(explored_flights(reference, plan))
+        output.write(options["report"], text_bytes(as_page(plan, reference.run, shared.repeat(), card, explorer)))
 
 
 def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool) -> tuple[str, bool]:
@@ -153,7 +147,7 @@ def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: b
     found = _judged(plan, reference, options, every=every)
     if found is None:
         raise click.UsageError(need_ids(card_request(reference.run, options, plan.history), plan.history))
-    return plan_deck.write_and_check(found[0], reference.run, plan.settings, options)
+    return plan_deck.write_and_check(found[0], plan, reference.run, options)
 
 
 def _card(plan: Plan, reference: Reference, options: dict[str, Any], output: Output, *, every: bool) -> bool:
@@ -173,14 +167,9 @@ def _card(plan: Plan, reference: Reference, options: dict[str, Any], output: Out
 def _judged(
     plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool
 ) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
-    """Write the cards and judge them as printed; None without a window, or where nobody says whom to switch."""
-    from functools import partial
+    """Write the cards of the next run and judge them; None without a new window, or nobody to switch."""
+    from d2rpick.choice.judged_card import card_of_plan
 
-    from d2rpick.choice.judged_card import judged_card
-    from d2rpick.choice.of_run import verify_of
-
-    windows = plan.windows(every=every)
-    if not windows:
+    if not plan.windows(every=every):
         return None
-    judge = partial(verify_of, reference._replace(history=plan.history), settings=plan.settings)
-    return judged_card(windows, plan.history, judge, card_request(reference.run, options, plan.history))
+    return card_of_plan(plan, reference.run, card_request(reference.run, options, plan.history), every=every)

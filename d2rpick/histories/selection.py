@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Part
 
 # More digits than any number of a part has are a title.
-_RANGE = re.compile(r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?")
+_RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"  # compiled where it is needed
 
 
 class Selection(NamedTuple):
@@ -66,7 +66,7 @@ def _meant(text: str, known: Sequence[Part], where: str) -> Iterator[Part]:
 
 def _piece(piece: str, known: Sequence[Part], where: str) -> Sequence[Part]:
     titled = _titled(piece, known)
-    numbers = _RANGE.fullmatch(piece)
+    numbers = re.fullmatch(_RANGE, piece)
     if not numbers:
         if not titled:
             near = near_miss(piece, [part.title for part in known])

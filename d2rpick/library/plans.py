@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.library import arguments
-from d2rpick.library.answers import selection_for, written
+from d2rpick.library.answers import explorer_of, selection_for, written
 from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import command_line
+from d2rpick.library.repeat import asking, command_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -30,15 +30,18 @@ class Plan:
     """Answer of `plan`; nothing of it changes.
 
     ``flights`` has a row per flight with ``window``, ``status`` and ``reason``; ``windows`` are the (tr, td) that this
-    run supports, ``all_windows`` also those that wait for a switched run; times in the unit of the run.
+    run supports, ``all_windows`` also those that wait for a switched run, ``next_run`` those that are done and
+    ``windows``: what the next run is switched in, none where no window is new.  Times in the unit of the run.
     """
 
     run: Run = field(repr=False)
     flights: tuple[Planned, ...] = field(repr=False)
     windows: tuple[tuple[float, float], ...]
     all_windows: tuple[tuple[float, float], ...]
+    next_run: tuple[tuple[float, float], ...]
     warnings: tuple[Caution, ...]
     command: tuple[str, ...] = field(repr=False)
+    _asking: tuple[str, ...] = field(repr=False)
     _core: Core = field(repr=False)
 
     @property
@@ -77,10 +80,17 @@ class Plan:
         return draw_plan(self._core)
 
     def report(self, path: arguments.Path) -> Path:
-        """Write the plan to one HTML page that needs no network; an existing file is replaced."""
+        """Write the plan, with the solver's cards, to one HTML page that needs no network; a file is replaced."""
+        from d2rpick.choice.explored import explored_flights
+        from d2rpick.choice.judged_card import CardRequest, card_of_plan
+        from d2rpick.choice.of_run import Reference
         from d2rpick.report.plan_page import as_page
 
-        return written(path, as_page(self._core, self.run.files, ("d2rpick", *self.command), None))
+        card = card_of_plan(self._core, self.run.files, CardRequest())
+        found = explored_flights(Reference(self.run.files, self._core.history), self._core)
+        text = card[0].text if card else None
+        page = as_page(self._core, self.run.files, ("d2rpick", *self.command), text, explorer_of(found, self._asking))
+        return written(path, page)
 
 
 def plan(
@@ -133,18 +143,24 @@ def plan(
     settings = arguments.settings(choosing)
     shortest = None if min_rigid is None else arguments.number("min_rigid", min_rigid, 0.0)
     pairs = [arguments.window(f"done[{number}]", list(pair)) for number, pair in enumerate(done)]
+    if before is not None and not pairs:
+        raise ValueError("before is a run, but done names no window that was planned from it")
     selection = selection_for(run, parts, flying)
     reference = Reference.of(run.files, selection)
     earlier = reference.like(before.files, selection) if before is not None else None
     windows = check_windows(pairs) if pairs else ()
     core = plan_of(reference, settings, min_rigid=shortest, done=windows, before=earlier)
-    own = () if shortest is None else ("--min-rigid", repr(shortest))
+    own = [] if shortest is None else ["--min-rigid", repr(shortest)]
+    own += ["--done", "-"] if windows else []  # on its standard input, a line for each
+    own += [text for name in (before.sources if before else ()) for text in ("--before", name)]
     return Plan(
         run=run,
         flights=core.rows,
         windows=core.windows(),
         all_windows=core.windows(every=True),
+        next_run=core.next_run(),
         warnings=core.cautions,
         command=command_line("plan", own, run, selection, choosing),
+        _asking=asking(run, selection, choosing),
         _core=core,
     )

@@ -11,7 +11,7 @@ import numpy as np
 from d2rpick.models.exhibit import Curve, Exhibit, Panel, Shape
 from d2rpick.models.rollover.as_history import suggestion_for
 from d2rpick.models.rollover.record import BOX
-from d2rpick.models.rollover.run import Window, simulate
+from d2rpick.models.rollover.run import RigidWindow, simulate
 from d2rpick.models.rollover.scan import compare
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Tried(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _run(parameters: Parameters, *windows: Window) -> Record:
+def _run(parameters: Parameters, *windows: RigidWindow) -> Record:
     return simulate(parameters, _END, *windows)
 
 
@@ -65,7 +65,7 @@ def _setting(_: Parameters) -> Exhibit:
 
 
 def _early(base: Parameters) -> Exhibit:
-    reference, early = _run(base), _run(base, Window(_EARLY, TD))
+    reference, early = _run(base), _run(base, RigidWindow(_EARLY, TD))
     off = _roll_error(reference, early)
     return _compared(
         "early", "Switched at 1 ms", "2a, b", 1, base, (_EARLY,),
@@ -78,7 +78,7 @@ def _early(base: Parameters) -> Exhibit:
 
 def _energies(base: Parameters) -> Exhibit:
     reference = _run(base)
-    errors = {tr: _roll_error(reference, _run(base, Window(tr, TD))) for tr in (_LITTLE, _MUCH)}
+    errors = {tr: _roll_error(reference, _run(base, RigidWindow(tr, TD))) for tr in (_LITTLE, _MUCH)}
     energy = {tr: float(np.interp(tr, reference.time, reference.internal_energy[:, BOX])) for tr in (*errors, TD)}
     return _compared(
         "energies", "Too little and too much energy", "2c", 1, base, (_LITTLE, _MUCH),
@@ -95,7 +95,7 @@ def _revised(base: Parameters) -> Exhibit:
     reference = _run(base)
     tr = _own(reference, TD)
     assert tr is not None
-    errors = [_roll_error(reference, _run(base, Window(time, TD))) for time in (_REVISED, tr)]
+    errors = [_roll_error(reference, _run(base, RigidWindow(time, TD))) for time in (_REVISED, tr)]
     return _compared(
         "revised", "The revised pair", "8", 4, base, (_REVISED, tr),
         "With tr = 70 and td = 370 ms, the ground at about 380 ms, height and roll agree closely.",
@@ -118,7 +118,7 @@ def _compared(
     shapes = [Shape("without switching", _outlines(reference))]
     rolls, differences, heights = [Curve("without switching", "roll_deg")], [], []
     for tr in times:
-        run, key = _run(base, Window(tr, TD)), f"{1e3 * tr:.4g}"
+        run, key = _run(base, RigidWindow(tr, TD)), f"{1e3 * tr:.4g}"
         label = f"tr = {key} ms"
         columns[f"roll_{key}_deg"] = np.degrees(run.roll)
         columns[f"droll_{key}_deg"] = np.degrees(run.roll - reference.roll)
@@ -155,7 +155,7 @@ def variants_of(base: Parameters) -> Iterator[Variant]:
     yield Variant("damping 1 1/s", replace(base, damping=1.0), before=True)
 
 
-def tried(base: Parameters) -> tuple[Window, tuple[Tried, ...]]:
+def tried(base: Parameters) -> tuple[RigidWindow, tuple[Tried, ...]]:
     """Run all variants; give their common window, and how each run does in it.
 
     td is 10 ms before the first of their landings, tr the latest of their own.
@@ -164,11 +164,11 @@ def tried(base: Parameters) -> tuple[Window, tuple[Tried, ...]]:
     landings = [_run(one.parameters).landed or _END for one in variants]
     td = round(min(landings) - _BEFORE_LANDING, 3)
     own = [_own(_run(one.parameters), td) for one in variants]
-    common = Window(max(tr for tr in own if tr is not None), td)
+    common = RigidWindow(max(tr for tr in own if tr is not None), td)
     return common, tuple(_at(one, tr, common) for one, tr in zip(variants, own, strict=True))
 
 
-def _at(variant: Variant, own: float | None, common: Window) -> Tried:
+def _at(variant: Variant, own: float | None, common: RigidWindow) -> Tried:
     reference, run = _run(variant.parameters), _run(variant.parameters, common)
     outcome = compare(reference, run, common.tr, common.td)
     end = float(np.degrees(run.roll[-1] - reference.roll[-1]))
@@ -194,7 +194,7 @@ def _variants(base: Parameters) -> Exhibit:
     )  # fmt: skip
 
 
-def _of_variants(window: Window) -> tuple[tuple[Panel, ...], ...]:
+def _of_variants(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
     dots, common = {"style": "dots", "x": "run"}, 1e3 * window.tr
     level = (f"common tr = {common:.1f} ms, td = {1e3 * window.td:g} ms", common)
     rigid = (Curve("own tr", "rigid_own", **dots), Curve("common tr", "rigid_common", **dots))
@@ -212,7 +212,7 @@ def _of_variants(window: Window) -> tuple[tuple[Panel, ...], ...]:
     )
 
 
-def _told(window: Window, rows: tuple[Tried, ...]) -> str:
+def _told(window: RigidWindow, rows: tuple[Tried, ...]) -> str:
     """Say how far the paper's statement holds, and where it fails."""
     known = [(row, 1e3 * row.own_tr) for row in rows if row.own_tr is not None]
     after, before = ([tr for row, tr in known if row.variant.before is flag] for flag in (False, True))

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.health import Health
+    from d2rpick.choice.quality import Quality
     from d2rpick.choice.suggest import Pair
     from d2rpick.choice.verify import Verdict
     from d2rpick.choice.warnings import Caution
@@ -105,6 +106,14 @@ def of_verdict(verdict: Verdict) -> dict[str, Any]:
     }
 
 
+def of_quality(quality: Quality | None) -> dict[str, Any]:
+    """The grade of a pair and why it is none better; null without a pair."""
+    return {
+        "quality": quality.grade if quality else None,
+        "quality_reasons": list(quality.reasons) if quality else None,
+    }
+
+
 def of_pair(pair: Pair | None) -> dict[str, Any] | None:
     """The better pair, or null."""
     return {"td": pair.td, "tr": pair.tr, "residual": pair.residual} if pair else None
@@ -144,6 +153,7 @@ def of_health(health: Health | None) -> dict[str, Any] | None:
         "window_eroded": health.window_eroded,
         "reason": health.reason,
         "window_reason": health.window_reason,
+        "until": health.until,
     }
 
 

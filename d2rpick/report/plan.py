@@ -61,8 +61,11 @@ def as_json(plan: Plan, command: Sequence[str]) -> str:
 
 
 def as_value(plan: Plan, *, every: bool = False) -> str:
-    """A line ``tr td`` for each supported window, or for ``every`` one, in the shortest digits that read back."""
-    return "\n".join(f"{tr!r} {td!r}" for tr, td in plan.windows(every=every))
+    """A line ``tr td`` for each window of the next run, in the shortest digits that read back.
+
+    Those that are done, and the supported ones, or ``every`` new one; nothing where none is new.
+    """
+    return "\n".join(f"{tr!r} {td!r}" for tr, td in plan.next_run(every=every))
 
 
 def window(plan: Plan, row: Planned) -> dict[str, Any]:
@@ -119,8 +122,10 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     if plan.run_time_share is not None:
         lines.append(("run time", f"about {plan.run_time_share:.0%} of the reference's"))
     lines += [(f"flight {row.number}", given_up(row)) for row in supported if row.answer and row.answer.longer]
-    if waiting:
-        lines.append(("next", "run with these windows, and plan the others from that run (--done)"))
+    if waiting or plan.done:
+        what = "with those that are done and these" if plan.done else "with these windows"
+        after = ", and plan the others from that run (--done)" if waiting else ""
+        lines.append(("next", f"run from the start {what}{after}"))
     return lines
 
 

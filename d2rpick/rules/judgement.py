@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from d2rpick.choice.settings import Settings
+    from d2rpick.choice.switched_run import Times
     from d2rpick.choice.verify import Verdict
     from d2rpick.deck import Window
     from d2rpick.histories.history import History
@@ -41,12 +42,14 @@ class HistoryJudge:
 
     As ``suggest`` chooses it for these parts: they are locked in and released at the same times.
 
-    ``selection`` says what else was asked for; with a named energy all windows are judged by that one.
+    ``selection`` says what else was asked for; with a named energy all windows are judged by that one.  In the windows
+    that are ``done`` the run was switched already: they cannot be judged by it.
     """
 
     run: Run
     selection: Selection
     settings: Settings
+    done: tuple[Times, ...] = ()
     _references: dict[tuple[int, ...], Reference] = field(default_factory=dict)
     _faults: dict[tuple[tuple[int, ...], float, float | None], tuple[Fault, ...]] = field(default_factory=dict)
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
@@ -116,6 +119,8 @@ class HistoryJudge:
             return
         if td is None:
             yield from _of_load(history, tr, self.settings)
+            return
+        if (tr, td) in self.done:
             return
         verdict = verify_of(reference, tr, td, self.settings)
         if parts and not history.energy.any():

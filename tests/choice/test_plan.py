@@ -123,6 +123,37 @@ def test_a_switched_run_is_recognised_and_the_next_window_planned(
     landed = [row.done.landing for row in found.rows if row.done]
     contacts = [start for start, _ in drop(*done).landings]
     assert all(min(abs(one - at) for at in contacts) < 2e-3 for one in landed if one is not None)
+    assert found.next_run() == (*done, *found.windows())
+    assert plan.next_run() == done
+    assert plan_of(switched, PLAIN, done=done, min_rigid=1.0).next_run() == ()
+
+
+@pytest.mark.parametrize("window", [(0.31, 0.5), (0.281, 0.75)])
+def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
+    plan: Plan, window: tuple[float, float], tmp_path: Path
+) -> None:
+    """The box is made rigid before, or while, it stands on the ground; it takes off while it is rigid."""
+    done = [one for one in (plan.windows()[0], window) if one[1] < window[0]] + [window]
+    record = drop(*done)
+    (take_off,) = [end for _, end in record.landings if window[0] < end < window[1]]
+    found = plan_of(read(written(record, tmp_path), BOX), PLAIN, done=done)
+    (told,) = [row.done for row in found.rows if row.done and row.window == window]
+    assert not told.landed_rigid
+    assert told.took_off == pytest.approx(take_off, abs=1e-3)
+    assert "rigid in the contact" in told.told
+    assert "landed-rigid" in [caution.code for caution in found.cautions]
+    assert not found.supported
+    assert not found.next_run()
+    reasons = [row.reason or "" for row in found.rows if row.status == "re-plan"]
+    assert reasons
+    assert all(f"in the window {window[0]:.6g} to {window[1]:.6g}" in reason for reason in reasons)
+
+
+def test_a_window_that_is_done_where_nothing_flies_is_told(tmp_path: Path) -> None:
+    window = (0.31, 0.36)  # on the ground all the time
+    found = plan_of(read(written(drop(window), tmp_path), BOX), PLAIN, done=[window])
+    assert ("done-without-flight", "the window 0.31 to 0.36: no flight is seen there") in found.cautions
+    assert window not in [row.window for row in found.rows]
 
 
 def test_a_run_that_was_not_switched_is_not_taken_for_one(reference: Reference, plan: Plan) -> None:
@@ -151,6 +182,8 @@ def test_a_landing_while_rigid_is_told() -> None:
     found = plan_of(read(legs), PLAIN, done=done, before=real("drop2T01.gz"))
     moved = [row.done.moved for row in found.rows if row.done]
     assert moved == pytest.approx([0.0, -1.6e-3, -5.4e-3], abs=3e-4)
+    again = plan_of(read(legs), PLAIN, done=done, before=read(legs))  # rigid times of that run are no flights
+    assert [row.done.moved for row in again.rows if row.done] == [0.0, 0.0, 0.0]
     assert [row.done.landed_rigid for row in found.rows if row.done] == [False, False, True]
     assert found.supported == ()
     assert "landed-rigid" in [caution.code for caution in found.cautions]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import pytest
 from tests.cli.test_output import check_by_schema
 from tests.command import BOX, ENERGY, answer, run
 from tests.drops import drop, written
+from tests.shared import shared
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -122,9 +124,59 @@ def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tm
     told = run("plan", "-q", *PART, "--done", str(done), *before, *switched).stdout
     assert "as planned" in told
     assert "than planned" in told
+    assert "run from the start with those that are done and these" in told
+    new = [(row["tr"], row["td"]) for row in found["windows"] if row["status"] == "supported"]
+    lines = run("plan", "-q", "-f", "value", *PART, "--done", str(done), *before, *switched).stdout.splitlines()
+    assert [tuple(map(float, line.split())) for line in lines] == [*windows, *new]
     wrong = run("plan", "-q", *PART, "--done", str(done), *history)
     assert wrong.exit_code == 2
     assert "said to be done" in wrong.stderr
+
+
+def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(history: list[str], tmp_path: Path) -> None:
+    """It is computed from the start; what is done cannot be judged by a run that was rigid there."""
+    done, main, folder = tmp_path / "done.txt", tmp_path / "main.k", tmp_path / "next"
+    main.write_text(DECK)
+    run("plan", "-q", "-f", "value", *PART, "-o", str(done), *history)
+    windows = [tuple(map(float, line.split())) for line in done.read_text().splitlines()]
+    switched = written(drop(*((tr, td) for tr, td in windows)), tmp_path / "switched")
+    args = ("plan", "-q", *PART, "--done", str(done))
+    card = run(*args, "-f", "card", *switched)
+    assert card.exit_code == 0
+    assert "not judged again" in " ".join(card.stdout.replace("$", "").split())
+    assert card.stdout.count("*DEFORMABLE_TO_RIGID_AUTOMATIC") == 2 * (len(windows) + 1)
+    result = run(*args, "--deck", str(main), "--write-deck", str(folder), *switched)
+    assert result.exit_code == 0, result.stdout
+    assert "0 errors, 0 warnings" in result.stdout
+    found = json.loads(run("check", "-q", "-f", "json", str(folder / "main.k")).stdout)
+    times = [(one["tr"], one["td"]) for one in found["windows"]]
+    assert times[:-1] == [pytest.approx(one, abs=1e-7) for one in windows]
+    assert times[-1][0] > windows[-1][1]
+    nothing = run(*args, "-f", "card", "--min-rigid", "1", *switched)
+    assert (nothing.exit_code, nothing.stdout) == (1, "")
+
+
+def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(tmp_path: Path) -> None:
+    """Of the falling box; its first fall is free, so that the run itself stands for one that is switched there."""
+    name, node = "DROP2", "535"
+    deck = tmp_path / f"{name}_0000.rad"
+    deck.write_bytes(gzip.decompress(shared("openradioss/car_drop/decks/DROP2_0000.rad.gz").read_bytes()))
+    engine = f"/RUN/{name}/1\n0.7\n/VERS/2022\n/DT\n0.9 0.0\n/RBODY/OFF\n{node}\n/TFILE/4\n0.0002\n"
+    (tmp_path / f"{name}_0001.rad").write_text(engine)
+    history, done = str(shared("openradioss/car_drop/drop2T01.gz")), tmp_path / "done.txt"
+    done.write_text("0.0 0.277\n")
+    args = ("plan", "-q", "--part", "all", "--node", node, "--deck", str(deck), "--write-deck")
+    for folder, more in ((tmp_path / "a", ()), (tmp_path / "b", ("--done", str(done)))):
+        result = run(*args, str(folder), *more, history)
+        assert result.exit_code == 0, result.stdout
+        assert "0 errors, 0 warnings" in result.stdout
+        names = [f"{name}_{leg:04d}.rad" for leg in range(5)]
+        assert sorted(path.name for path in folder.iterdir()) == names
+        assert (folder / names[0]).read_bytes() == deck.read_bytes()
+        legs = [(folder / leg).read_text() for leg in names[1:]]
+        assert ["/RBODY/ON" in leg for leg in legs] == [True, False, True, False]
+        assert all("/TFILE/4" in leg for leg in legs)
+    assert legs[0].splitlines()[1].strip() == "0.277"
 
 
 DECK = """*KEYWORD
@@ -158,6 +210,6 @@ def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(history: list[s
     assert again.exit_code == 2
     assert "exists" in again.stderr
     assert run(*args, "--overwrite").exit_code == 0
-    alone = run("plan", "--part", "box", "--deck", str(main), *history)
+    alone = run("plan", "--part", "box", "--write-deck", str(folder), *history)
     assert alone.exit_code == 2
-    assert "--deck needs --write-deck" in alone.stderr
+    assert "--write-deck needs --deck" in alone.stderr

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 import d2rpick as d2
-from tests.command import ENERGY, answer
+from tests.command import ENERGY, answer, run
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -39,8 +40,18 @@ def test_a_table_a_figure_and_a_page(tmp_path: Path) -> None:
     frame = found.to_frame()
     assert frame["status"].tolist() == [row.status for row in found.flights]
     assert found.plot().axes
-    assert "<html" in found.report(tmp_path / "plan.html").read_text()
+    page = found.report(tmp_path / "plan.html").read_text()
+    assert page.count("*DEFORMABLE_TO_RIGID_AUTOMATIC") == 2 * len(found.windows)
+    assert found.next_run == found.windows
     assert found.rigid_fraction == pytest.approx(sum(td - tr for tr, td in found.windows) / 0.42, rel=1e-3)
+
+
+def test_what_is_done_and_where_it_was_planned_is_in_the_command_that_repeats_it() -> None:
+    energy = d2.read(ENERGY)  # without parts: nothing shows that it was not switched
+    found = d2.plan(energy, done=[(0.0137, 0.03)], before=energy)
+    assert found.command == ("plan", "--done", "-", "--before", ENERGY, ENERGY)
+    theirs = json.loads(run(*found.command, "-f", "json", stdin=b"0.0137 0.03\n").stdout)
+    assert {**theirs, "command": None} == {**found.to_dict(), "command": None}
 
 
 def test_a_wrong_argument_is_named() -> None:
@@ -48,5 +59,7 @@ def test_a_wrong_argument_is_named() -> None:
         d2.plan(d2.read(ENERGY), min_rigid=-1)
     with pytest.raises(ValueError, match=r"done\[0\] is"):
         d2.plan(d2.read(ENERGY), done=[(0.2, 0.1)])
+    with pytest.raises(ValueError, match="before is a run, but done names no window"):
+        d2.plan(d2.read(ENERGY), before=d2.read(ENERGY))
     with pytest.raises(d2.RangeError, match="outside the record"):
         d2.plan(d2.read(ENERGY), done=[(0.1, 0.9)])

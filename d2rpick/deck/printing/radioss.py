@@ -22,7 +22,9 @@ TAKES: tuple[str, ...] = ("step_cap", "end", "name")
 
 _RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
 _NODES_PER_LINE = 10
-_CAP_SHARE = 1000  # of the rigid window, per step: the release is at most a thousandth of it late
+# Of the rigid window, per step: the release is at most a thousandth of it late.  Each window has its own, so that
+# further windows leave the run up to them as it was.
+_CAP_SHARE = 1000
 _MOST_LEGS = 99  # the solver numbers them with two digits where it matters, in the names of time histories
 _SOLVER = (
     "Ids are main nodes of /RBODY, not bodies; an unknown one is skipped silently.",
@@ -34,12 +36,11 @@ _SOLVER = (
 )
 
 
-class Leg(NamedTuple):
-    """An engine run: its number, its end, and whether the bodies are rigid in it; ``cap`` is its largest step."""
+class EngineFile(NamedTuple):
+    """An engine run: its number, its end, and its largest step where the bodies are rigid in it, else None."""
 
     number: int
     stop: float
-    rigid: bool
     cap: float | None
 
 
@@ -47,7 +48,7 @@ def cards(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] =
     """Print the engine files, a leg up to each switch and one to the end.
 
     The main nodes are those of /RBODY in the starter file, of bodies without sensor.  Without a cap the step is
-    held below a thousandth of the shortest rigid window while the bodies are rigid.
+    held below a thousandth of the rigid window while the bodies are rigid.
 
     Raises
     ------
@@ -73,20 +74,21 @@ def cards(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] =
     return PrintedCard(text, windows, files)
 
 
-def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[Leg]:
+def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[EngineFile]:
     """Give the engine runs that the windows ask for; a window from 0 on needs none before it."""
-    cap = step_cap or float(f"{min(td - tr for tr, td in windows) / _CAP_SHARE:.2g}")
-    stops = [(time, rigid) for tr, td in windows for time, rigid in ((tr, False), (td, True)) if time > 0]
+    caps = [step_cap or float(f"{(td - tr) / _CAP_SHARE:.2g}") for tr, td in windows]
+    switches = zip(windows, caps, strict=True)
+    stops = [(time, cap) for (tr, td), own in switches for time, cap in ((tr, None), (td, own)) if time > 0]
     if len(stops) >= _MOST_LEGS:
         raise DeckError(f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected")
-    numbered = enumerate([*stops, (end, False)], start=1)
-    return [Leg(number, stop, rigid, cap if rigid else None) for number, (stop, rigid) in numbered]
+    numbered = enumerate([*stops, (end, None)], start=1)
+    return [EngineFile(number, stop, cap) for number, (stop, cap) in numbered]
 
 
-def _engine(leg: Leg, name: str, listed: Sequence[str]) -> Iterator[str]:
+def _engine(leg: EngineFile, name: str, listed: Sequence[str]) -> Iterator[str]:
     yield f"/RUN/{name}/{leg.number}"
     yield f"{leg.stop!r:>20}"
-    yield "/RBODY/ON" if leg.rigid else "/RBODY/OFF"
+    yield "/RBODY/ON" if leg.cap else "/RBODY/OFF"
     yield from listed
     if leg.cap is not None:
         yield from ("# with nothing deformable left the step would grow without limit", "/DTIX")
