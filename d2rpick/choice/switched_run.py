@@ -12,9 +12,10 @@ from d2rpick.choice.warnings import Caution
 from d2rpick.errors import RangeError
 from d2rpick.flight.energy_alone import round_off
 from d2rpick.histories.history import Given
+from d2rpick.histories.names import listing
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -103,21 +104,21 @@ def switched_history(
     windows : tuple of (float, float)
         Those that are done: ``done``, and others in which the parts have no kinetic energy.
     cautions : tuple of Caution
-        What was recognised beside ``done``.
+        What was recognised beside ``done``, and parts that were not rigid in it.
 
     Raises
     ------
     RangeError
         If a window lies outside the record, or the parts were deformable in it.
     """
-    history = reference.history
+    history, cautions = reference.history, list[Caution]()
     for tr, td in done:
         for time in (tr, td):
             history.energy_at(time)
-        _check_rigid(reference, tr, td)
+        cautions += _partly_rigid(reference, tr, td)
     absent = _absent_times(reference)
     more = tuple(one for one in absent if not any(tr < one[1] and one[0] < td for tr, td in done))
-    cautions = [
+    cautions += [
         Caution(
             "rigid-times",
             f"the parts were rigid from {a:.6g} to {b:.6g}, give or take an output interval: taken as done",
@@ -152,11 +153,17 @@ def _around(history: History, flights: Sequence[Flight], tr: float, td: float) -
     return best if best and shared(best) > 0 else None
 
 
-def _check_rigid(reference: Reference, tr: float, td: float) -> None:
-    """Raise RangeError where no part was rigid in a window, as far as single parts tell."""
+def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Caution]:
+    """Name the parts asked for that deform in a window; RangeError where no part was rigid, as far as parts tell."""
     run, history, parts = *reference, _deformable(reference)
     rigid = rigid_parts(run, parts, history.time, tr, td)
-    if rigid is None or rigid.any():
+    if rigid is None:
+        return
+    if rigid.any():
+        names = [part.title or f"part {part.id}" for part, one in zip(parts, rigid.tolist(), strict=True) if not one]
+        if names and history.parts:
+            found = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {listing(names)}"
+            yield Caution("partly-rigid", f"{found}; the window counts as done for the others")
         return
     if float(np.abs(history.between(tr, td)[1]).max(initial=0.0)) <= round_off(history):
         return  # a free fall looks the same

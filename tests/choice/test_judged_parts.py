@@ -10,6 +10,7 @@ import pytest
 from d2rpick.choice.of_run import Reference, compare_with, read, verify_of
 from d2rpick.choice.rigid_parts import rigid_parts
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.switched_run import switched_history
 from d2rpick.histories.opening import Selection, open_run
 from tests.shared import shared
 
@@ -79,3 +80,14 @@ def test_where_all_energies_are_reported_wrongly_only_the_motion_is_judged(parts
     assert found.momentum_error is not None
     assert found.momentum_error < 1e-5
     assert (parts == ()) == ("judged by the parts that were rigid: engine, battery, wheels" in found.notes)
+
+
+def test_plans_go_on_from_a_run_of_which_some_parts_were_rigid() -> None:
+    heavy = read(legs("car_heavy"), Selection(parts=("11-14",)))
+    history, windows, cautions = switched_history(heavy, [(TR, TD)])
+    assert windows == ((TR, TD),)
+    (told,) = cautions
+    assert told.code == "partly-rigid"
+    assert "these parts were not rigid: bows;" in told.message
+    assert not [one for one in history.momenta if one.parts is not None]
+    assert not switched_history(read(legs("car_heavy"), Selection(parts=("12-14",))), [(TR, TD)])[2]
