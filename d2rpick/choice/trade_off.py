@@ -128,11 +128,12 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
     unbeaten = set()
     for known in (True, False):
         group = [one for one in offers if _found(one) and (one.basis != "energy") == known]
-        least = np.inf
+        least, longest = np.inf, np.inf
         for one in sorted(group, key=lambda one: (-(one.rigid_time or 0.0), _printed(one))):
-            if _printed(one) < least:
+            error, rigid = _printed(one), one.rigid_time or 0.0
+            if error < least or (error, rigid) == (least, longest):  # equal pairs do not beat each other
                 unbeaten.add(one.td)
-                least = _printed(one)
+                least, longest = error, rigid
     return (replace(one, unbeaten=one.td in unbeaten) for one in offers)
 
 
