@@ -5,6 +5,7 @@ Run as ``python -m tests.sample_deck``.  It has the parts of the sample historie
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,9 @@ import numpy as np
 from tests.command import ROOT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
+
+    from d2rpick.histories.history import Samples
 
 DECK = ROOT / "sample_data" / "rollover_box.k"
 _X, _Y, _Z = np.linspace(-0.9, 0.0, 4), np.linspace(0.0, 1.5, 6), np.linspace(0.2, 1.4, 5)
@@ -37,10 +40,10 @@ class _Mesh:
         self.nodes: dict[tuple[float, ...], int] = {}
         self.shells: list[tuple[int, list[int]]] = []
 
-    def grid(self, part: int, fixed: int, at: float, one: Sequence[float], other: Sequence[float]) -> None:
+    def grid(self, part: int, fixed: int, at: float, one: Samples, other: Samples) -> None:
         """Fill a rectangle, at a constant coordinate ``fixed``, with shells."""
-        for a, b in zip(one[:-1], one[1:], strict=True):
-            for c, d in zip(other[:-1], other[1:], strict=True):
+        for a, b in itertools.pairwise(one):
+            for c, d in itertools.pairwise(other):
                 corners = [(a, c), (b, c), (b, d), (a, d)]
                 self.shells.append((part, [self._node(*np.insert(corner, fixed, at)) for corner in corners]))
 

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.deck.inventory import ls_dyna, read_inventory
-from d2rpick.deck.inventory.model import Inventory
 from d2rpick.deck.reader import read_deck
 from d2rpick.errors import DeckError
 from tests.decks import read, write
@@ -20,6 +19,8 @@ from tests.shared import shared
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+    from d2rpick.deck.inventory.model import Inventory
 
 HEAD = "*KEYWORD\n*PART\na\n         7         1         1\n*PART\nb\n         9         1         1\n"
 
@@ -45,29 +46,37 @@ def counted(found: Inventory) -> dict[int, dict[str, int]]:
 
 
 SHELLS = row(1, 7, 1, 2, 4, 3) + row(2, 7, 5, 6, 8, 7)
+WIDE = row(1, 7, 1, 2, 4, 3, width=10) + row(2, 7, 5, 6, 8, 7, width=10)
+LINES = SHELLS.splitlines(keepends=True)
+
+
+def after_each(line: str) -> str:
+    """Shells, each with a line of an option below."""
+    return "".join(f"{shell}{line}\n" for shell in LINES)
+
+
 FORMS = {
-    "plain": (nodes(), "*ELEMENT_SHELL\n" + SHELLS),
-    "i10": (nodes(10).replace("", "", 1), "*ELEMENT_SHELL %\n" + row(1, 7, 1, 2, 4, 3, width=10) + row(2, 7, 5, 6, 8, 7, width=10)),
-    "i10 in the name": (nodes(), "*ELEMENT_SHELL%\n" + row(1, 7, 1, 2, 4, 3, width=10) + row(2, 7, 5, 6, 8, 7, width=10)),
-    "commas": (nodes(), "*ELEMENT_SHELL\n1,7,1,2,4,3\n2,7,5,6,8,7\n"),
-    "commas and columns": (nodes(), "*ELEMENT_SHELL\n1,7,1,2,4,3\n" + row(2, 7, 5, 6, 8, 7)),
-    "parameter": ("*PARAMETER\nI      pid         7\n*NODE\n" + nodes(), "*ELEMENT_SHELL\n       1    &pid       1       2       4       3\n" + row(2, 7, 5, 6, 8, 7)),
-    "thickness": (nodes(), "*ELEMENT_SHELL_THICKNESS\n" + "".join(line + "             1.0" * 4 + "\n" for line in SHELLS.splitlines(True))),
-    "whole thickness": (nodes(), "*ELEMENT_SHELL_THICKNESS\n" + "".join(line + "               1" * 4 + "\n" for line in SHELLS.splitlines(True))),
-    "beta": (nodes(), "*ELEMENT_SHELL_BETA\n" + "".join(line + "             0.0\n" for line in SHELLS.splitlines(True))),
-    "comments and blank lines": (nodes(), "*ELEMENT_SHELL\n$#   eid     pid\n" + SHELLS.replace("\n", "\n$ 1 7 1 2 3\n\n", 1)),
-    "lower case": (nodes(), "*Element_Shell\n" + SHELLS),
-    "CR LF": (nodes(), ("*ELEMENT_SHELL\n" + SHELLS).replace("\n", "\r\n")),
-    "triangles": (nodes(), "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 4) + row(2, 7, 5, 6, 8)),
-    "trailing nodes": (nodes(), "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 3, 0, 0, 0, 0) + row(2, 7, 5, 6, 8, 7, 0, 0, 0, 0)),
-}  # fmt: skip
+    "plain": f"*ELEMENT_SHELL\n{SHELLS}",
+    "i10": f"*ELEMENT_SHELL %\n{WIDE}",
+    "i10 in the name": f"*ELEMENT_SHELL%\n{WIDE}",
+    "commas": "*ELEMENT_SHELL\n1,7,1,2,4,3\n2,7,5,6,8,7\n",
+    "commas and columns": f"*ELEMENT_SHELL\n1,7,1,2,4,3\n{LINES[1]}",
+    "parameter": "*PARAMETER\nI      pid         7\n*ELEMENT_SHELL\n" + SHELLS.replace("       7", "    &pid", 1),
+    "thickness": "*ELEMENT_SHELL_THICKNESS\n" + after_each("             1.0" * 4),
+    "whole thickness": "*ELEMENT_SHELL_THICKNESS\n" + after_each("               1" * 4),
+    "beta": "*ELEMENT_SHELL_BETA\n" + after_each("             0.0"),
+    "comments and blank lines": "*ELEMENT_SHELL\n$#   eid     pid\n" + SHELLS.replace("\n", "\n$ 1 7 1 2 3\n\n", 1),
+    "lower case": f"*Element_Shell\n{SHELLS}",
+    "CR LF": f"*ELEMENT_SHELL\n{SHELLS}".replace("\n", "\r\n"),
+    "triangles": "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 4) + row(2, 7, 5, 6, 8),
+    "trailing nodes": "*ELEMENT_SHELL\n" + SHELLS.replace("\n", "       0" * 4 + "\n"),
+}
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_two_shells_are_counted_in_every_form(tmp_path: Path, form: str) -> None:
-    mesh, elements = FORMS[form]
-    mesh = mesh if mesh.startswith("*") else f"*NODE{' %' if form == 'i10' else ''}\n{mesh}"
-    found = inventory(tmp_path, f"{HEAD}{mesh}{elements}*END\n")
+    mesh = f"*NODE %\n{nodes(10)}" if form == "i10" else f"*NODE\n{nodes()}"
+    found = inventory(tmp_path, f"{HEAD}{mesh}{FORMS[form]}*END\n")
     assert counted(found) == {7: {"shell": 2}}
     assert found.notes == ()
     assert found.rigid_nodes([7]) == (6 if form == "triangles" else 8)
@@ -138,7 +147,8 @@ def test_a_deck_without_parts_is_refused(tmp_path: Path) -> None:
 
 def test_materials_and_sections_are_told(tmp_path: Path) -> None:
     cards = (
-        "*MAT_RIGID\n" + row(1, width=10) + "*MAT_SPRING_ELASTIC\n" + row(2, width=10) + "*MAT_DAMPER_VISCOUS_TITLE\nd\n"
+        "*MAT_RIGID\n" + row(1, width=10) + "*MAT_SPRING_ELASTIC\n" + row(2, width=10)
+        + "*MAT_DAMPER_VISCOUS_TITLE\nd\n"
         + row(3, width=10) + "*MAT_FABRIC\n" + row(4, width=10) + "*MAT_SIMPLIFIED_RUBBER/FOAM\n" + row(5, width=10)
         + "*SECTION_SOLID\n" + row(1, 1, width=10)
     )  # fmt: skip
