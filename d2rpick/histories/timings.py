@@ -30,7 +30,7 @@ _D3HSP_SETUP: Final = re.compile(
     rb"^ *(?:Keyword Processing|Initialization|MPP Decomposition)" + _D3HSP_ROW, re.MULTILINE
 )
 _D3HSP_CYCLES: Final = re.compile(rb"Problem cycle *= *(\d+)")
-_ZONE: Final = re.compile(rb"^ time(?:\.{5,}| per zone cycle\.\(nanosec\)\.\.) *" + _NUMBER, re.MULTILINE)
+_ZONE: Final = re.compile(rb"^ time(?:\.{5,}| per zone cycle\.\(nanosec\)\.\.) +" + _NUMBER, re.MULTILINE)
 _PER_ZONE: Final = b" time per zone"
 
 

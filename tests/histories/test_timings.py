@@ -29,7 +29,7 @@ def test_a_real_d3hsp_is_read_by_the_clock_where_processor_times_are_rounded_to_
 def test_smallest_steps_of_a_real_d3hsp_are_found_beside_the_history(tmp_path: Path, name: str) -> None:
     (tmp_path / "d3hsp").write_bytes(shared(HISTORIES + name).read_bytes())
     expected = 5.4722e-5 if "R12" in name else 6.0802e-5
-    assert printed_steps(open_run([GLSTAT]), str(tmp_path / "main.k")) == {101: (expected, "d3hsp")}
+    assert printed_steps(open_run([GLSTAT]), str(tmp_path / "main.k"))[101] == (expected, "d3hsp")
 
 
 def test_the_part_that_controls_the_step_is_found_in_a_real_glstat() -> None:
