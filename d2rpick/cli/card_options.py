@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
 
-_RANGE: Final = re.compile(r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?", re.ASCII)
+_RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
 _MOST_IDS: Final = 100_000
 _NAMES: Final = ("node", "merge", "swset", "step_cap", "end", "name")
 
@@ -162,7 +162,7 @@ def numbers(option: str, texts: Sequence[str]) -> list[int]:
     """Numbers and ranges as they are typed; without a history nobody knows which of a range exist."""
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
-        found = _RANGE.fullmatch(piece)
+        found = re.fullmatch(_RANGE, piece, re.ASCII)
         if not found:
             hint = "; titles need a --history that has parts" if option == "--part" else ""
             raise click.UsageError(f"{option}: {piece!r} is not a number (7) or range (10-19){hint}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,6 +9,7 @@ import click
 from d2rpick.cli import deck_cost, plan_deck
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
+from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS, Shown, write
@@ -86,7 +86,7 @@ def command(
         options = deck_cost.with_recommended(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
         settings, unknown = deck_cost.with_cost(settings, reference.history, model)
-        earlier = reference.like(replace(asked, names=before).open(), asked.selection) if before else None
+        earlier = reference.like(asked._replace(names=before).open(), asked.selection) if before else None
     windows = _windows(done) if done else ()
     plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
     plan = plan._replace(cautions=(*plan.cautions, *unknown))
@@ -131,11 +131,13 @@ def _beside(plan: Plan, reference: Reference, options: dict[str, Any], output: O
 
         output.write(options["plot"], figures.render(draw_plan(plan), options["plot"]))
     if options["report"]:
+        from d2rpick.choice.explored import explored_flights
         from d2rpick.report.plan_page import as_page
 
         found = _judged(plan, reference, options, every=False)
         card = found[0].text if found else None
-        output.write(options["report"], text_bytes(as_page(plan, reference.run, shared.repeat(), card)))
+        explorer = explorer_of(explored_flights(reference, plan))
+        output.write(options["report"], text_bytes(as_page(plan, reference.run, shared.repeat(), card, explorer)))
 
 
 def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool) -> tuple[str, bool]:

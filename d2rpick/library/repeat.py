@@ -17,7 +17,12 @@ def command_line(
     command: str, times: Sequence[str], run: Run, selection: Selection, choosing: Choosing
 ) -> tuple[str, ...]:
     """Give the arguments of ``d2rpick`` that ask the same question."""
-    return (command, *times, *options_of(selection, choosing), *run.sources)
+    return (command, *times, *asking(run, selection, choosing))
+
+
+def asking(run: Run, selection: Selection, choosing: Choosing) -> tuple[str, ...]:
+    """Give what follows the times in such a command line."""
+    return (*options_of(selection, choosing), *run.sources)
 
 
 def options_of(selection: Selection, choosing: Choosing) -> tuple[str, ...]:

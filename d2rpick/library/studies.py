@@ -66,13 +66,14 @@ class Study:
 
     def plot(self) -> Figure:
         """Draw the energies over each other, with every tr, as a matplotlib Figure."""
-        from d2rpick.report.figures import draw_study
+        from d2rpick.report.figures_study import draw_study
 
         return draw_study(self._core)
 
     def report(self, path: arguments.Path) -> Path:
         """Write the study to one HTML page that needs no network; an existing file is replaced."""
-        from d2rpick.report.figures import both_widths, draw_study
+        from d2rpick.report.figures import both_widths
+        from d2rpick.report.figures_study import draw_study
         from d2rpick.report.study_page import as_page
 
         page = as_page(self._core, ("d2rpick", *self.command), both_widths(draw_study, self._core, "runs"))

@@ -16,6 +16,7 @@ from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import D2RPickError, RangeError
 from d2rpick.histories.names import listing
+from d2rpick.histories.outline import outline
 from d2rpick.histories.selection import Selection
 from d2rpick.histories.source import expand
 from d2rpick.version import __version__
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.settings import Settings
-    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.history import Samples
 
 # A run has one of these; the first two were judged.
 OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = "ok", "none", "unreadable", "out-of-range", "failed"
@@ -179,7 +180,7 @@ def ask(question: Question, source: str) -> Row:
         time_unit=reference.history.time_unit,
         acceptable=acceptable_windows(answer.situation, answer.candidates, best.tr if best else None),
         files=files,
-        curve=outline(reference.history) if question.curve else None,
+        curve=outline(reference.history.time, reference.history.energy, _STRETCHES) if question.curve else None,
     )
     if best is None:
         return row
@@ -201,17 +202,6 @@ def stamps(source: str) -> tuple[Stamp, ...]:
     except (D2RPickError, OSError):  # told by whoever reads it
         return ()
     return tuple(Stamp(path, state.st_size, state.st_mtime_ns) for path, state in found)
-
-
-def outline(history: History) -> Samples:
-    """Times and energies that draw the curve: all samples, or the lowest and highest of each of 200 stretches."""
-    time, energy = history.time, history.energy
-    if time.size <= 2 * _STRETCHES:
-        return np.stack([time, energy])
-    pieces = np.array_split(np.arange(time.size), _STRETCHES)
-    kept = [(piece[0] + np.argmin(energy[piece]), piece[0] + np.argmax(energy[piece])) for piece in pieces]
-    at = np.sort(np.array(kept).ravel())
-    return np.stack([time[at], energy[at]])
 
 
 def summarise(td: float, rows: Sequence[Row]) -> Study:

@@ -19,6 +19,7 @@ COMMANDS = {
     "overview": ("info", ENERGY),
     "study": ("study", "--td", "0.064", ENERGY),
     "plan": ("plan", ENERGY),
+    "trade_off": ("explore", "--steps", "5", ENERGY),
     "reproduction": ("reproduce", "--section", "5", "--overwrite", "--output-dir"),
     "rollover": ("rollover", "--scan"),
     "findings": ("check", "--exit-zero", "sample_data/switching.k", "--history", "sample_data/energy.glstat"),
