@@ -90,6 +90,16 @@ def test_a_part_whose_material_is_missing_is_not_judged(tmp_path: Path) -> None:
     assert (found.rows[1].verdict, found.rows[1].reasons) == ("unknown", ("its material is not in the deck",))
 
 
+def test_elements_in_a_file_that_is_missing_are_not_taken_for_none(tmp_path: Path) -> None:
+    part = "\nmore\n         4         1         1\n*SECTION_SHELL"
+    whole = asked(BOX, variant(tmp_path, ("\n*SECTION_SHELL", part)))
+    assert (whole.rows[3].verdict, whole.rows[3].reasons) == ("keep", ("no elements",))
+    found = asked(BOX, variant(tmp_path, ("\n*SECTION_SHELL", part), ("*END", "*INCLUDE\nmesh.k\n*END")))
+    assert found.rows[3].verdict == "unknown"
+    assert "not in what was read of the deck" in found.rows[3].reasons[0]
+    assert found.recommended is None
+
+
 def test_rigid_in_the_deck_but_with_energy_in_the_history_is_not_taken_for_rigid(tmp_path: Path) -> None:
     found = asked(BOX, variant(tmp_path, (STEP, "step\n         2         2         2")))
     assert found.rows[1].verdict == "merge"

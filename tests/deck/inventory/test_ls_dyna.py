@@ -13,7 +13,7 @@ from d2rpick.deck.inventory import ls_dyna, read_inventory
 from d2rpick.deck.reader import read_deck
 from d2rpick.errors import DeckError
 from tests.decks import read, write
-from tests.sample_deck import DECK, deck
+from tests.sample_deck import DECK, FLYING, deck, radioss
 from tests.shared import shared
 
 if TYPE_CHECKING:
@@ -140,6 +140,27 @@ def test_what_is_not_followed_is_said(tmp_path: Path) -> None:
         assert words in told
 
 
+def test_large_ids_are_kept_apart_and_numbers_beyond_them_are_not_ids(tmp_path: Path) -> None:
+    head = "*KEYWORD LONG=Y\n*PART\na\n" + row(7, 1, 1, width=20) + "*ELEMENT_SHELL\n"
+    first = 4_000_000_000
+    shells = row(1, 7, first, first + 1, first + 2, first + 3, width=20) + row(2, 7, first, 5, 6, first + 9, width=20)
+    wide = f"{3:20d}{7:20d}{'9' * 20}{first:20d}{first:20d}\n"
+    found = inventory(tmp_path, f"{head}{shells}{wide}*END\n")
+    assert counted(found) == {7: {"shell": 2}}
+    assert found.rigid_nodes([7]) == 7
+
+
+def test_a_deck_cut_at_any_byte_counts_what_is_whole_or_says_that_it_is_cut(tmp_path: Path) -> None:
+    text = f"{HEAD}*NODE\n{nodes()}*ELEMENT_SHELL\n{SHELLS}"
+    whole = {7: {"shell": 2}}
+    for end in range(text.index("*ELEMENT") + 16, len(text)):
+        found = inventory(tmp_path, text[:end])
+        cut = text[end - 1] != "\n"
+        assert any("is it cut" in note for note in found.notes) == cut
+        assert counted(found) in ({}, {7: {"shell": 1}}, whole)
+        assert found.complete != cut
+
+
 def test_a_deck_without_parts_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DeckError, match="no parts were found"):
         read_inventory(write(tmp_path, "*KEYWORD\n*END\n"))
@@ -189,7 +210,8 @@ def test_real_decks_hold_what_a_plain_count_finds() -> None:
     assert {part: counts.total() for part, counts in found.counts.items()} == plain
 
 
-def test_the_sample_deck_is_what_its_module_writes() -> None:
+def test_the_sample_decks_are_what_their_module_writes() -> None:
     assert DECK.read_text("utf-8") == deck()
+    assert {name: (FLYING / name).read_text("utf-8") for name in radioss()} == radioss()
     found = read_inventory(str(DECK))
     assert counted(found) == {1: {"shell": 94}, 2: {"shell": 15}, 3: {"shell": 4}}
