@@ -227,7 +227,7 @@ def _draw_motion(axes: Axes, situation: Situation, tr: float) -> None:
     axes.set_ylabel("deformation [√energy]")
 
 
-def _mark(axes: Axes, tr: float | None, td: float, width: float) -> None:
+def _mark(axes: Axes, tr: float | None, td: float | None, width: float) -> None:
     """Mark the switch times; their labels stand above the axes, away from each other and from the edges.
 
     A label takes up ``width`` of the axes: where one would reach over an edge it changes its side if there is room.
