@@ -42,17 +42,26 @@ def acceptable_windows(situation: Situation, candidates: Candidates, recommended
     Returns
     -------
     array of shape (n, 2)
-        First and last time of each window, ascending [time].  Times within one output interval of td belong to none.
+        First and last time of each window, ascending [time].
     """
+    if situation.at_rest:  # any tr before td is right
+        return np.array([[situation.earliest_tr, np.nextafter(situation.td, -np.inf)]])
     grid = monotone_grid(situation, candidates)
-    if situation.at_rest and grid.size:  # any tr before td is right
-        return grid[np.newaxis, [0, -1]]
     widest = _windows_below(situation, grid, min(situation.settings.tolerance, _residual_left(situation)))
     judged = approve(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
     kept = widest[np.reshape(judged, (-1, 3)).all(axis=1)]
     if kept.size and kept[-1, 1] >= grid[-1] and not (recommended is not None and kept[-1, 0] <= recommended):
         kept = kept[:-1]
     return kept
+
+
+def clear_of_td(situation: Situation, windows: Samples) -> Samples:
+    """Give the windows without what lies within one output interval of td: nothing is saved there."""
+    time = situation.history.time
+    state = int(np.searchsorted(time, situation.td))
+    end = situation.td - float(time[state] - time[state - 1])
+    kept = windows[windows[:, 0] < end]
+    return np.stack([kept[:, 0], np.minimum(kept[:, 1], end)], axis=1)
 
 
 def alike_windows(situation: Situation, candidates: Candidates, chosen: Candidate, acceptable: Samples) -> Samples:
@@ -124,14 +133,14 @@ def common_windows(runs: Sequence[Samples]) -> Samples:
 
 
 def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
-    """Times in the flight, up to one output interval before td, between which the rule changes once at most."""
-    time, start = situation.history.time, situation.earliest_tr
-    state = int(np.searchsorted(time, situation.td))
-    end = situation.td - float(time[state] - time[state - 1])
-    if start is None or max(start, time[0]) > end:
+    """Times in the flight before td between which the rule changes once at most."""
+    history, td = situation.history, situation.td
+    start = situation.earliest_tr
+    if start is None or start >= td:
         return np.zeros(0)
-    times = np.concatenate([time, candidates.tr, situation.vibration.knots(), [start, end]])
-    return np.unique(times[(times >= max(start, time[0])) & (times <= end)])
+    ends = [start, np.nextafter(td, -np.inf)]
+    times = np.concatenate([history.time, candidates.tr, situation.vibration.knots(), ends])
+    return np.unique(times[(times >= max(start, history.time[0])) & (times < td)])
 
 
 def _residual_left(situation: Situation) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows
+from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows, clear_of_td
 from d2rpick.choice.error_profile import error_profile
 from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.warnings import Caution
@@ -129,7 +129,7 @@ def ask(question: Question, source: str) -> Row:
 def row_of(source: str, answer: Suggestion) -> Row:
     """Keep of the answer for one run what a study needs."""
     best, situation = answer.chosen, answer.situation
-    acceptable = acceptable_windows(situation, answer.candidates, best.tr if best else None)
+    acceptable = clear_of_td(situation, acceptable_windows(situation, answer.candidates, best.tr if best else None))
     said = {caution.code: caution.message for caution in answer.cautions}
     row = Row(
         source=source,
