@@ -17,7 +17,7 @@ from d2rpick.choice.plan import plan_of
 from d2rpick.choice.settings import Settings
 from d2rpick.histories.opening import Selection
 from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.run import Window, simulate
+from d2rpick.models.rollover.run import RigidWindow, simulate
 from tests.drops import written
 
 SETS = tuple(
@@ -50,7 +50,7 @@ def outcome(parameters: Parameters) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
         files = written(simulate(parameters, T_END, interval=INTERVAL), Path(folder))
         windows = plan_of(read(files, BOX), Settings()).windows()
-    switched = simulate(parameters, T_END, *(Window(*one) for one in windows), interval=INTERVAL)
+    switched = simulate(parameters, T_END, *(RigidWindow(*one) for one in windows), interval=INTERVAL)
     contacts = switched.landings
     after = tuple(next((start for start, _ in contacts if start > tr), None) for tr, _ in windows)
     return Outcome(windows, after)

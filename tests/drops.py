@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.models.rollover import files
 from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.run import Window, simulate
+from d2rpick.models.rollover.run import RigidWindow, simulate
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,7 +22,7 @@ T_END = 1.2
 def drop(*windows: tuple[float, float], height: float = 0.4, tilt: float = 30.0, speed: float = 0.0) -> Record:
     """Compute a run that is switched in ``windows`` [s]."""
     parameters = Parameters(speed=speed, drop=height, tilt=tilt, mesh=MESH)
-    return simulate(parameters, T_END, *(Window(*one) for one in windows))
+    return simulate(parameters, T_END, *(RigidWindow(*one) for one in windows))
 
 
 def written(record: Record, folder: Path) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from d2rpick.models.rollover import files
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.record import BOX, Record
-from d2rpick.models.rollover.run import Window, simulate
+from d2rpick.models.rollover.run import RigidWindow, simulate
 from d2rpick.models.rollover.scan import scan, scan_times
 from tests.command import answer
 
@@ -115,7 +115,7 @@ def rehearse(parameters: Parameters, folder: Path, *, every: int = 1, interval: 
 def _mean_ratio(parameters: Parameters, tr: float, td: float, interval: float) -> float:
     """Mean energy of the box after td, switched over not switched, if no ground came."""
     flying = replace(parameters, ground=NO_GROUND)
-    runs = (simulate(flying, td + MEAN_OVER, *windows, interval=interval) for windows in ((Window(tr, td),), ()))
+    runs = (simulate(flying, td + MEAN_OVER, *windows, interval=interval) for windows in ((RigidWindow(tr, td),), ()))
     means = [float(run.internal_energy[run.time > td, BOX].mean()) for run in runs]
     return means[0] / means[1]
 

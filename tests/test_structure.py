@@ -175,7 +175,10 @@ def test_the_command_line_offers_the_formats_there_are() -> None:
 
 SCHEMAS = [
     f"schemas/{name}.json"
-    for name in ("suggest-1", "plan-1", "verify-1", "info-1", "check-1", "study-1", "reproduce-2", "rollover-1")
+    for name in (
+        *("suggest-1", "explore-1", "plan-1", "verify-1", "info-1", "check-1", "study-1", "reproduce-2"),
+        "rollover-1",
+    )
 ]
 
 

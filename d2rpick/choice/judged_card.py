@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.of_run import Reference, verify_of
+from d2rpick.choice.verify import verify_at
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
 from d2rpick.deck.printing.common import Printing
+from d2rpick.errors import D2RPickError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.choice.plan import Plan
+    from d2rpick.choice.situation import Situation
     from d2rpick.choice.verify import Verdict
     from d2rpick.deck.printing.common import PrintedCard, Times
     from d2rpick.histories.history import History
@@ -35,6 +38,31 @@ class CardRequest:
         ids = self.printing.part or tuple(part.id for part in history.parts or ())
         end = float(history.time[-1]) if self.printing.end is None else self.printing.end
         return self.solver or solver_of(history.format), replace(self.printing, part=ids, end=end)
+
+
+class SolverInput(NamedTuple):
+    """Solver input for a pair of times: its ``text``, or ``refusal``, why it cannot be printed.
+
+    Both are None where nobody says whom it switches; ``solver`` is the one that it is for in any case.
+    """
+
+    solver: str
+    text: str | None = None
+    refusal: str | None = None
+
+
+def input_for(situation: Situation, tr: float, request: CardRequest) -> SolverInput:
+    """Print the card of ``tr`` and the td of a situation, judged as it is printed."""
+    solver, _ = request.of(situation.history)
+
+    def judge(early: float, late: float) -> Verdict:
+        return verify_at(situation.at(late), early)
+
+    try:
+        found = judged_card([(tr, situation.td)], situation.history, judge, request)
+    except D2RPickError as error:
+        return SolverInput(solver, refusal=str(error))
+    return SolverInput(solver, found[0].text if found else None)
 
 
 def judged_card(

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
     from d2rpick.histories.history import History, Part, Track
     from d2rpick.histories.run import Run
+    from d2rpick.vibration.fits import Fits
 
 _DEFAULT = Selection()
 
@@ -39,7 +40,8 @@ class Reference(NamedTuple):
     def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read of another run of the model the parts that this one has, whatever words they were asked for by."""
         ids = tuple(str(part.id) for part in self.history.parts or ())
-        return Reference.of(run, selection._replace(parts=ids) if ids else selection)
+        springs = tuple(str(part.id) for part in self.history.springs)
+        return Reference.of(run, selection._replace(parts=ids, springs=springs) if ids else selection)
 
 
 _Answer = TypeVar("_Answer", Suggestion, Verdict)
@@ -51,11 +53,17 @@ def read(names: Sequence[str], selection: Selection = _DEFAULT, input_format: st
 
 
 def suggest_of(
-    reference: Reference, td: float | tuple[float, float] | None, settings: Settings, *, with_better: bool = True
+    reference: Reference,
+    td: float | tuple[float, float] | None,
+    settings: Settings,
+    *,
+    with_better: bool = True,
+    fits: Fits | None = None,
 ) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window (low, high) or, for None, in the longest flight [time].
 
-    ``with_better`` False: for a given td no better one is looked for.
+    ``with_better`` False: for a given td no better one is looked for.  ``fits`` are those of an earlier look at the
+    record with the same settings.
 
     Raises
     ------
@@ -69,8 +77,8 @@ def suggest_of(
     if isinstance(td, tuple):
         from d2rpick.choice.suggest_td import suggest_in_window
 
-        return _with_health(suggest_in_window(reference.history, td, settings), reference.run)
-    answer = suggest_at(examine(reference.history, td, settings), with_better=with_better)
+        return _with_health(suggest_in_window(reference.history, td, settings, fits), reference.run)
+    answer = suggest_at(examine(reference.history, td, settings, fits), with_better=with_better)
     return _with_health(answer, reference.run)
 
 
@@ -113,7 +121,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
         start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
-    health = assess(balance, window, locked)
+    health = assess(balance, window, locked, td)
     return answer._replace(health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
 
 

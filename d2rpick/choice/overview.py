@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.choice.health import Health, assess
+from d2rpick.choice.health import Health, assess, cautions_of_health
 from d2rpick.errors import FormatError
 from d2rpick.flight.flight import all_seen
 from d2rpick.flight.flying_parts import with_parts_by_number
@@ -18,6 +18,7 @@ from d2rpick.histories.selection import select_parts
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.choice.warnings import Caution
     from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import Part
@@ -67,6 +68,11 @@ class Overview:
     flights: tuple[tuple[str, FreeFlight], ...]
     health: Health | None
     notes: tuple[str, ...]
+
+    @property
+    def cautions(self) -> tuple[Caution, ...]:
+        """What to know of the health of the run."""
+        return tuple(cautions_of_health(self.health)) if self.health else ()
 
 
 def survey(run: Run, selection: Selection) -> Overview:
@@ -141,7 +147,7 @@ def _health(run: Run, flights: Sequence[FreeFlight]) -> Health | None:
     if balance is None:
         return None
     longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)
-    return assess(balance, (longest.start, longest.end) if longest else None)
+    return assess(balance, (longest.start, longest.end) if longest else None, until=float(balance.time[-1]))
 
 
 def _flights(run: Run, selection: Selection) -> tuple[tuple[str, FreeFlight], ...]:

@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
-from d2rpick.choice.ranking import best_of, over_limits, rank
+from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, over_limits, rank
 from d2rpick.choice.verify import verify_at
-from d2rpick.choice.warnings import Caution, cautions_of
+from d2rpick.choice.warnings import Caution, cautions_of, out_of_place
 from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate, Candidates
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.health import Health
+    from d2rpick.choice.quality import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 # Pairs at other peaks that may turn out not to verify when the record is examined there, before it is given up.
 _MOST_REFUSED = 3
-# Decimals of a residual that people read.
-_READ = 3
 
 
 class Pair(NamedTuple):
@@ -73,14 +72,41 @@ class Suggestion(NamedTuple):
         return None if place is None else self.candidates[place]
 
     @property
+    def acceptable_windows(self) -> tuple[tuple[float, float], ...]:
+        """First and last acceptable tr of each window of them, on any basis [time]."""
+        if self.windows is not None:
+            return tuple((one.start, one.end) for one in self.windows)
+        from d2rpick.choice.acceptable_windows import acceptable_windows  # not above: a table does without it
+
+        best = self.recommended
+        found = acceptable_windows(self.situation, self.candidates, best.tr if best else None)[0].tolist()
+        return tuple((start, end) for start, end in found)
+
+    @property
+    def quality(self) -> Quality | None:
+        """How good the recommended pair is; None without one."""
+        best = self.chosen
+        if best is None:
+            return None
+        from d2rpick.choice.quality import quality_of  # not above: a bare value does without it
+
+        return quality_of(self.situation, best, self.expected)
+
+    @property
     def clearly_better(self) -> Pair | None:
-        """The better pair where it is another one and better than that recommended, to the digits people read."""
+        """The better pair where it is better than that recommended by more than what counts as equally good.
+
+        Residuals are compared; on basis "energy" the amplitudes of the levels at td.
+        """
         better, own = self.better_pair, self.recommended
         if better is None or own is None:
             return better
         if better.residual is not None and own.residual is not None:
-            return better if round(better.residual, _READ) < round(own.residual, _READ) else None
-        return better if f"{better.td:.6g}" != f"{own.td:.6g}" else None
+            bound = self.chosen.residual_high if self.chosen else None
+            uncertain = 0.0 if bound is None else bound - own.residual
+            return better if own.residual - better.residual > max(EQUALLY_GOOD, uncertain) else None
+        levels = [max(self.situation.vibration.energy(td), 0.0) ** 0.5 for td in (better.td, own.td)]
+        return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
 
 
 def suggest(history: History, td: float, settings: Settings) -> Suggestion:
@@ -96,7 +122,9 @@ def suggest_at(situation: Situation, *, with_better: bool = True) -> Suggestion:
         candidates = candidates.recommending(best.rank - 1)
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
-    if not best:
+    if best:
+        cautions += out_of_place(situation, best.position_error)
+    else:
         cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
     if with_better and not better:
         cautions.append(Caution("no-better-td", "no peak of the energy in the flight has an acceptable tr"))

@@ -6,12 +6,15 @@ from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.margin import margin_before_contact
-from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, rank
+from d2rpick.choice.ranking import best_of, like_quality, rank
+from d2rpick.choice.reach_back import longest_rigid_times
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import SOURCES, witnesses
@@ -44,12 +47,16 @@ def suggest_in_longest_flight(history: History, settings: Settings) -> Suggestio
     RangeError
         If nothing in the record shows a flight.
     """
+    return suggest_in_window(history, longest_flight(history, settings), settings)
+
+
+def longest_flight(history: History, settings: Settings) -> tuple[float, float]:
+    """Give the longest flight as a window within the record [time]; RangeError where nothing shows a flight."""
     flights = flights_of(history, settings)
     if not flights:
         found = f"{', '.join(history.source)}: nothing in the record shows a flight"
         raise RangeError(f"{found}; name td, or a window for it")
-    window = max((bounds(history, flight) for flight in flights), key=lambda one: one[1] - one[0])
-    return suggest_in_window(history, window, settings)
+    return max((bounds(history, flight) for flight in flights), key=lambda one: one[1] - one[0])
 
 
 def flights_of(history: History, settings: Settings) -> tuple[Flight, ...]:
@@ -68,7 +75,9 @@ def bounds(history: History, flight: Flight) -> tuple[float, float]:
     return first if flight.start is None else flight.start, last if flight.end is None else flight.end
 
 
-def suggest_in_window(history: History, window: tuple[float, float], settings: Settings) -> Suggestion:
+def suggest_in_window(
+    history: History, window: tuple[float, float], settings: Settings, fits: Fits | None = None
+) -> Suggestion:
     """Choose td in ``window`` and tr for it; RangeError when the window lies outside the record.
 
     Of the pairs of all peaks of the energy those that are alike in quality count, and of these the one with the
@@ -76,15 +85,28 @@ def suggest_in_window(history: History, window: tuple[float, float], settings: S
     energy alone, a level within the tolerance of the best one, which is twice the mean energy.  td keeps the margin
     from the contact, unless the whole window lies in it.  Without an acceptable peak the ends of the window are tried.
     """
-    for time in window:
-        history.energy_at(time)
-    look = cache(partial(examine, history, settings=settings, fits=Fits()))  # the record is examined once for each td
-    situation = _flying(look, window)
-    inside = window[0], _latest(situation, window)
+    look = looking(history, settings, fits)
+    situation, inside = within_flight(look, history, window)
     choose = _by_level if situation.vibration.unknown else _by_residual
     chosen, longest = choose(situation, inside, look)
     found = suggest_at(look(chosen if chosen is not None else inside[1]))
     return found._replace(td_window=window, longer=_given_up(longest, found.recommended, inside, look))
+
+
+def looking(history: History, settings: Settings, fits: Fits | None = None) -> Look:
+    """Give what examines a record once for each td, by ``fits`` of an earlier look with the same settings."""
+    return cache(partial(examine, history, settings=settings, fits=fits or Fits()))
+
+
+def within_flight(look: Look, history: History, window: tuple[float, float]) -> tuple[Situation, tuple[float, float]]:
+    """Give the situation that is known best in ``window``, and the part of it that keeps the margin [time].
+
+    RangeError when the window lies outside the record.
+    """
+    for time in window:
+        history.energy_at(time, "td_window")
+    situation = _flying(look, window)
+    return situation, (window[0], _latest(situation, window))
 
 
 def _latest(situation: Situation, window: tuple[float, float]) -> float:
@@ -125,7 +147,7 @@ def _by_residual(situation: Situation, window: tuple[float, float], look: Look) 
     highest = sorted(peaks, key=lambda t: -situation.vibration.energy(t))[:_MOST_PEAKS]
     pairs = _acceptable(look(td) for td in dict.fromkeys((*highest, *peaks[-_MOST_PEAKS:])))
     pairs = pairs or _acceptable(map(look, window))
-    limit = min((best.error for _, best in pairs), default=0.0) + EQUALLY_GOOD
+    limit = min((best.error for _, best in pairs), default=0.0) + like_quality(situation)
     alike = [pair for pair in pairs if pair[1].error <= limit]
     return _td(_longest(alike)), _td(_longest(pairs))
 
@@ -148,10 +170,12 @@ def _by_level(situation: Situation, window: tuple[float, float], look: Look) -> 
 
 
 def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice]:
-    """Give acceptable choices, the latest td first, as long as an earlier one may be longer."""
-    start, longest = situation.earliest_tr, 0.0
-    for td in sorted(times, reverse=True):
-        if start is None or td - start <= longest:
+    """Give acceptable choices, the td that may be longest first, as long as another one may be longer."""
+    tds, longest = np.fromiter(times, np.float64), 0.0
+    most = longest_rigid_times(situation, tds)
+    order = np.lexsort((-tds, -most))
+    for td, possible in zip(tds[order].tolist(), most[order].tolist(), strict=True):
+        if possible <= 0 or possible < longest:
             return
         for pair in _acceptable([situation.at(td)]):
             longest = max(longest, pair[1].rigid_time)

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
 
-_RANGE: Final = re.compile(r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?", re.ASCII)
+_RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
 _MOST_IDS: Final = 100_000
 _NAMES: Final = ("node", "merge", "swset", "step_cap", "end", "name")
 
 
-class Solver(click.types.StringParamType):
+class SolverName(click.types.StringParamType):
     """Name of a solver whose input can be printed; the table of solvers is read when it is asked."""
 
     name = "solver"
@@ -59,7 +59,7 @@ def card_options(function: shared.Decorated) -> shared.Decorated:
     """How a card is printed; collected by ``card_request``."""
     options = (
         click.option(
-            "--solver", type=Solver(),
+            "--solver", type=SolverName(),
             help="Solver whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]",
         ),
         click.option(
@@ -162,7 +162,7 @@ def numbers(option: str, texts: Sequence[str]) -> list[int]:
     """Numbers and ranges as they are typed; without a history nobody knows which of a range exist."""
     ids: list[int] = []
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
-        found = _RANGE.fullmatch(piece)
+        found = re.fullmatch(_RANGE, piece, re.ASCII)
         if not found:
             hint = "; titles need a --history that has parts" if option == "--part" else ""
             raise click.UsageError(f"{option}: {piece!r} is not a number (7) or range (10-19){hint}")

@@ -12,6 +12,7 @@ from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
 from d2rpick.cli.wording import in_words
 from d2rpick.errors import ConfigurationError, DeckError
+from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -45,7 +46,7 @@ Examples:
     show_default=True,
     help="Least severe finding that sets exit code 1.",
 )
-@shared.output_options("table", "json", "ndjson", "github", "junit", "sarif")
+@shared.output_options(*FORMATS["findings"])
 @click.pass_context
 def command(
     ctx: click.Context, /, deck: tuple[str, ...], fail_on: str, output_format: str, exit_zero: bool, **options: Any
@@ -56,18 +57,24 @@ def command(
     and the engine files of a Radioss run are one DECK, whichever is named.  `d2rpick rule` lists the rules; a comment
     line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) silences one for it.
     """
+    from d2rpick.report.findings import Checks
+    from d2rpick.report.formats import Shown, write
     from d2rpick.rules import Severity
 
     judge = _judge(options)
     output = Output.of(options, *deck, *(judge.run.sources if judge else ()))
     results, failed, inputs = _checked(deck, judge, options)
     output.spare(inputs)
-    output.notes(judge.notes if judge else (), _cautions(results, judge))
+    cautions = _cautions(results, judge)
+    output.notes(judge.notes if judge else (), cautions)
     for one in failed:
         click.echo(f"d2rpick: {one.reason}", err=True)
     limit = Severity(fail_on)
     if results or output_format != "table":
-        output.result(in_words(_text(ctx, output_format, results, failed, judge, limit), output_format))
+        checks = Checks(results, failed=failed, warnings=_warnings(cautions, failed), fail_on=limit,
+                        history=judge.run.sources if judge else None)  # fmt: skip
+        text = write("findings", output_format, checks, Shown(ctx.meta["d2rpick.command"]))
+        output.result(in_words(text, output_format))
     if not results:
         ctx.exit(2)
     heavy = any(finding.severity.rank <= limit.rank for result in results for finding in result.findings)
@@ -145,32 +152,11 @@ def _cautions(results: Sequence[Checked], judge: HistoryJudge | None) -> list[Ca
     return [*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)]
 
 
+def _warnings(cautions: Sequence[Caution], failed: Sequence[Unreadable]) -> list[dict[str, str]]:
+    from d2rpick.report.keys import of_warnings
+
+    return of_warnings(cautions) + [{"code": "unreadable-deck", "message": one.reason} for one in failed]
+
+
 def _ids(texts: Sequence[str]) -> tuple[str, ...]:
     return tuple(name.strip().upper() for text in texts for name in text.split(",") if name.strip())
-
-
-def _text(
-    ctx: click.Context,
-    form: str,
-    results: Sequence[Checked],
-    failed: Sequence[Unreadable],
-    judge: HistoryJudge | None,
-    limit: Any,
-) -> str:
-    from pathlib import Path
-
-    from d2rpick.report import findings as report
-
-    root = Path.cwd()
-    warnings = [{"code": c.code, "message": c.message} for c in _cautions(results, judge)]
-    warnings += [{"code": "unreadable-deck", "message": one.reason} for one in failed]
-    sources = judge.run.sources if judge else None
-    texts = {
-        "table": lambda: report.as_table(results, root, failed),
-        "json": lambda: report.as_json(results, root, ctx.meta["d2rpick.command"], warnings, sources),
-        "ndjson": lambda: report.as_ndjson(results, root, ctx.meta["d2rpick.command"], warnings, sources),
-        "github": lambda: report.as_github(results, root, failed),
-        "junit": lambda: report.as_junit(results, root, limit, failed),
-        "sarif": lambda: report.as_sarif(results, root, failed),
-    }
-    return texts[form]()

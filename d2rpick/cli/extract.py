@@ -32,8 +32,8 @@ def command(write_as: str | None, **options: Any) -> None:
     """Write the chosen energy of HISTORY as columns time and internal_energy.
 
     With more than one part a column part_<id> for each follows, then what else is known at these times of the whole
-    model: kinetic energy, total energy, external work, contact energy, momentum, ... Where the files have the momenta
-    of parts, those that fly together with the chosen ones count.
+    model: total internal energy, kinetic energy, external work, contact energy, momentum, ... Where the files have the
+    momenta of parts, those that fly together with the chosen ones count.
     """
     from d2rpick.choice.of_run import Reference
     from d2rpick.histories.writing import TABLE_WRITERS, format_of
@@ -48,9 +48,23 @@ def command(write_as: str | None, **options: Any) -> None:
         if history.parts and len(history.parts) > 1:
             energies = run.part_energies(history.parts)
             table |= {f"part_{part.id}": column for part, column in zip(history.parts, energies.T, strict=True)}
-        table |= run.quantities(history.time) | _momentum(history)
+        table |= run.quantities(history.time) | _of_model(history) | _momentum(history)
     output.notes(history.notes, ())
     output.content(TABLE_WRITERS[form](table))
+
+
+def _of_model(history: History) -> dict[str, Samples]:
+    """Columns of the whole model as its balance takes them, where they are written at the times of the energy.
+
+    The kinetic energy is that with rotation; the internal one is there where the chosen one is that of some parts.
+    """
+    import numpy as np
+
+    balance = history.balance
+    if balance is None or not np.array_equal(balance.time, history.time):
+        return {}
+    terms = {"kinetic_energy": balance.kinetic, "total_internal_energy": balance.internal if history.parts else None}
+    return {name: term for name, term in terms.items() if term is not None}
 
 
 def _momentum(history: History) -> dict[str, Samples]:

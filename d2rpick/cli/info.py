@@ -26,13 +26,12 @@ Examples:
 def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **options: Any) -> None:  # noqa: ARG001
     """Show what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health."""
     from d2rpick.choice.overview import survey
-    from d2rpick.report import overview as report
 
     asked = shared.Reading.of(options)
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
         output = Output.of(options, *run.sources)
         overview = survey(run, asked.selection)
-    output.notes((), report.cautions(overview))
+    output.notes((), overview.cautions)
     text = write("overview", output_format, overview, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))

@@ -36,7 +36,7 @@ class Output(NamedTuple):
         if plot is not None:
             from d2rpick.report import figures
 
-            figures.format_of(plot)
+            figures.picture_format(plot)
         if options.get("report") == "-":
             raise D2RPickError("-: --report writes a file; give its name")
         names = {"--output-file": options["output_file"], "--plot": plot, "--report": options.get("report")}

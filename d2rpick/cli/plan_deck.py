@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli.deck_cost import cost_options
 
 if TYPE_CHECKING:
     from d2rpick.choice.plan import Plan
@@ -15,27 +16,18 @@ if TYPE_CHECKING:
 
 
 def deck_options(function: shared.Decorated) -> shared.Decorated:
-    """``--deck`` and ``--write-deck``."""
-    options = (
-        click.option(
-            "--deck", metavar="DECK", type=shared.FILE,
-            help="Main deck of the run (Radioss: its starter or engine file), for --write-deck.",
-        ),
-        click.option(
-            "--write-deck", metavar="DIR", type=shared.FILE,
-            help="Write a copy of --deck with the cards of the windows into this folder, and check it.",
-        ),
+    """``--deck``, ``--weights`` and ``--write-deck``."""
+    write = click.option(
+        "--write-deck", metavar="DIR", type=shared.FILE,
+        help="Write a copy of --deck with the cards of the windows into this folder, and check it.",
     )  # fmt: skip
-    for option in reversed(options):
-        function = option(function)
-    return function
+    return cost_options(write(function))
 
 
 def check_usage(deck: str | None, folder: str | None) -> None:
-    """Raise UsageError where one of the two options stands alone."""
-    if (deck is None) != (folder is None):
-        given, missing = ("--write-deck", "--deck") if deck is None else ("--deck", "--write-deck")
-        raise click.UsageError(f"{given} needs {missing}: the deck, and the folder for its copy with the cards")
+    """Raise UsageError where there is no deck to be copied."""
+    if folder is not None and deck is None:
+        raise click.UsageError("--write-deck needs --deck, the deck that is copied with the cards")
 
 
 def for_deck(options: dict[str, Any]) -> dict[str, Any]:
@@ -61,10 +53,8 @@ def write_and_check(card: PrintedCard, plan: Plan, run: Run, options: dict[str, 
     passed : bool
         Whether no finding is an error.
     """
-    from pathlib import Path
-
     from d2rpick.deck.writing import write_deck
-    from d2rpick.report import findings
+    from d2rpick.report.findings import Checks, as_table
     from d2rpick.rules import Severity, check_deck, configuration_for
     from d2rpick.rules.configuration import Configuration
     from d2rpick.rules.judgement import HistoryJudge
@@ -74,5 +64,5 @@ def write_and_check(card: PrintedCard, plan: Plan, run: Run, options: dict[str, 
     judge = HistoryJudge(run, shared.selection({**options, "part": ()}), plan.settings, done)
     checked = check_deck(written[0], configuration_for(written[0], Configuration()), judge)
     listed = [f"written  {name}" for name in written]
-    text = "\n".join([*listed, "", findings.as_table([checked], Path.cwd(), [])])
+    text = "\n".join([*listed, "", as_table(Checks([checked]))])
     return text, all(one.severity is not Severity.ERROR for one in checked.findings)

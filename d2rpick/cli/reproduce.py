@@ -8,6 +8,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
+from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
     from d2rpick.models.exhibit import Exhibit
-    from d2rpick.models.published import Row
+    from d2rpick.report.reproduction import Reproduction
 
 EXAMPLES = """\b
 Examples:
@@ -57,7 +58,7 @@ PICTURES = ("svg", "png")
     + "; repeatable.",
 )
 @click.option("--report", metavar="FILE", type=shared.FILE, help="Write all of it to one HTML page.")
-@shared.output_options("table", "json", "csv", "markdown")
+@shared.output_options(*FORMATS["reproduction"])
 @click.pass_context
 def command(
     ctx: click.Context, /, output_dir: str, section: Sequence[str], solver: Sequence[str], report: str | None,
@@ -70,25 +71,21 @@ def command(
     about half a minute.
     """
     from d2rpick.models.published import table
-    from d2rpick.report import reproduction
+    from d2rpick.report.formats import Shown, write
+    from d2rpick.report.reproduction import Reproduction
 
     output = Output.of({**options, "report": report}, *solver)
     curves, place = _solver(solver), _made(output_dir)  # before the half minute that the box takes
-    rows, shown = table(), list(_exhibits(section, curves))
-    files = _write(output, place, rows, shown)
+    answer = Reproduction(table(), list(_exhibits(section, curves)))
+    files = _write(output, place, answer)
     if report:
         from d2rpick.report.reproduction_page import as_page
 
-        output.write(report, as_page(rows, shown, shared.repeat()).encode())
-    texts = {
-        "table": lambda: reproduction.as_table(rows, shown),
-        "markdown": lambda: reproduction.as_markdown(rows, shown),
-        "csv": lambda: reproduction.as_csv(rows),
-        "json": lambda: reproduction.as_json(rows, shown, files, ctx.meta["d2rpick.command"]),
-    }
-    output.result(texts[output_format]())
+        output.write(report, as_page(answer.rows, answer.exhibits, shared.repeat()).encode())
+    answer = answer._replace(files=files)
+    output.result(write("reproduction", output_format, answer, Shown(ctx.meta["d2rpick.command"])))
     output.notes([f"{len(files)} files in {output_dir}"], ())
-    finish(ctx, objection=not all(row.agrees for row in rows), exit_zero=exit_zero)
+    finish(ctx, objection=not all(row.agrees for row in answer.rows), exit_zero=exit_zero)
 
 
 def _exhibits(sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]) -> Iterator[Exhibit]:
@@ -132,14 +129,14 @@ def _made(folder: str) -> Path:
     return place
 
 
-def _write(output: Output, place: Path, rows: Sequence[Row], shown: Sequence[Exhibit]) -> list[str]:
+def _write(output: Output, place: Path, answer: Reproduction) -> list[str]:
     """Write all files, or none where one may not be written; give their names."""
     from d2rpick.histories.formats import csv_table
     from d2rpick.report import figures, figures_models, reproduction
 
-    index = reproduction.as_markdown(rows, shown, pictures=True)
-    contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{reproduction.as_csv(rows)}\n".encode()}
-    for one in shown:
+    index = reproduction.as_markdown(answer, pictures=True)
+    contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{reproduction.as_csv(answer.rows)}\n".encode()}
+    for one in answer.exhibits:
         figure = figures_models.draw_exhibit(one)
         contents |= {f"{one.name}.{form}": figures.render(figure, f"x.{form}") for form in PICTURES}
         if one.columns:

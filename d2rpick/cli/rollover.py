@@ -9,16 +9,17 @@ import click
 from d2rpick.cli import options as shared
 from d2rpick.cli.output import Output, finish
 from d2rpick.cli.progress import counting
+from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from d2rpick.choice.warnings import Caution
     from d2rpick.models.rollover.model import Parameters
     from d2rpick.models.rollover.record import Record
 
 MOST_STATES = 1_000_000
-FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.models.rollover.files, which --help does without
+HISTORIES = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.models.rollover.files, which --help does without
 PARAMETERS = ("speed", "stiffness", "yield_strain", "damping", "mesh", "drop", "tilt", "ground_stiffness")
 TD = 0.37  # of the published study, 10 ms before the ground comes
 TILT = 30.0  # of a box that falls: on an edge, so that it tumbles
@@ -65,10 +66,10 @@ Examples:
 @click.option("--damping", type=shared.NOT_NEGATIVE, help="Rate of the mass damping, 1/s.  [default: 0.2]")
 @click.option("--mesh", type=click.IntRange(4, 200), help="Cells along each side of the box.  [default: 16]")
 @click.option(
-    "--write-as", type=click.Choice(FORMATS), help="Format of a history.  [default: by the name of -o, else csv]"
+    "--write-as", type=click.Choice(HISTORIES), help="Format of a history.  [default: by the name of -o, else csv]"
 )
 @click.option(
-    "-f", "--output-format", type=click.Choice(["table", "json", "csv", "markdown"]), help="Form of a scan.  "
+    "-f", "--output-format", type=click.Choice(list(FORMATS["rollover"])), help="Form of a scan.  "
     "[default: table]",
 )  # fmt: skip
 @click.option(
@@ -138,14 +139,14 @@ def _run(options: dict[str, Any]) -> None:
     """One run; for a plot also the one without switching."""
     from d2rpick.histories.writing import format_of
     from d2rpick.models.rollover import files
-    from d2rpick.models.rollover.run import Window, simulate
+    from d2rpick.models.rollover.run import RigidWindow, simulate
 
-    form = options["write_as"] or format_of(options["output_file"], FORMATS)
+    form = options["write_as"] or format_of(options["output_file"], HISTORIES)
     output = Output.of(options)
     parameters, plot = _parameters(options), options["plot"]
-    windows = tuple(map(Window, options["tr"], options["td"]))
+    windows = tuple(map(RigidWindow, options["tr"], options["td"]))
 
-    def simulated(*rigid: Window) -> Record:
+    def simulated(*rigid: RigidWindow) -> Record:
         return simulate(parameters, options["t_end"], *rigid, interval=options["dt"])
 
     record = simulated(*windows)
@@ -164,7 +165,8 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     from d2rpick.models.rollover.as_history import suggestion_for
     from d2rpick.models.rollover.run import simulate
     from d2rpick.models.rollover.scan import comparison_end, scan, scan_times
-    from d2rpick.report import rollover as report
+    from d2rpick.report.formats import Shown, write
+    from d2rpick.report.rollover import Scan
 
     output = Output.of(options)
     parameters, td, plot = _parameters(options), next(iter(options["td"]), TD), options["plot"]
@@ -185,13 +187,8 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
         from d2rpick.report import figures, figures_models
 
         output.write(plot, figures.render(figures_models.draw_scan(reference, outcomes, answer), plot))
-    texts: dict[str, Callable[[], str]] = {
-        "table": lambda: report.as_table(reference, outcomes, answer),
-        "markdown": lambda: report.as_markdown(outcomes),
-        "csv": lambda: report.as_csv(outcomes),
-        "json": lambda: report.as_json(reference, outcomes, answer, cautions, ctx.meta["d2rpick.command"]),
-    }
-    output.result(texts[options["output_format"] or "table"]())
+    found = Scan(reference, outcomes, answer, cautions)
+    output.result(write("rollover", options["output_format"] or "table", found, Shown(ctx.meta["d2rpick.command"])))
     finish(ctx, objection=answer.recommended is None, exit_zero=options["exit_zero"])
 
 

@@ -177,14 +177,14 @@ def _write_files(answer: Study, plot: str | None, report: str | None, output: Ou
             output.claim(name)
     if plot is None and report is None:
         return
-    from d2rpick.report import figures
+    from d2rpick.report import figures, figures_study
 
     if plot is not None:
-        output.write(plot, figures.render(figures.draw_study(answer), plot))
+        output.write(plot, figures.render(figures_study.draw_study(answer), plot))
     if report is not None:
         from d2rpick.report.study_page import as_page
 
-        drawing = figures.both_widths(figures.draw_study, answer, "runs")
+        drawing = figures.both_widths(figures_study.draw_study, answer, "runs")
         output.write(report, text_bytes(with_options(as_page(answer, shared.repeat(), drawing))))
 
 

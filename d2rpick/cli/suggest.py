@@ -6,14 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from d2rpick.cli import deck_cost
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
+from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.cli.wording import in_words, with_options
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
+    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.opening import Run
 
@@ -44,9 +47,11 @@ Examples:
     show_default=True,
     help="Number of rows in the table; json and csv have all.",
 )
+@deck_cost.cost_options
 @shared.history_options
 @shared.choosing_options
 @card_options
+@shared.MIN_QUALITY
 @shared.output_options(*FORMATS["suggestion"], "card")
 @click.pass_context
 def command(
@@ -55,6 +60,7 @@ def command(
     td: float | None,
     td_window: tuple[float, float] | None,
     limit: int,
+    min_quality: str | None,
     output_format: str,
     exit_zero: bool,
     **options: Any,
@@ -79,20 +85,26 @@ def command(
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
         output = Output.of(options, *run.sources)
+        model = deck_cost.model_of(options)
+        options = deck_cost.with_recommended(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
     answer = suggest_of(reference, td_window if td is None else td, settings)
+    answer = answer._replace(cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
-        from d2rpick.report import figures
+        from d2rpick.report import figures, figures_choice
 
-        output.write(extras.plot, figures.render(figures.draw_suggestion(answer), extras.plot))
+        output.write(extras.plot, figures.render(figures_choice.draw_suggestion(answer), extras.plot))
     if extras.report:
-        output.write(extras.report, text_bytes(with_options(_page(answer, run, options))))
+        output.write(extras.report, text_bytes(with_options(_page(answer, reference, options))))
+    poor = shared.falls_short(answer.quality, min_quality)
     if output_format == "card":
-        return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
+        passed = _card(answer, run, options, output)
+        return finish(ctx, objection=not passed or poor, exit_zero=exit_zero)
     text = write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit))
     output.result(in_words(text, output_format))
-    return finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
+    return finish(ctx, objection=answer.recommended is None or poor, exit_zero=exit_zero)
 
 
 def _only_in_environment(ctx: click.Context, option: str, *, overruled_by: str) -> bool:
@@ -111,13 +123,19 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
         raise click.UsageError("-f card needs --part, the parts to switch (Radioss: --node, their main nodes)")
 
 
-def _page(answer: Suggestion, run: Run, options: dict[str, Any]) -> str:
-    """Draw the figures, wide and narrow, and write the page around them."""
+def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> str:
+    """Draw the figures, wide and narrow, explore the flight, and write the page around them."""
+    from d2rpick.choice.explored import explored_around
+    from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import Record
     from d2rpick.report.suggestion_page import as_page, drawn
 
-    request = card_request(run, options, answer.situation.history)
-    return as_page(answer, Record(run, shared.repeat(), shared.judging(options), drawn(answer), request))
+    run = reference.run
+    request, pair = card_request(run, options, answer.situation.history), answer.recommended
+    card = input_for(answer.situation, pair.tr, request) if pair else None
+    explorer = explorer_of([explored_around(reference, answer.situation, answer.td_window)])
+    judging = shared.judging(options)
+    return as_page(answer, Record(run, shared.repeat(), judging, drawn(answer), card, explorer=explorer))
 
 
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.flight.window import FEWEST, FreeFlight, lasting_window
+from d2rpick.flight.window import FEWEST, FreeFlight, Remembered, lasting_window
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Samples
@@ -30,7 +30,8 @@ def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     time, energy = balance.time, balance.sliding
     if energy is None or not time[0] <= td <= time[-1]:
         return None
-    window = lasting_window(_Constant(time, energy), td, float(np.ptp(energy)), _noise(balance))
+    law = Remembered(_Constant(time, energy))
+    window = lasting_window(law, td, float(np.ptp(energy)), _noise(balance))
     if window is None or (window[0] == 0 and balance.external_work is None):
         return None
     first, last = window

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -54,8 +53,7 @@ class Flight(NamedTuple):
         return self.source not in ("energy", None)
 
 
-@dataclass(frozen=True)
-class Witness:
+class Witness(NamedTuple):
     """One source of evidence: the flight that it shows around a time, over the times of its record.
 
     ``decisive``: where it shows none, there is none, even if it shows none anywhere.

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from functools import partial
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows, lasting_window
-from d2rpick.histories.samples import integral
+from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, Remembered, all_windows, lasting_window
+from d2rpick.histories.samples import bent, integral
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -31,6 +32,8 @@ _LONGER = 1.1
 _LOOK_BACK, _LOOK_STATES = 0.1, 200
 # Parts that are added to the chosen ones, at most, before all parts are tried.
 _MOST_ATTACHED = 12
+# Of each record, for each set of parts: it is asked about many td.
+_LAWS: WeakKeyDictionary[Momenta, dict[tuple[int, ...], tuple[FreeFall, Remembered]]] = WeakKeyDictionary()
 
 
 def to_be_asked(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
@@ -75,14 +78,23 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float) -> FreeFlight
         return FreeFlight(float(time[0]), float(time[-1]), parts, False) if known else None
     if noise > TOLERANCE * extent:
         return None
-    fit = FreeFall(time, momentum)
-    window = lasting_window(fit, td, extent, noise)
+    fit, law = _law(momenta, tuple(members))
+    window = lasting_window(law, td, extent, noise)
     if window is None:
         return None
     first, last = window
     if float(np.abs(momentum[first : last + 1]).max()) <= noise:  # held, or at rest
         return None
     return FreeFlight(float(time[first]), float(time[last]), parts, last < time.size - 1, fit.damping(first, last))
+
+
+def _law(momenta: Momenta, members: tuple[int, ...]) -> tuple[FreeFall, Remembered]:
+    """Give the law of free flight for a set of parts, made once for all td."""
+    laws = _LAWS.setdefault(momenta, {})
+    if members not in laws:
+        fit = FreeFall(momenta.time, momenta.of(members))
+        laws[members] = fit, Remembered(fit)
+    return laws[members]
 
 
 def all_flights(momenta: Momenta) -> tuple[FreeFlight, ...]:
@@ -114,6 +126,7 @@ class FreeFall:
     def __init__(self, time: Samples, momentum: Samples) -> None:
         self.time, self.momentum = time, momentum
         self.integral = integral(time, momentum)
+        self._both = np.hstack([momentum, self.integral])
 
     def misfit(self, first: int, last: int) -> float:
         """Largest deviation of the momentum from free flight between two states [momentum]."""
@@ -134,16 +147,9 @@ class FreeFall:
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
         """What is not straight of momentum and impulse, and the alpha >= 0 that explains the one by the other."""
         states = slice(first, last + 1)
-        p, impulse = (_bent(self.time[states], values[states]) for values in (self.momentum, self.integral))
+        p, impulse = np.hsplit(bent(self.time[states], self._both[states]), 2)
         power = float(np.sum(impulse**2))
         return p, impulse, max(0.0, -float(np.sum(impulse * p)) / power) if power > 0 else 0.0
-
-
-def _bent(time: Samples, values: Samples) -> Samples:
-    """Give what is left of each column after a straight line."""
-    t = time - time.mean()
-    centred = values - values.mean(axis=0)
-    return np.asarray(centred - np.outer(t, t @ centred / (t @ t)))
 
 
 def _sets(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
@@ -164,8 +170,8 @@ def _attached(momenta: Momenta, chosen: Sequence[int], moving: Sequence[int], td
     look = np.flatnonzero(back)[:: max(1, int(back.sum()) // _LOOK_STATES)]
     if look.size < FEWEST:
         return
-    bent = _bent(time[look], momenta.values[look].reshape(look.size, -1))
-    rests = bent.reshape(look.size, -1, 3).transpose(1, 0, 2).reshape(momenta.values.shape[1], -1)
+    rests = bent(time[look], momenta.values[look].reshape(look.size, -1))
+    rests = rests.reshape(look.size, -1, 3).transpose(1, 0, 2).reshape(momenta.values.shape[1], -1)
     total = rests[list(chosen)].sum(axis=0)
     left = [i for i in moving if i not in chosen]
     for _ in range(min(_MOST_ATTACHED, len(left))):

@@ -50,7 +50,27 @@ class Law(Protocol):
         """Times of the record, shape (n,)."""
 
     def misfit(self, first: int, last: int) -> float:
+        """Largest deviation of the states ``first`` to ``last``, in any order, from the law that suits them best."""
+
+
+class Remembered:
+    """A law that is held against no window twice: from one time to the next the same ones come up again."""
+
+    def __init__(self, law: Law) -> None:
+        self._law = law
+        self._misfits: dict[tuple[int, int], float] = {}
+
+    @property
+    def time(self) -> Samples:
+        """Times of the record, shape (n,)."""
+        return self._law.time
+
+    def misfit(self, first: int, last: int) -> float:
         """Largest deviation of the states ``first`` to ``last`` from the law that suits them best."""
+        window = min(first, last), max(first, last)
+        if window not in self._misfits:
+            self._misfits[window] = self._law.misfit(*window)
+        return self._misfits[window]
 
 
 def lasting_window(law: Law, td: float, extent: float, noise: float) -> tuple[int, int] | None:

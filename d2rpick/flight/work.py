@@ -7,10 +7,11 @@ With the resultant F of gravity, the momentum p and the mass m, gravity works by
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from d2rpick.flight.window import FEWEST, FreeFlight, lasting_window
+from d2rpick.flight.window import FEWEST, FreeFlight, Remembered, lasting_window
 from d2rpick.histories.samples import integral, window
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ _SLOW: Final = 1e-2
 # Mass so found is a bound already; a table may hold the kinetic energy of the chosen parts only, and a load that works
 # like gravity without moving the model exceeds it by orders of magnitude.
 _MASS_ERROR: Final = 2.0
+# One for each record: it is asked about many td.
+_LAWS: Final[WeakKeyDictionary[Balance, Remembered]] = WeakKeyDictionary()
 
 
 def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | None:
@@ -115,8 +118,9 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     noise = balance.precision.quantum(largest) / 2
     if noise > _OWN_ERROR * extent:
         return None
-    law = _Parabola(time, np.stack(terms, axis=1), balance.kinetic)
-    window = lasting_window(law, td, extent, noise)
+    if balance not in _LAWS:
+        _LAWS[balance] = Remembered(_Parabola(time, np.stack(terms, axis=1), balance.kinetic))
+    window = lasting_window(_LAWS[balance], td, extent, noise)
     if window is None:
         return None
     first, last = window

@@ -149,9 +149,12 @@ class _Columns:
         return None
 
     def internal(self) -> Samples | None:
-        """Give the internal energy of the whole model."""
+        """Give the internal energy of the whole model; beside its total, a plain one may be that of some parts."""
+        total = self.first(*_TOTAL_INTERNAL)
+        if total is not None:
+            return total
         plain = [name for name in self._names.values() if is_internal_energy(name)]
-        return self._values(plain[0]) if plain else self.first(*_TOTAL_INTERNAL)
+        return self._values(plain[0]) if plain else None
 
     def _values(self, name: str) -> Samples | None:
         try:

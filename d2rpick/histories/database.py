@@ -239,24 +239,30 @@ class Legs:
     def _order(self, times: Sequence[Samples]) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         """Which states count, and what to say of the others."""
         for leg, time in zip(self._legs, times, strict=True):
-            back, steps = int(np.count_nonzero(np.diff(time) < 0)), time.size - 1
+            back, steps = int(np.count_nonzero(time[1:] < time[:-1])), time.size - 1
             if back > 1 and back > _MOST_BACK * steps:
                 raise FormatError(
                     f"{leg.source}: time steps back at {back} of {steps} states, increasing times were expected; "
                     "check that this is the time (`time`) and the file is not damaged"
                 )
-        keep, notes = newest_states(np.concatenate(times))
+        every = _together(times)
+        keep, notes = newest_states(every)
         behind = np.cumsum([time.size for time in times])
         unused = [
             f"{leg.source} was not used: a newer leg begins at or before its first time"
             for leg, here in zip(self._legs, np.split(keep, behind[:-1]), strict=True)
             if here.size and not here.any()
         ]
-        return keep, (*notes, *unused, *_holes(np.concatenate(times)[keep]))
+        return keep, (*notes, *unused, *_holes(every if keep.all() else every[keep]))
 
     def _joined(self, columns: Sequence[Samples], keep: NDArray[np.bool_]) -> Samples:
-        whole = columns[0] if len(columns) == 1 else np.concatenate(columns)
+        whole = _together(columns)
         return whole if keep.all() else whole[keep]
+
+
+def _together(columns: Sequence[Samples]) -> Samples:
+    """Join columns without copying a single one."""
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
 def _times(database: Database) -> list[Samples]:

@@ -1,4 +1,4 @@
-"""Samples over ascending times: which lie in a window, and their running integral."""
+"""Samples over ascending times: which lie in a window, their running integral, and how far they are from straight."""
 
 from __future__ import annotations
 
@@ -32,3 +32,17 @@ def integral(time: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[
     """
     areas = np.diff(time) * (values[1:] + values[:-1]).T / 2
     return np.concatenate([np.zeros_like(values[:1]), np.cumsum(areas.T, axis=0)])
+
+
+def bent(time: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give what is left of each column of values (n, k) beside a straight line.
+
+    Examples
+    --------
+    >>> bent(np.array([0.0, 1.0, 2.0]), np.array([[1.0, 0.0], [2.0, 3.0], [3.0, 0.0]])).round(12).tolist()
+    [[0.0, -1.0], [0.0, 2.0], [0.0, -1.0]]
+    """
+    t = time - time.sum() / time.size  # as mean(), which is slow for few
+    centred = values - values.sum(axis=0) / time.size
+    centred -= t[:, np.newaxis] * (t @ centred / (t @ t))
+    return np.asarray(centred)

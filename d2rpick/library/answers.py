@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.library import arguments
 from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import command_line
+from d2rpick.library.repeat import asking, command_line
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     import pandas as pd
     from matplotlib.figure import Figure
@@ -21,12 +21,15 @@ if TYPE_CHECKING:
     from d2rpick.choice import verify as judgement
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.health import Health
+    from d2rpick.choice.judged_card import SolverInput
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.suggest import Pair
+    from d2rpick.choice.trade_off import TradeOff
     from d2rpick.choice.warnings import Caution
     from d2rpick.flight.flight import Flight
     from d2rpick.library.arguments import Choosing, Parts
     from d2rpick.library.runs import Run
+    from d2rpick.report.explorer import Explorer
     from d2rpick.report.page import Record
 
 
@@ -44,6 +47,7 @@ class Answer:
     warnings: tuple[Caution, ...]
     health: Health | None = field(repr=False)
     command: tuple[str, ...] = field(repr=False)
+    _asking: tuple[str, ...] = field(repr=False)
 
     @property
     def td(self) -> float:
@@ -74,11 +78,20 @@ class Answer:
         """Give the JSON document of the command line."""
         raise NotImplementedError
 
-    def _record(self, figures: dict[str, tuple[str, str]]) -> Record:
-        from d2rpick.choice.judged_card import CardRequest
-        from d2rpick.report.page import Record
+    def _record(
+        self,
+        figures: dict[str, tuple[str, str]],
+        tr: float | None,
+        td_window: tuple[float, float] | None = None,
+    ) -> Record:
+        from d2rpick.choice.explored import explored_around
+        from d2rpick.choice.judged_card import CardRequest, input_for
+        from d2rpick.choice.of_run import Reference
 
-        return Record(self.run.files, ("d2rpick", *self.command), (), figures, CardRequest())
+        reference = Reference(self.run.files, self.situation.history)
+        explorer = explorer_of([explored_around(reference, self.situation, td_window)], self._asking)
+        card = None if tr is None else input_for(self.situation, tr, CardRequest())
+        return page_record(self.run, self.command, figures, card, explorer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +138,7 @@ class Suggestion(Answer):
 
     def plot(self) -> Figure:
         """Draw the energy with its level at td, and the choice, as a matplotlib Figure."""
-        from d2rpick.report.figures import draw_suggestion
+        from d2rpick.report.figures_choice import draw_suggestion
 
         return draw_suggestion(self._core)
 
@@ -133,7 +146,8 @@ class Suggestion(Answer):
         """Write the answer to one HTML page that needs no network; an existing file is replaced."""
         from d2rpick.report.suggestion_page import as_page, drawn
 
-        page = as_page(self._core, self._record(drawn(self._core)))
+        pair = self.recommended
+        page = as_page(self._core, self._record(drawn(self._core), pair.tr if pair else None, self._core.td_window))
         return written(path, page)
 
 
@@ -180,7 +194,7 @@ class Verdict(Answer):
 
     def plot(self) -> Figure:
         """Draw the energy with its level at td, and the pair, as a matplotlib Figure."""
-        from d2rpick.report.figures import draw_verdict
+        from d2rpick.report.figures_choice import draw_verdict
 
         return draw_verdict(self._core)
 
@@ -188,7 +202,7 @@ class Verdict(Answer):
         """Write the verdict to one HTML page that needs no network; an existing file is replaced."""
         from d2rpick.report.verdict_page import as_page, drawn
 
-        return written(path, as_page(self._core, self._record(drawn(self._core))))
+        return written(path, as_page(self._core, self._record(drawn(self._core), self.tr if self.verified else None)))
 
 
 def suggest(
@@ -254,6 +268,7 @@ def suggest(
         warnings=core.cautions,
         health=core.health,
         command=command_line("suggest", times, run, selection, choosing),
+        _asking=asking(run, selection, choosing),
         candidates=core.candidates,
         recommended=core.recommended,
         better_pair=core.better_pair,
@@ -319,6 +334,7 @@ def verify(
         warnings=core.cautions,
         health=core.health,
         command=command_line("verify", times, run, selection, choosing),
+        _asking=asking(run, selection, choosing),
         verified=core.verified,
         reasons=core.reasons,
         tr_ok=core.tr_ok,
@@ -336,6 +352,27 @@ def selection_for(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
     if names and run.chosen.energy:
         raise ValueError("parts and the energy that was named when the run was read exclude each other")
     return run.chosen._replace(parts=names, flying=arguments.part_names("flying", flying))
+
+
+def explorer_of(found: Iterable[TradeOff | None], asking: Sequence[str]) -> Explorer | None:
+    """Give what can be explored on a page; ``asking`` is the command line behind the td."""
+    from d2rpick.report.explorer import Explorer
+
+    trade_offs = tuple(one for one in found if one)
+    return Explorer(trade_offs, (("d2rpick", "suggest", "--td"), asking)) if trade_offs else None
+
+
+def page_record(
+    run: Run,
+    command: Sequence[str],
+    figures: dict[str, tuple[str, str]],
+    card: SolverInput | None,
+    explorer: Explorer | None,
+) -> Record:
+    """Give what a page shows besides the answer that ``command`` repeats."""
+    from d2rpick.report.page import Record
+
+    return Record(run.files, ("d2rpick", *command), (), figures, card, explorer=explorer)
 
 
 def written(path: arguments.Path, page: str) -> Path:

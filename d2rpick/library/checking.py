@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.library import arguments
@@ -44,12 +43,12 @@ class Findings:
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick check``, schema d2rpick/check/1; paths relative to the working folder."""
-        from d2rpick.report.findings import as_json
+        from d2rpick.report.findings import Checks, as_json
         from d2rpick.report.keys import of_warnings
 
         history = [text for name in self._history or () for text in ("--history", name)]
-        said = of_warnings(self.warnings)
-        return as_json(self._checked, Path.cwd(), ("check", *history, *self.decks), said, self._history)
+        checks = Checks(self._checked, warnings=of_warnings(self.warnings), history=self._history)
+        return as_json(checks, ("check", *history, *self.decks))
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per finding, a column per key of ``findings`` in the JSON.

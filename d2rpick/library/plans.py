@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.library import arguments
-from d2rpick.library.answers import selection_for, written
+from d2rpick.library.answers import explorer_of, selection_for, written
 from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import command_line
+from d2rpick.library.repeat import asking, command_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -41,6 +41,7 @@ class Plan:
     next_run: tuple[tuple[float, float], ...]
     warnings: tuple[Caution, ...]
     command: tuple[str, ...] = field(repr=False)
+    _asking: tuple[str, ...] = field(repr=False)
     _core: Core = field(repr=False)
 
     @property
@@ -80,12 +81,16 @@ class Plan:
 
     def report(self, path: arguments.Path) -> Path:
         """Write the plan, with the solver's cards, to one HTML page that needs no network; a file is replaced."""
+        from d2rpick.choice.explored import explored_flights
         from d2rpick.choice.judged_card import CardRequest, card_of_plan
+        from d2rpick.choice.of_run import Reference
         from d2rpick.report.plan_page import as_page
 
-        found = card_of_plan(self._core, self.run.files, CardRequest())
-        card = found[0].text if found else None
-        return written(path, as_page(self._core, self.run.files, ("d2rpick", *self.command), card))
+        card = card_of_plan(self._core, self.run.files, CardRequest())
+        found = explored_flights(Reference(self.run.files, self._core.history), self._core)
+        text = card[0].text if card else None
+        page = as_page(self._core, self.run.files, ("d2rpick", *self.command), text, explorer_of(found, self._asking))
+        return written(path, page)
 
 
 def plan(
@@ -156,5 +161,6 @@ def plan(
         next_run=core.next_run(),
         warnings=core.cautions,
         command=command_line("plan", own, run, selection, choosing),
+        _asking=asking(run, selection, choosing),
         _core=core,
     )

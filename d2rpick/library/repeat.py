@@ -17,7 +17,12 @@ def command_line(
     command: str, times: Sequence[str], run: Run, selection: Selection, choosing: Choosing
 ) -> tuple[str, ...]:
     """Give the arguments of ``d2rpick`` that ask the same question."""
-    return (command, *times, *options_of(selection, choosing), *run.sources)
+    return (command, *times, *asking(run, selection, choosing))
+
+
+def asking(run: Run, selection: Selection, choosing: Choosing) -> tuple[str, ...]:
+    """Give what follows the times in such a command line."""
+    return (*options_of(selection, choosing), *run.sources)
 
 
 def options_of(selection: Selection, choosing: Choosing) -> tuple[str, ...]:
@@ -31,6 +36,8 @@ def _selected(selection: Selection) -> Iterator[str]:
     for option, values in (("energy", selection.energy), ("part", selection.parts), ("flying", selection.flying)):
         for value in values:
             yield from (f"--{option}", value)
+    for quantity, channel in selection.channels:
+        yield from ("--channel", f"{quantity}={channel}")
 
 
 def _options(choosing: Choosing) -> Iterator[str]:

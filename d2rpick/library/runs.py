@@ -8,7 +8,7 @@ from typing import IO, TYPE_CHECKING, Any
 from d2rpick.library import arguments
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     import pandas as pd
 
@@ -109,6 +109,7 @@ def read(
     *,
     time: str | int | None = None,
     energy: str | int | Iterable[str | int] | None = None,
+    channels: Mapping[str, str | int] | None = None,
     input_format: str = "auto",
 ) -> Run:
     """Read the files of one run, as ``d2rpick suggest`` reads its HISTORY.
@@ -119,6 +120,8 @@ def read(
         A file, a folder, a glob, the legs of a run, companions of different formats; a string is one path.
     time, energy : str or int, optional
         Columns, labels or HDF5 paths, by name or 1-based number; several energies are added.
+    channels : mapping, optional
+        Channels of other quantities whose names are unusual, as ``{"kinetic_energy": "E2"}``; as ``--channel``.
     input_format : str
         ``"auto"`` (by content), or one of csv, hdf5, glstat, matsum, binout, radioss-th.
 
@@ -139,11 +142,11 @@ def read(
     ('z', 'y', 'vz', 'vy', 'internal_energy', 'kinetic_energy')
     """
     if hasattr(source, "read"):
-        return _opened([_in_memory(source)], selection_of(time, energy), input_format)
+        return _opened([_in_memory(source)], selection_of(time, energy, channels), input_format)
     names = arguments.paths("source", source)
     from d2rpick.histories.opening import open_run
 
-    chosen = selection_of(time, energy)
+    chosen = selection_of(time, energy, channels)
     return Run(open_run(names, chosen, known_format(input_format)), chosen)
 
 
@@ -152,6 +155,7 @@ def from_frame(
     *,
     time: str | int | None = None,
     energy: str | int | Iterable[str | int] | None = None,
+    channels: Mapping[str, str | int] | None = None,
     name: str = "frame",
 ) -> Run:
     """Take the energies of a run from a table: of lasso-python (``as_df``), a database, a spreadsheet.
@@ -162,7 +166,7 @@ def from_frame(
     ----------
     frame : pandas.DataFrame
         A row per state; the times are a column named so, or the index.
-    time, energy : str or int, optional
+    time, energy, channels : optional
         Columns as for ``read``.
     name : str
         What messages call it.
@@ -190,7 +194,7 @@ def from_frame(
         raise TypeError(f"frame is a {type(frame).__name__}, a pandas.DataFrame was expected")
     has_time = time is not None or any(is_time(str(column)) for column in frame.columns)
     text = frame.to_csv(index=not has_time, index_label="time")
-    return _opened([Source(name, text.encode())], selection_of(time, energy), "csv")
+    return _opened([Source(name, text.encode())], selection_of(time, energy, channels), "csv")
 
 
 def _in_memory(file: Any) -> Source:
@@ -217,12 +221,24 @@ def known_format(input_format: str) -> str:
     return input_format
 
 
-def selection_of(time: str | int | None, energy: str | int | Iterable[str | int] | None) -> Selection:
-    """Give the columns that are meant; TypeError for what is no name or number."""
+def selection_of(
+    time: str | int | None,
+    energy: str | int | Iterable[str | int] | None,
+    channels: Mapping[str, str | int] | None = None,
+) -> Selection:
+    """Give the columns that are meant; TypeError for what is no name or number, ValueError for an unknown quantity."""
+    from d2rpick.histories.names import QUANTITIES
     from d2rpick.histories.selection import Selection
 
     listed = [] if energy is None else [energy] if isinstance(energy, str | int) else list(energy)
-    for name, value in [("time", time), *(("energy", one) for one in listed)]:
+    named = dict(channels or {})
+    for name, value in [("time", time), *(("energy", one) for one in listed), *named.items()]:
         if value is not None and (isinstance(value, bool) or not isinstance(value, str | int)):
             raise TypeError(f"{name} is {value!r}, the name or number of a column was expected")
-    return Selection(None if time is None else str(time), tuple(str(one) for one in listed))
+    if unknown := [name for name in named if name not in QUANTITIES]:
+        raise ValueError(f"channels names {unknown[0]!r}, one of {', '.join(QUANTITIES)} was expected")
+    return Selection(
+        time=None if time is None else str(time),
+        energy=tuple(str(one) for one in listed),
+        channels=tuple((name, str(channel)) for name, channel in named.items()),
+    )

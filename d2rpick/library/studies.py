@@ -12,7 +12,7 @@ from d2rpick.library.answers import written
 from d2rpick.library.frames import frame_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     import pandas as pd
@@ -68,13 +68,14 @@ class Study:
 
     def plot(self) -> Figure:
         """Draw the energies over each other, with every tr, as a matplotlib Figure."""
-        from d2rpick.report.figures import draw_study
+        from d2rpick.report.figures_study import draw_study
 
         return draw_study(self._core)
 
     def report(self, path: arguments.Path) -> Path:
         """Write the study to one HTML page that needs no network; an existing file is replaced."""
-        from d2rpick.report.figures import both_widths, draw_study
+        from d2rpick.report.figures import both_widths
+        from d2rpick.report.figures_study import draw_study
         from d2rpick.report.study_page import as_page
 
         page = as_page(self._core, ("d2rpick", *self.command), both_widths(draw_study, self._core, "runs"))
@@ -90,6 +91,7 @@ def study(
     flying: Parts | None = None,
     time: str | int | None = None,
     energy: str | int | Iterable[str | int] | None = None,
+    channels: Mapping[str, str | int] | None = None,
     input_format: str = "auto",
     jobs: int = 1,
     **choosing: Unpack[Choosing],
@@ -106,7 +108,7 @@ def study(
         Instead of ``td``: where each run chooses its own [time].
     parts, flying, **choosing
         As for `suggest`.
-    time, energy, input_format
+    time, energy, channels, input_format
         As for `read`.
     jobs : int
         Processes that work at the same time.  In a script more than 1 need its guard ``if __name__ == "__main__":``.
@@ -137,7 +139,7 @@ def study(
         raise TypeError("td or td_window was expected, and not both")
     asked = arguments.number("td", td) if td_window is None else arguments.window("td_window", td_window)
     names = find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
-    selection = selection_of(time, energy)._replace(
+    selection = selection_of(time, energy, channels)._replace(
         parts=arguments.part_names("parts", parts), flying=arguments.part_names("flying", flying)
     )
     question = Question(asked, arguments.settings(choosing), selection, known_format(input_format), True)

@@ -45,7 +45,7 @@ _SOLVER_DIFFERENCE: Final = 0.006
 
 
 @dataclass(frozen=True)
-class Row:
+class PublishedValue:
     """A number of the paper, or an independent reference value, beside the one found here.
 
     ``published`` is the number that the paper states, None where it states none; ``reference`` one that was computed
@@ -78,17 +78,17 @@ class Row:
         return abs(self.difference) <= self.tolerance
 
 
-def _exact(what: str, unit: str, reference: float, here: float) -> Row:
-    return Row(what, unit, None, reference, here, MOST_DIFFERENCE * abs(reference), _EXACT)
+def _exact(what: str, unit: str, reference: float, here: float) -> PublishedValue:
+    return PublishedValue(what, unit, None, reference, here, MOST_DIFFERENCE * abs(reference), _EXACT)
 
 
-def better_pair() -> tuple[float, float]:
+def pair_at_peak() -> tuple[float, float]:
     """Give the pair that is better: td at the first energy peak after 64 ms, tr where the deformation matches [s]."""
     td = MODE.peaks(PUBLISHED[1], END)[0]
     return _matching(td), td
 
 
-def table() -> tuple[Row, ...]:
+def table() -> tuple[PublishedValue, ...]:
     """Numbers of the paper and reference values beside those found here."""
     return tuple(_rows())
 
@@ -106,9 +106,9 @@ def residual(pair: tuple[float, float]) -> float:
     return switched(pair).residual()
 
 
-def _rows() -> Iterator[Row]:
-    td, better = PUBLISHED[1], better_pair()
-    yield Row(
+def _rows() -> Iterator[PublishedValue]:
+    td, better = PUBLISHED[1], pair_at_peak()
+    yield PublishedValue(
         "tr with the energy of td = 64 ms", "ms", 13.0, None, 1e3 * _matching(td), 0.5,
         "the paper, read from its plot to a millisecond",
     )  # fmt: skip
@@ -127,7 +127,7 @@ def _rows() -> Iterator[Row]:
             yield _exact(f"E of {name}", "J", energy, float(OSCILLATOR.internal_energy(state)))
     for name, pair, found in (("(13, 64) ms", PUBLISHED, 0.888), ("better pair", better, 0.005)):
         what = f"deviation after td, {name}"
-        yield Row(what, "-", None, found, deviation(pair), _SOLVER_DIFFERENCE, _SOLVER)
+        yield PublishedValue(what, "-", None, found, deviation(pair), _SOLVER_DIFFERENCE, _SOLVER)
 
 
 # z [m], y [m], E [J] at times [s] of the switched runs

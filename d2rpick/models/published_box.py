@@ -11,7 +11,7 @@ import numpy as np
 from d2rpick.models.exhibit import Curve, Exhibit, Panel, Shape
 from d2rpick.models.rollover.as_history import suggestion_for
 from d2rpick.models.rollover.record import BOX
-from d2rpick.models.rollover.run import Window, simulate
+from d2rpick.models.rollover.run import RigidWindow, simulate
 from d2rpick.models.rollover.scan import compare
 from d2rpick.studies.common import common_tr
 from d2rpick.studies.study import row_of
@@ -61,14 +61,14 @@ class Trial(NamedTuple):
     ``stiffness``: one tr for the base and the stiffness +-15 % alone [s], and the largest level error of the three.
     """
 
-    window: Window
+    window: RigidWindow
     kept: bool
     runs: tuple[Tried, ...]
     stiffness: tuple[float, float] | None
 
 
 @lru_cache(maxsize=64)
-def _run(parameters: Parameters, *windows: Window) -> Record:
+def _run(parameters: Parameters, *windows: RigidWindow) -> Record:
     return simulate(parameters, _END, *windows)
 
 
@@ -80,7 +80,7 @@ def _setting(_: Parameters) -> Exhibit:
 
 
 def _early(base: Parameters) -> Exhibit:
-    reference, early = _run(base), _run(base, Window(_EARLY, TD))
+    reference, early = _run(base), _run(base, RigidWindow(_EARLY, TD))
     off = _roll_error(reference, early)
     return _compared(
         "early", "Switched at 1 ms", "2a, b", 1, base, (_EARLY,),
@@ -93,7 +93,7 @@ def _early(base: Parameters) -> Exhibit:
 
 def _energies(base: Parameters) -> Exhibit:
     reference = _run(base)
-    errors = {tr: _roll_error(reference, _run(base, Window(tr, TD))) for tr in (_LITTLE, _MUCH)}
+    errors = {tr: _roll_error(reference, _run(base, RigidWindow(tr, TD))) for tr in (_LITTLE, _MUCH)}
     energy = {tr: float(np.interp(tr, reference.time, reference.internal_energy[:, BOX])) for tr in (*errors, TD)}
     return _compared(
         "energies", "Too little and too much energy", "2c", 1, base, (_LITTLE, _MUCH),
@@ -110,7 +110,7 @@ def _revised(base: Parameters) -> Exhibit:
     reference = _run(base)
     tr = _own(reference, TD)
     assert tr is not None
-    errors = [_roll_error(reference, _run(base, Window(time, TD))) for time in (_REVISED, tr)]
+    errors = [_roll_error(reference, _run(base, RigidWindow(time, TD))) for time in (_REVISED, tr)]
     return _compared(
         "revised", "The revised pair", "8", 4, base, (_REVISED, tr),
         "With tr = 70 and td = 370 ms, the ground at about 380 ms, height and roll agree closely.",
@@ -133,7 +133,7 @@ def _compared(
     shapes = [Shape("without switching", _outlines(reference))]
     rolls, differences, heights = [Curve("without switching", "roll_deg")], [], []
     for tr in times:
-        run, key = _run(base, Window(tr, TD)), f"{1e3 * tr:.4g}"
+        run, key = _run(base, RigidWindow(tr, TD)), f"{1e3 * tr:.4g}"
         label = f"tr = {key} ms"
         columns[f"roll_{key}_deg"] = np.degrees(run.roll)
         columns[f"droll_{key}_deg"] = np.degrees(run.roll - reference.roll)
@@ -181,7 +181,7 @@ def tried(base: Parameters) -> Trial:
     rows = [row_of(one.name, suggestion_for(_run(one.parameters), td)) for one in variants]
     common = common_tr(rows)
     assert common.tr is not None
-    window = Window(common.tr, td)
+    window = RigidWindow(common.tr, td)
     known = zip(variants, rows, common.errors, strict=True)
     runs = tuple(_at(one, row, error or 0.0, window) for one, row, error in known)
     named = [row for row in rows if row.source in ("base", "stiffness -15%", "stiffness +15%")]
@@ -190,7 +190,7 @@ def tried(base: Parameters) -> Trial:
     return Trial(window, bool(common.keeps_tolerance), runs, three)
 
 
-def _at(variant: Variant, row: Row, error: float, common: Window) -> Tried:
+def _at(variant: Variant, row: Row, error: float, common: RigidWindow) -> Tried:
     reference, run = _run(variant.parameters), _run(variant.parameters, common)
     outcome = compare(reference, run, common.tr, common.td)
     end = float(np.degrees(run.roll[-1] - reference.roll[-1]))
@@ -217,7 +217,7 @@ def _variants(base: Parameters) -> Exhibit:
     )  # fmt: skip
 
 
-def _of_variants(window: Window) -> tuple[tuple[Panel, ...], ...]:
+def _of_variants(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
     dots, common = {"style": "dots", "x": "run"}, 1e3 * window.tr
     level = (f"common tr = {common:.1f} ms, td = {1e3 * window.td:g} ms", common)
     rigid = (Curve("own tr", "rigid_own", **dots), Curve("common tr", "rigid_common", **dots))

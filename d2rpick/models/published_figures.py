@@ -15,8 +15,8 @@ from d2rpick.models.published import (
     PUBLISHED,
     START,
     TIME,
-    better_pair,
     deformation_of,
+    pair_at_peak,
     residual,
     switched,
 )
@@ -177,7 +177,7 @@ def _after_td() -> Exhibit:
     """Response after td for the published pair and the better one, against the reference."""
     columns: dict[str, Samples] = {"time_ms": 1e3 * TIME, "y_free_m": OSCILLATOR.free(START, TIME).y}
     panels = []
-    for name, pair in (("published", PUBLISHED), ("better", better_pair())):
+    for name, pair in (("published", PUBLISHED), ("better", pair_at_peak())):
         columns[f"y_{name}_m"] = switched(pair).motion(TIME).y
         columns[f"r_{name}_m"] = deformation_of(switched(pair).motion(TIME))
         motion = (Curve("without switching", "y_free_m"), Curve("switched", f"y_{name}_m"))
@@ -203,7 +203,7 @@ def _beside_solver(solver: Mapping[str, Samples]) -> Exhibit:
     time = solver["time_s"]
     columns = {"time_ms": 1e3 * time, "reference_solver_m": solver["reference_m"]}
     panels = []
-    for name, pair in (("published", PUBLISHED), ("better", better_pair())):
+    for name, pair in (("published", PUBLISHED), ("better", pair_at_peak())):
         columns |= {f"{name}_solver_m": solver[f"{name}_m"], f"{name}_m": deformation_of(switched(pair).motion(time))}
         curves = (
             Curve("without switching, solver", "reference_solver_m", "thin"),

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.models.exhibit import Exhibit, Panel
     from d2rpick.models.rollover.model import Parameters
     from d2rpick.models.rollover.record import Record
-    from d2rpick.models.rollover.run import Window
+    from d2rpick.models.rollover.run import RigidWindow
     from d2rpick.models.rollover.scan import Outcome
     from d2rpick.vibration.replay import Replay, Trajectory
 
@@ -121,7 +121,7 @@ def _show(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
 
 
 def draw_rollover(
-    parameters: Parameters, reference: Record, switched: Record | None = None, windows: Sequence[Window] = ()
+    parameters: Parameters, reference: Record, switched: Record | None = None, windows: Sequence[RigidWindow] = ()
 ) -> Figure:
     """Outlines of the box at even times with sled, curb and ground; roll and height over time, and what differs.
 
@@ -178,7 +178,7 @@ def _draw_outlines(axes: Axes, parameters: Parameters, reference: Record, switch
     axes.grid(visible=True, linewidth=0.3)
 
 
-def _draw_times(axes: Axes, reference: Record, windows: Sequence[Window]) -> None:
+def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -> None:
     """Shade the rigid windows; mark when the sled pushed last and when the ground pushes."""
     for number, window in enumerate(windows):
         label = "_" if number else "rigid"

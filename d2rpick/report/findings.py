@@ -6,6 +6,7 @@ import json
 import os
 import re
 from collections import Counter
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
@@ -29,10 +30,27 @@ _SARIF: Final = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.
 _NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def as_table(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable] = ()) -> str:
-    """Findings and windows of each deck, one per line, and how many there are; decks that ``failed`` are counted."""
+@dataclass(frozen=True)
+class Checks:
+    """What was found in several decks; paths are shown relative to ``root`` where they lie below it.
+
+    ``failed`` are decks that could not be read, ``warnings`` have code and message.  ``history`` are the files by which
+    the windows were judged, None without any; findings lighter than ``fail_on`` are no failures.
+    """
+
+    results: Sequence[Checked]
+    root: Path = field(default_factory=Path.cwd)
+    failed: Sequence[Unreadable] = ()
+    warnings: Sequence[Mapping[str, str]] = ()
+    history: Sequence[str] | None = None
+    fail_on: Severity = Severity.ERROR
+
+
+def as_table(checks: Checks) -> str:
+    """Findings and windows of each deck, one per line, and how many there are; decks that failed are counted."""
+    root = checks.root
     lines: list[str] = []
-    for result in results:
+    for result in checks.results:
         lines.append(_shown(result.deck, root))
         if not result.cards:
             lines.append("  no switching cards")
@@ -40,49 +58,28 @@ def as_table(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable
         lines += [
             f"  {_shown(f.file, root)}:{f.line}:{f.column}: {f.severity} {f.rule} {f.message}" for f in result.findings
         ]
-    left_out = f", {len(failed)} not checked" if failed else ""
-    return "\n".join([*lines, "", _summary_line(results) + left_out])
+    left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
+    return "\n".join([*lines, "", _summary_line(checks.results) + left_out])
 
 
-def as_json(
-    results: Sequence[Checked],
-    root: Path,
-    command: Sequence[str],
-    warnings: Sequence[Mapping[str, str]] = (),
-    history: Sequence[str] | None = None,
-) -> str:
-    """Give everything by schema d2rpick/check/1; paths are relative to ``root`` where they lie below it.
-
-    ``history`` are the files the windows were judged by, None without any.
-    """
-    content = _content(results, root, command, warnings, history)
-    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
+def as_json(checks: Checks, command: Sequence[str]) -> str:
+    """Give everything by schema d2rpick/check/1."""
+    return json.dumps(_content(checks, command), indent=2, allow_nan=False, ensure_ascii=False)
 
 
-def as_ndjson(
-    results: Sequence[Checked],
-    root: Path,
-    command: Sequence[str],
-    warnings: Sequence[Mapping[str, str]] = (),
-    history: Sequence[str] | None = None,
-) -> str:
+def as_ndjson(checks: Checks, command: Sequence[str]) -> str:
     """Give a line for each deck, by the same schema as ``as_json``."""
-    contents = (_content([result], root, command, warnings, history) for result in results)
+    contents = (_content(replace(checks, results=[result]), command) for result in checks.results)
     return "\n".join(json.dumps(content, allow_nan=False, ensure_ascii=False) for content in contents)
 
 
-def _content(
-    results: Sequence[Checked],
-    root: Path,
-    command: Sequence[str],
-    warnings: Sequence[Mapping[str, str]],
-    history: Sequence[str] | None,
-) -> dict[str, Any]:
+def _content(checks: Checks, command: Sequence[str]) -> dict[str, Any]:
+    results, root, history = checks.results, checks.root, checks.history
     return {
         "schema": SCHEMA,
         "tool_version": __version__,
         "command": list(command),
-        "warnings": [dict(warning) for warning in warnings],
+        "warnings": [dict(warning) for warning in checks.warnings],
         "decks": [_shown(result.deck, root) for result in results],
         "history": None if history is None else [_shown(name, root) for name in history],
         "windows": [_window(result, window, root) for result in results for window in result.windows],
@@ -91,32 +88,29 @@ def _content(
     }
 
 
-def as_github(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable] = ()) -> str:
+def as_github(checks: Checks) -> str:
     """Workflow commands that GitHub Actions shows beside the lines of a deck."""
+    root = checks.root
     found = [
         f"::{_GITHUB[f.severity]} file={_escaped(_shown(f.file, root), ',:')},line={f.line},col={f.column},"
         f"title={f.rule}::{_escaped(f.message)}"
-        for result in results
+        for result in checks.results
         for f in result.findings
     ]
-    found += [f"::error file={_escaped(_shown(one.deck, root), ',:')}::{_escaped(one.reason)}" for one in failed]
+    found += [f"::error file={_escaped(_shown(one.deck, root), ',:')}::{_escaped(one.reason)}" for one in checks.failed]
     return "\n".join(found)
 
 
-def as_junit(
-    results: Sequence[Checked],
-    root: Path,
-    fail_on: Severity = Severity.ERROR,
-    failed: Sequence[Unreadable] = (),
-) -> str:
+def as_junit(checks: Checks) -> str:
     """One suite per deck, one case per finding; those lighter than ``fail_on`` pass and only say their message."""
+    root, fail_on = checks.root, checks.fail_on
     suites = ET.Element("testsuites", name="d2rpick check")
-    for one in failed:
+    for one in checks.failed:
         name = _xml(_shown(one.deck, root))
         suite = ET.SubElement(suites, "testsuite", name=name, tests="1", failures="0", errors="1")
         case = ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
         ET.SubElement(case, "error", type="unreadable-deck", message=_xml(one.reason))
-    for result in results:
+    for result in checks.results:
         failures = sum(finding.severity.rank <= fail_on.rank for finding in result.findings)
         suite = ET.SubElement(
             suites,
@@ -140,8 +134,9 @@ def as_junit(
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(suites, encoding="unicode")
 
 
-def as_sarif(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable] = ()) -> str:
+def as_sarif(checks: Checks) -> str:
     """SARIF 2.1.0 with all rules; ids are stable."""
+    root = checks.root
     ids = list(RULES)
     driver = {
         "name": "d2rpick",
@@ -171,7 +166,7 @@ def as_sarif(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable
                 }
             ],
         }
-        for result in results
+        for result in checks.results
         for f in result.findings
     ]
     messages = [
@@ -180,12 +175,12 @@ def as_sarif(results: Sequence[Checked], root: Path, failed: Sequence[Unreadable
             "message": {"text": one.reason},
             "locations": [{"physicalLocation": {"artifactLocation": {"uri": _uri(one.deck, root)}}}],
         }
-        for one in failed
+        for one in checks.failed
     ]
     run = {
         "tool": {"driver": driver},
         "columnKind": "unicodeCodePoints",
-        "invocations": [{"executionSuccessful": not failed, "toolExecutionNotifications": messages}],
+        "invocations": [{"executionSuccessful": not checks.failed, "toolExecutionNotifications": messages}],
         "results": found,
     }
     return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2, ensure_ascii=False)

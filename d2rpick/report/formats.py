@@ -5,9 +5,8 @@ A result is a module of this folder, imported when it is written: ``--help`` lis
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -15,8 +14,7 @@ if TYPE_CHECKING:
     Writer = Callable[[Any, Any, "Shown"], str]
 
 
-@dataclass(frozen=True)
-class Shown:
+class Shown(NamedTuple):
     """What a form may show beside the answer: the command that was given, how many rows, lines written before.
 
     ``every``: all windows of a plan, not only the supported ones.
@@ -41,14 +39,36 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         **_PLAIN,
         "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
+        "ndjson": lambda report, answer, shown: report.as_ndjson(answer, shown.command),
         "value": lambda report, answer, _: report.as_value(answer),
     },
     "plan": {**_PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
+    "trade_off": {
+        **_PLAIN,
+        "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
+        "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
+    },
+    "parts": {**_PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
+    "calibration": {**_PLAIN, "toml": lambda report, answer, _: report.as_toml(answer)},
     "verdict": _PLAIN,
     "overview": _PLAIN,
     "study": {
         **_PLAIN,
         "ndjson": lambda report, answer, shown: "\n".join([*shown.lines, report.as_last_line(answer, shown.command)]),
+    },
+    "reproduction": {**_PLAIN, "csv": lambda report, answer, _: report.as_csv(answer.rows)},
+    "rollover": {
+        **_PLAIN,
+        "markdown": lambda report, answer, _: report.as_markdown(answer.outcomes),
+        "csv": lambda report, answer, _: report.as_csv(answer.outcomes),
+    },
+    "findings": {
+        "table": lambda report, answer, _: report.as_table(answer),
+        "json": lambda report, answer, shown: report.as_json(answer, shown.command),
+        "ndjson": lambda report, answer, shown: report.as_ndjson(answer, shown.command),
+        "github": lambda report, answer, _: report.as_github(answer),
+        "junit": lambda report, answer, _: report.as_junit(answer),
+        "sarif": lambda report, answer, _: report.as_sarif(answer),
     },
 }
 
@@ -59,6 +79,6 @@ def write(result: str, form: str, answer: Any, shown: Shown) -> str:
     Examples
     --------
     >>> list(FORMATS["suggestion"])
-    ['table', 'json', 'csv', 'markdown', 'value']
+    ['table', 'json', 'csv', 'markdown', 'ndjson', 'value']
     """
     return FORMATS[result][form](import_module(f"d2rpick.report.{result}"), answer, shown)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
+from hashlib import sha256
 from html import escape
 from importlib.resources import files
 from typing import TYPE_CHECKING
@@ -15,9 +17,11 @@ if TYPE_CHECKING:
     from d2rpick.choice.warnings import Caution
     from d2rpick.report.tables import Cell
 
-# Nothing is ever fetched, and nothing runs, whatever the files that were read may hold.
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
-_VOID = frozenset({"meta", "link", "br", "hr"})
+# More columns than this do not fit on a narrow screen.
+_FIT = 3
+_HINT = "The table goes on to the right: scroll it sideways."
+_VOID = frozenset({"meta", "link", "br", "hr", "input"})
+_NOTHING = "'none'"
 # Characters that no page may hold.
 _CONTROLS = dict.fromkeys({*range(32), *range(127, 160)} - {*map(ord, "\t\n")}, "\ufffd")
 
@@ -49,20 +53,42 @@ def join(children: Iterable[str], between: str = "") -> Markup:
     )
 
 
-def document(title: str, *content: str, signed: Sequence[str]) -> str:
-    """Give a whole page that needs nothing but itself, with lines ``signed`` to be filled in by hand in print."""
+def document(
+    title: str, *content: str, signed: Sequence[str], styles: Sequence[Markup] = (), scripts: Sequence[Markup] = ()
+) -> str:
+    """Give a whole page that needs nothing but itself, with lines ``signed`` to be filled in by hand.
+
+    ``styles`` and ``scripts`` are what it needs beside the style of every page; nothing else takes effect on it.
+    """
+    sheets = (resource("style.css"), *styles)
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("meta", http_equiv="Content-Security-Policy", content=_policy(sheets, scripts)),
         tag("title", title),
-        tag("style", resource("style.css")),
+        *(tag("style", sheet) for sheet in sheets),
     )
     # on top, beside the times: behind a card of any length it may stand on a sheet of its own
     sign = tag("p", *(tag("span", line) for line in signed), class_="sign")
     header = tag("header", tag("h1", title), tag("p", f"d2rpick {__version__}", class_="soft"), sign)
-    return f"<!DOCTYPE html>\n{tag('html', head, tag('body', header, tag('main', *content)), lang='en')}\n"
+    body = tag("body", header, tag("main", *content), *(tag("script", script) for script in scripts))
+    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+
+
+def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
+    """Nothing is ever fetched, and only what the page itself is made of runs, whatever the files that were read hold.
+
+    Drawings have styles of their own as attributes.  Older browsers know one rule for all styles only.
+    """
+    allowed = {"style-src-elem": styles, "script-src": scripts}
+    rules = [f"{name} {' '.join(map(_digest, texts)) or _NOTHING}" for name, texts in allowed.items()]
+    base = f"default-src {_NOTHING}; base-uri {_NOTHING}; form-action {_NOTHING}"
+    return "; ".join([base, *rules, "style-src-attr 'unsafe-inline'", "style-src 'unsafe-inline'"])
+
+
+def _digest(text: str) -> str:
+    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
 def section(title: str, *content: str) -> Markup:
@@ -106,7 +132,8 @@ def table(title: str, head: Sequence[str], rows: Iterable[Sequence[Cell]], marke
         for i, row in enumerate(body)
     ]
     content = tag("table", tag("thead", tag("tr", *top)), tag("tbody", *lines))
-    return tag("div", content, class_="scroll", role="region", aria_label=title, tabindex="0")
+    box = tag("div", content, class_="scroll", role="region", aria_label=title, tabindex="0")
+    return join([tag("p", _HINT, class_="hint"), box]) if len(head) > _FIT else box
 
 
 def pairs(rows: Iterable[tuple[str, str]]) -> Markup:
@@ -128,4 +155,4 @@ def _figure(caption: str, wide: str, narrow: str) -> Markup:
         tag("div", Markup(svg), class_=name, role="img", aria_label=caption)
         for svg, name in ((wide, "wide"), (narrow, "narrow"))
     )
-    return tag("figure", *drawn, tag("figcaption", caption))
+    return tag("figure", *drawn, tag("figcaption", caption), class_="drawn")

@@ -4,29 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.health import cautions_of_health
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.health import HEAD as HEALTH_HEAD
-from d2rpick.report.health import measures_of
+from d2rpick.report.health import head, measures_of
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.overview import Overview
-    from d2rpick.choice.warnings import Caution
     from d2rpick.flight.window import FreeFlight
 
 SCHEMA = "d2rpick/info/1"
 _PARTS_HEAD = ("part", "title", "highest internal energy")
 # Keys of the JSON output with a single value.
 _PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "time_unit", "complete")
-
-
-def cautions(overview: Overview) -> tuple[Caution, ...]:
-    """What to know of the health of the run."""
-    return tuple(cautions_of_health(overview.health)) if overview.health else ()
 
 
 def as_table(overview: Overview) -> str:
@@ -36,8 +28,8 @@ def as_table(overview: Overview) -> str:
     lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in rows]
     if overview.parts:
         lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview))]
-    if health := _health(overview):
-        lines += ["", tables.as_text(HEALTH_HEAD, health)]
+    if overview.health and (health := _health(overview)):
+        lines += ["", tables.as_text(head(overview.health), health)]
     return "\n".join([*lines, *(f"note: {printable(note)}" for note in overview.notes)])
 
 
@@ -45,7 +37,8 @@ def as_markdown(overview: Overview) -> str:
     """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
     facts = tables.as_markdown(("what", "value"), _rows(overview))
     parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
-    health = [tables.as_markdown(HEALTH_HEAD, _health(overview))] if _health(overview) else []
+    listed = _health(overview)
+    health = [tables.as_markdown(head(overview.health), listed)] if overview.health and listed else []
     return "\n\n".join([facts, *parts, *health, *(f"* {printable(note)}" for note in overview.notes)])
 
 
@@ -73,7 +66,7 @@ def as_json(overview: Overview, command: Sequence[str]) -> str:
             "schema": SCHEMA,
             "tool_version": __version__,
             "command": list(command),
-            "warnings": keys.of_warnings(cautions(overview)),
+            "warnings": keys.of_warnings(overview.cautions),
             "source": overview.source,
             "format": overview.format,
             "version": overview.version,

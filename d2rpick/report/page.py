@@ -6,25 +6,24 @@ import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.judged_card import judged_card
-from d2rpick.choice.verify import verify_at
 from d2rpick.deck.printing import DEFAULT, SOLVERS
-from d2rpick.errors import D2RPickError
+from d2rpick.report.explorer import scripts, styles
 from d2rpick.report.health import measures_of
-from d2rpick.report.html import Markup, document, pairs, resource, section, table, tag
+from d2rpick.report.html import Markup, document, join, pairs, resource, section, table, tag
 from d2rpick.report.situation import heading
-from d2rpick.report.tables import measure, short
+from d2rpick.report.tables import short
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.health import Health
-    from d2rpick.choice.judged_card import CardRequest
+    from d2rpick.choice.judged_card import SolverInput
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
     from d2rpick.histories.source import Source
+    from d2rpick.report.explorer import Explorer
 
 
 @dataclass(frozen=True)
@@ -33,33 +32,42 @@ class Record:
 
     ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the
     options of ``card`` that judge by the same history.  ``figures`` are SVG elements by caption, for a wide and for a
-    narrow page, with ids of their own.  ``request`` says how the card is printed.
+    narrow page, with ids of their own.  ``card`` is the solver input of a pair that is recommended or verified;
+    ``explorer`` makes the page live.
     """
 
     run: Run
     command: Sequence[str]
     judging: Sequence[str]
     figures: Mapping[str, tuple[str, str]]
-    request: CardRequest
+    card: SolverInput | None = None
     switched: Run | None = None
+    explorer: Explorer | None = None
 
 
-def run_page(run: Run, sections: Iterable[Markup]) -> str:
-    """Write a page about one run."""
+def run_page(run: Run, sections: Iterable[Markup], explored: Explorer | None = None) -> str:
+    """Write a page about one run; with what can be ``explored`` it runs a script."""
     name = next((database.title for database in run.databases if database.title), "") or run.name
-    return document(f"Switch times: {name}", *sections, signed=("chosen by", "date", "signature"))
+    needed = {"styles": styles(), "scripts": scripts()} if explored else {}
+    return document(f"Switch times: {name}", *sections, signed=("chosen by", "date", "signature"), **needed)
 
 
-def pair(title: str, times: tuple[float, float], residual: float | None, history: History, class_: str) -> Markup:
-    """Show (tr, td) large, and in full below."""
+def pair(title: str, times: tuple[float, float], told: Markup, history: History, class_: str) -> Markup:
+    """Show (tr, td) large, what is ``told`` of them, and the times in full."""
+    unit = f" {history.time_unit}" if history.time_unit else ""
+    shown = (
+        tag("span", tag("i", name), f"{short(time)}{unit}") for name, time in zip(("tr", "td"), times, strict=True)
+    )
+    full = (tag("span", f"{name} = {time!r}") for name, time in zip(("tr", "td"), times, strict=True))
+    exact = tag("p", "in full: ", join(full, ", "), class_="soft exact")
+    return tag("div", tag("h2", title), tag("div", *shown, class_="times"), told, exact, class_=class_)
+
+
+def rigid_for(times: tuple[float, float], history: History) -> str:
+    """Say how long a pair is rigid."""
     unit = f" {history.time_unit}" if history.time_unit else ""
     (tr, td), span = times, float(history.time[-1] - history.time[0])
-    shown = (tag("span", tag("i", name), f"{short(time)}{unit}") for name, time in (("tr", tr), ("td", td)))
-    known = "residual unknown" if residual is None else f"residual {measure(residual)}"
-    text = f"{known}, rigid for {short(td - tr)}{unit}, {(td - tr) / span:.0%} of the record"
-    exact = ("in full: ", tag("span", f"tr = {tr!r}"), ", ", tag("span", f"td = {td!r}"))
-    lines = (tag("p", text), tag("p", *exact, class_="soft exact"))
-    return tag("div", tag("h2", title), tag("div", *shown, class_="times"), *lines, class_=class_)
+    return f"rigid for {short(td - tr)}{unit}, {(td - tr) / span:.0%} of the record"
 
 
 def digests(files: Iterable[Source]) -> list[tuple[str, str]]:
@@ -89,19 +97,18 @@ def evidence(situation: Situation, health: Health | None, record: Record) -> Ite
     yield section("To repeat this", *stdin, tag("pre", shlex.join(record.command), class_="wrap"))
 
 
-def solver_input(situation: Situation, times: tuple[float, float], record: Record) -> Markup:
+def solver_input(times: tuple[float, float], record: Record) -> Markup:
     """Give the solver's card where it is known whom it switches, else the command that prints it."""
-    history, title = situation.history, "Solver input"
-    try:
-        found = judged_card([times], history, lambda tr, td: verify_at(situation.at(td), tr), record.request)
-    except D2RPickError as error:
-        return section(title, tag("p", f"No card can be printed for these times: {error}"))
-    if found:
-        return section(title, tag("pre", found[0].text))
-    solver, _ = record.request.of(history)
+    title, card = "Solver input", record.card
+    assert card is not None
+    if card.refusal:
+        return section(title, tag("p", f"No card can be printed for these times: {card.refusal}"))
+    if card.text:
+        return section(title, tag("pre", card.text, tabindex="0"))
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
-    command += [] if solver == DEFAULT else ["--solver", solver]
-    line = tag("pre", shlex.join([*command, f"--{SOLVERS[solver].SWITCHES}", "IDS", *record.judging]), class_="wrap")
+    command += [] if card.solver == DEFAULT else ["--solver", card.solver]
+    switches = f"--{SOLVERS[card.solver].SWITCHES}"
+    line = tag("pre", shlex.join([*command, switches, "IDS", *record.judging]), class_="wrap")
     return section(title, tag("p", "Printed, and judged again as printed, by"), line)
 
 

@@ -6,21 +6,23 @@ import shlex
 from typing import TYPE_CHECKING
 
 from d2rpick.report import page
+from d2rpick.report.explorer import explorer
 from d2rpick.report.figures import svg_element
 from d2rpick.report.figures_plan import draw_plan
 from d2rpick.report.html import Markup, drawings, pairs, remarks, resource, section, table, tag
-from d2rpick.report.plan import HEAD, heading, outlook, rows
+from d2rpick.report.plan import HEAD, heading, outlook, quality, rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.plan import Plan, Planned
     from d2rpick.histories.opening import Run
+    from d2rpick.report.explorer import Explorer
 
 _CAPTION = "Internal energy with the flights, and below it the rigid windows with their numbers"
 
 
-def as_page(plan: Plan, run: Run, command: Sequence[str], card: str | None) -> str:
+def as_page(plan: Plan, run: Run, command: Sequence[str], card: str | None, explored: Explorer | None = None) -> str:
     """Write the page.
 
     Parameters
@@ -32,22 +34,28 @@ def as_page(plan: Plan, run: Run, command: Sequence[str], card: str | None) -> s
         Arguments that repeat the answer.
     card : str or None
         Solver input for the next run, where it is known whom it switches.
+    explored : Explorer, optional
+        The flights of the plan.
     """
-    return page.run_page(run, _sections(plan, run, command, card))
+    return page.run_page(run, _sections(plan, run, command, card, explored), explored)
 
 
-def _sections(plan: Plan, run: Run, command: Sequence[str], card: str | None) -> Iterator[Markup]:
+def _sections(
+    plan: Plan, run: Run, command: Sequence[str], card: str | None, explored: Explorer | None
+) -> Iterator[Markup]:
     cards = [_window(row, plan) for row in plan.supported]
     if not cards:
         nothing = tag("p", "No window of this run can be recommended.")
         cards = [tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")]
     yield tag("section", tag("div", *cards, class_="choice"), remarks(plan.cautions), pairs(outlook(plan)))
+    if explored:
+        yield explorer(explored)
     drawn = tuple(svg_element(draw_plan(plan, narrow=narrow), f"plan-{narrow}-") for narrow in (False, True))
     yield drawings({_CAPTION: (drawn[0], drawn[1])})
     reasons = pairs([(f"flight {row.number}", row.reason) for row in plan.rows if row.reason])
     yield section("Flights", table("Flights", HEAD[1:], [row[1:] for row in rows(plan)]), reasons)
     if card:
-        yield section("For the solver's input", tag("pre", card))
+        yield section("For the solver's input", tag("pre", card, tabindex="0"))
     what, _, text = heading(plan).partition(" ")
     notes = [("note", note) for note in plan.history.notes]
     yield section("What was read", pairs([(what, text.strip()), *page.digests(run.files), *notes]))
@@ -57,5 +65,5 @@ def _sections(plan: Plan, run: Run, command: Sequence[str], card: str | None) ->
 
 def _window(row: Planned, plan: Plan) -> Markup:
     assert row.window is not None
-    residual = row.candidate.residual if row.candidate else None
-    return page.pair(f"Flight {row.number}", row.window, residual, plan.history, "card chosen")
+    told = tag("p", f"{quality(row)}; {page.rigid_for(row.window, plan.history)}")
+    return page.pair(f"Flight {row.number}", row.window, told, plan.history, "card chosen")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from d2rpick.models.published import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, better_pair, residual
+from d2rpick.models.published import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, pair_at_peak, residual
 from d2rpick.report import tables
 from d2rpick.version import __version__
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.models.exhibit import Exhibit
-    from d2rpick.models.published import Row
+    from d2rpick.models.published import PublishedValue
 
 SCHEMA = "d2rpick/reproduce/2"
 MODEL = "k = 660e3 N/m, M = 31.4 kg, beta = 2, alpha = 50 1/s, V0 = 6 m/s"
@@ -20,16 +20,26 @@ _DECIMALS = 12
 HEAD = ("quantity", "unit", "published", "reference", "here", "difference", "agrees", "source")
 
 
-def as_table(rows: Sequence[Row], exhibits: Sequence[Exhibit]) -> str:
+class Reproduction(NamedTuple):
+    """Values and figures of the paper beside those found here; ``files`` were written."""
+
+    rows: Sequence[PublishedValue]
+    exhibits: Sequence[Exhibit]
+    files: Sequence[str] = ()
+
+
+def as_table(answer: Reproduction) -> str:
     """Published numbers and reference values beside those here, the pairs, the figures, the misprints."""
+    rows, exhibits, _ = answer
     lines = [tables.as_text(HEAD, [cells(row) for row in rows]), "", *pairs_of(), ""]
     for one in exhibits:
         lines += [f"{heading(one)}: {verdict(one)}", f"  paper  {one.paper}", f"  here   {one.found}"]
     return "\n".join([*lines, "", "misprints in the paper", *(f"  {misprint}" for misprint in MISPRINTS)])
 
 
-def as_markdown(rows: Sequence[Row], exhibits: Sequence[Exhibit], *, pictures: bool = False) -> str:
+def as_markdown(answer: Reproduction, *, pictures: bool = False) -> str:
     """Give the same as Markdown, with the figures where ``pictures`` lie beside it."""
+    rows, exhibits, _ = answer
     blocks = ["# Analysis of switched-rigid floating oscillator, reproduced", f"{MODEL}; d2rpick {__version__}."]
     for one in exhibits:
         shown = [f"![{one.title}]({one.name}.svg)"] if pictures else []
@@ -45,15 +55,16 @@ def as_markdown(rows: Sequence[Row], exhibits: Sequence[Exhibit], *, pictures: b
     return "\n\n".join(blocks)
 
 
-def as_csv(rows: Sequence[Row]) -> str:
+def as_csv(rows: Sequence[PublishedValue]) -> str:
     """Give the rows at full precision."""
     body: list[list[tables.Cell]]
     body = [[r.what, r.unit, r.published, r.reference, r.here, r.difference, r.agrees, r.source] for r in rows]
     return tables.as_csv(HEAD, body).rstrip("\n")
 
 
-def as_json(rows: Sequence[Row], exhibits: Sequence[Exhibit], files: Sequence[str], command: Sequence[str]) -> str:
+def as_json(answer: Reproduction, command: Sequence[str]) -> str:
     """Everything by schema d2rpick/reproduce/2."""
+    rows, exhibits, files = answer
     keys = ("what", "unit", "published", "reference", "here", "difference", "tolerance", "source", "agrees")
     return tables.as_json(
         {
@@ -63,7 +74,7 @@ def as_json(rows: Sequence[Row], exhibits: Sequence[Exhibit], files: Sequence[st
             "warnings": [],
             "rows": [{key: getattr(row, key) for key in keys} for row in rows],
             "published": _pair(PUBLISHED),
-            "better": _pair(better_pair()),
+            "better": _pair(pair_at_peak()),
             "figures": [
                 {key: getattr(one, key) for key in ("name", "title", "section", "figure", "paper", "found", "agrees")}
                 for one in exhibits
@@ -74,7 +85,7 @@ def as_json(rows: Sequence[Row], exhibits: Sequence[Exhibit], files: Sequence[st
     )
 
 
-def cells(row: Row) -> list[tables.Cell]:
+def cells(row: PublishedValue) -> list[tables.Cell]:
     """Give a row in digits that are the same on every machine."""
     known = (None if value is None else f"{round(value, _DECIMALS):.12g}" for value in (row.published, row.reference))
     here = f"{round(row.here, _DECIMALS):.12g}"
@@ -101,5 +112,5 @@ def pairs_of() -> list[str]:
     """Say how good the published and the better pair are."""
     return [
         f"{name} pair: tr = {1e3 * pair[0]:.6g} ms, td = {1e3 * pair[1]:.6g} ms, residual {residual(pair):.3f}"
-        for name, pair in (("published", PUBLISHED), ("better", better_pair()))
+        for name, pair in (("published", PUBLISHED), ("better", pair_at_peak()))
     ]

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.models.exhibit import Exhibit
-    from d2rpick.models.published import Row
+    from d2rpick.models.published import PublishedValue
 
 
-def as_page(rows: Sequence[Row], exhibits: Sequence[Exhibit], command: Sequence[str]) -> str:
+def as_page(rows: Sequence[PublishedValue], exhibits: Sequence[Exhibit], command: Sequence[str]) -> str:
     """Write the page: every figure with what the paper shows and what is found, then the table."""
     return document(
         "Analysis of switched-rigid floating oscillator, reproduced",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.models.rollover.record import BOX
 from d2rpick.models.rollover.scan import Outcome
@@ -21,8 +21,18 @@ SCHEMA = "d2rpick/rollover/1"
 _COLUMNS = tuple(field.name for field in fields(Outcome))
 
 
-def as_table(reference: Record, outcomes: Sequence[Outcome], answer: Suggestion) -> str:
+class Scan(NamedTuple):
+    """Runs switched at many tr beside the ``reference`` without switching, and what is recommended from that one."""
+
+    reference: Record
+    outcomes: Sequence[Outcome]
+    answer: Suggestion
+    cautions: Sequence[Caution]
+
+
+def as_table(scan: Scan) -> str:
     """What happened without switching, a row for each tr, and how good the tr is that the tool recommends."""
+    reference, outcomes, answer, _ = scan
     td, recommended = answer.situation.td, _recommended(answer)
     rows = [["*" if one.tr == recommended else "", *_short(one)] for one in outcomes]
     lines = [
@@ -55,11 +65,9 @@ def as_csv(outcomes: Sequence[Outcome]) -> str:
     return tables.as_csv(_COLUMNS, [list(asdict(one).values()) for one in outcomes]).rstrip("\n")
 
 
-def as_json(
-    reference: Record, outcomes: Sequence[Outcome], answer: Suggestion, cautions: Sequence[Caution],
-    command: Sequence[str],
-) -> str:  # fmt: skip
+def as_json(scan: Scan, command: Sequence[str]) -> str:
     """Everything by schema d2rpick/rollover/1."""
+    reference, outcomes, answer, cautions = scan
     return tables.as_json(
         {
             "schema": SCHEMA,

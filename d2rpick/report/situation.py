@@ -18,14 +18,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 
-def heading(situation: Situation) -> list[str]:
-    """Lines above the table of a result: what was read, and what the choice rests on."""
-    history, flight = situation.history, situation.flight
+def read_line(history: History) -> str:
+    """Say what was read."""
     unit = f" {history.time_unit}" if history.time_unit else ""
     what = f"{', '.join(history.source)}: {history.format}, {history.channel}"
+    span = f"{history.time[0]:.6g} to {history.time[-1]:.6g}{unit}"
+    return printable(f"history  {what}, {history.time.size} states, {span}")
+
+
+def heading(situation: Situation) -> list[str]:
+    """Lines above the table of a result: what was read, and what the choice rests on."""
+    flight = situation.flight
     share = measure(situation.kinetic_share) + (" (estimate)" if situation.vibration.estimated else "")
     lines = [
-        f"history  {what}, {history.time.size} states, {history.time[0]:.6g} to {history.time[-1]:.6g}{unit}",
+        read_line(situation.history),
         f"td       {situation.td:.6g}: energy {situation.energy_td:.6g}, kinetic share {share}",
         f"basis    {_basis(situation)}",
     ]

@@ -39,6 +39,18 @@ def measure(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
+def known(head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> tuple[list[str], list[list[Cell]]]:
+    """Leave the columns out in which nothing is known.
+
+    Examples
+    --------
+    >>> known(["tr", "sign", "R"], [[0.5, None, "-"], [0.7, None, "-"]])
+    (['tr'], [[0.5], [0.7]])
+    """
+    kept = [i for i in range(len(head)) if any(row[i] not in (None, "-") for row in rows)]
+    return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
+
+
 def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     """Columns in line, numbers to the right of their column, two blanks between.
 
@@ -99,6 +111,13 @@ def _exact(value: Cell) -> Cell:
     if isinstance(value, bool):
         return str(value).lower()
     return printable(value) if isinstance(value, str) else value
+
+
+def as_line(result: dict[str, Any]) -> str:
+    """Write a result as JSON in one line."""
+    import json
+
+    return json.dumps(result, allow_nan=False, ensure_ascii=False)
 
 
 def as_json(result: dict[str, Any]) -> str:

@@ -9,14 +9,13 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows, clear_of_td
 from d2rpick.choice.error_profile import error_profile
 from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import D2RPickError, RangeError
 from d2rpick.histories.names import listing
+from d2rpick.histories.outline import outline
 from d2rpick.histories.selection import Selection
 from d2rpick.histories.source import expand
 from d2rpick.studies.common import NAMED, Common, common_tr, runs_of
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.suggest import Suggestion
-    from d2rpick.histories.history import History, Samples
 
 # Cautions about single runs that a row says otherwise, or that are about what a study does not answer.
 _NOT_REPEATED = ("no-candidate",)
@@ -122,8 +120,9 @@ def ask(question: Question, source: str) -> Row:
         status = OUT_OF_RANGE if isinstance(error, RangeError) else UNREADABLE
         text = f"{source}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)
         return Row(source, status, text, files=files)
-    row = row_of(source, answer)
-    return replace(row, files=files, curve=outline(reference.history) if question.curve else None)
+    time, energy = reference.history.time, reference.history.energy
+    curve = outline(time, energy, _STRETCHES) if question.curve else None
+    return replace(row_of(source, answer), files=files, curve=curve)
 
 
 def row_of(source: str, answer: Suggestion) -> Row:
@@ -164,17 +163,6 @@ def stamps(source: str) -> tuple[Stamp, ...]:
     except (D2RPickError, OSError):  # told by whoever reads it
         return ()
     return tuple(Stamp(path, state.st_size, state.st_mtime_ns) for path, state in found)
-
-
-def outline(history: History) -> Samples:
-    """Times and energies that draw the curve: all samples, or the lowest and highest of each of 200 stretches."""
-    time, energy = history.time, history.energy
-    if time.size <= 2 * _STRETCHES:
-        return np.stack([time, energy])
-    pieces = np.array_split(np.arange(time.size), _STRETCHES)
-    kept = [(piece[0] + np.argmin(energy[piece]), piece[0] + np.argmax(energy[piece])) for piece in pieces]
-    at = np.sort(np.array(kept).ravel())
-    return np.stack([time[at], energy[at]])
 
 
 def summarise(td: float | tuple[float, float], rows: Sequence[Row]) -> Study:

@@ -56,7 +56,7 @@ def cores() -> int:
         return os.cpu_count() or 1
 
 
-class Answer(NamedTuple):
+class Finished(NamedTuple):
     """Result of the call for the item of this number, or the error that it ended with."""
 
     number: int
@@ -64,7 +64,7 @@ class Answer(NamedTuple):
     error: BaseException | None
 
 
-def answers(farm: Farm, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Answer]:
+def answers(farm: Farm, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
     """Compute ``function`` for all items; answers come as they are finished, whatever their order.
 
     A call whose process died is repeated once, alone: the death breaks a whole pool, and not all of its calls are to
@@ -92,13 +92,13 @@ def _error(future: Future[Any]) -> BaseException | None:
     return None if future.cancelled() else future.exception()
 
 
-def _answer(number: int, future: Future[Any]) -> Answer:
+def _answer(number: int, future: Future[Any]) -> Finished:
     if future.cancelled():
-        return Answer(number, None, D2RPickError("cancelled by the cluster; is its scheduler still running?"))
+        return Finished(number, None, D2RPickError("cancelled by the cluster; is its scheduler still running?"))
     error = future.exception()
     if isinstance(error, BrokenProcessPool):
         error = D2RPickError("its process ended without a result; was there enough memory?")
-    return Answer(number, None if error else future.result(), error)
+    return Finished(number, None if error else future.result(), error)
 
 
 class Here:

@@ -8,6 +8,7 @@ vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -49,24 +50,35 @@ def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst:
     """Return the least-squares parameters with the first ``size`` of them free, the others zero.
 
     None where on a few of the samples the fit leaves more than ``worst`` of the variance or, where that is finite, on
-    some more of them a structure that is too large.
+    these or some more of them a structure that is too large.
     """
 
     def model(parameters: Samples, times: Samples) -> tuple[Samples, Samples]:
         return energy_and_jacobian(parameters, times, size)
 
-    stride = -(-s.size // COARSE)
-    coarse_s, coarse_e = s[::stride], e[::stride]
-    best = refine(_starts(poles, coarse_s, coarse_e, size), model, coarse_s, coarse_e, worst)
-    if best is None or (np.isfinite(worst) and fails(best, model, s, e)):
+    starts = partial(_starts, poles, size=size)
+    best = best_of_starts(starts, model, s, e, worst)
+    if best is None:
         return None
-    if stride > 1:
-        best = minimise(best, model, s, e)[0]
     if best[5] < 0:  # q and -q make the same energy; the preload is taken positive
         best[[2, 3, 5]] *= -1
     if best[0] < 0:
         best[[0, 3]] *= -1
     return best
+
+
+def best_of_starts(
+    starts: Callable[[Samples, Samples], Sequence[Samples]], model: Model, s: Samples, e: Samples, worst: float
+) -> Samples | None:
+    """Return the best fit to all samples from what ``starts`` gives for a few of them; None as for `fit`."""
+    stride = -(-s.size // COARSE)
+    coarse_s, coarse_e = s[::stride], e[::stride]
+    best = refine(starts(coarse_s, coarse_e), model, coarse_s, coarse_e, worst)
+    if best is None:
+        return None
+    if np.isfinite(worst) and (_structured(best, model, coarse_s, coarse_e) or fails(best, model, s, e)):
+        return None
+    return best if stride == 1 else minimise(best, model, s, e)[0]
 
 
 def refine(starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float) -> Samples | None:
@@ -91,8 +103,12 @@ def fails(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
     if stride == 1:
         return False
     some_s, some_e = s[::stride], e[::stride]
-    ended = minimise(parameters, model, some_s, some_e, near=_NEAR)[0]
-    return surely_structured(some_e - model(ended, some_s)[0], float(np.std(some_e)))
+    return _structured(minimise(parameters, model, some_s, some_e, near=_NEAR)[0], model, some_s, some_e)
+
+
+def _structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
+    """Whether what the best fit to some of the samples leaves there refuses the fit to all of them."""
+    return surely_structured(e - model(parameters, s)[0], float(np.std(e)))
 
 
 def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
@@ -126,7 +142,7 @@ def cell_means(s: Samples, e: Samples, count: int) -> Samples:
     return np.asarray(np.diff(np.interp(np.linspace(0, 1, count + 1), s, integral(s, e))) * count)
 
 
-def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int) -> list[Samples]:
+def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, *, size: int) -> list[Samples]:
     """Return the best parameter vectors to start from, for a model with ``size`` free parameters.
 
     A rate p is that of q**2 (alpha = -Re p, omega = Im p / 2) or, with a preload, that of q (alpha = -2 Re p,
@@ -174,8 +190,9 @@ def minimise(
     cost, normal, gradient = _normal_equations(parameters, model, s, e)
     free = gradient.size
     for _ in range(_MAX_STEPS):
-        scale = np.sqrt(np.diag(normal)) + 1e-150
-        damped = normal / (scale * scale[:, None]) + damping * np.eye(free)
+        scale = np.sqrt(normal.diagonal()) + 1e-150
+        damped = normal / (scale * scale[:, None])
+        damped.flat[:: free + 1] += damping
         step = np.linalg.solve(damped, gradient / scale) / scale
         trial = parameters.copy()
         trial[:free] += step
@@ -195,11 +212,17 @@ def minimise(
 
 def _normal_equations(parameters: Samples, model: Model, s: Samples, e: Samples) -> tuple[float, Samples, Samples]:
     """Sum of squares of the rest, J J^T and J rest, block by block."""
+    if s.size <= _BLOCK:
+        return _of_block(parameters, model, s, e)
     cost, normal, gradient = 0.0, np.zeros(()), np.zeros(())
     for first in range(0, s.size, _BLOCK):
         block = slice(first, first + _BLOCK)
-        energy, jacobian = model(parameters, s[block])
-        rest = e[block] - energy
-        cost += float(rest @ rest)
-        normal, gradient = normal + jacobian @ jacobian.T, gradient + jacobian @ rest
+        own, squares, slope = _of_block(parameters, model, s[block], e[block])
+        cost, normal, gradient = cost + own, normal + squares, gradient + slope
     return cost, normal, gradient
+
+
+def _of_block(parameters: Samples, model: Model, s: Samples, e: Samples) -> tuple[float, Samples, Samples]:
+    energy, jacobian = model(parameters, s)
+    rest = e - energy
+    return float(rest @ rest), jacobian @ jacobian.T, jacobian @ rest

@@ -6,12 +6,13 @@ cosine and sine.
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import combinations
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.vibration.fit_one import COARSE, STARTS, fails, minimise, rates, refine
+from d2rpick.vibration.fit_one import STARTS, best_of_starts, rates
 from d2rpick.vibration.modes import sum_and_jacobian
 
 if TYPE_CHECKING:
@@ -30,15 +31,10 @@ def fit_several(s: Samples, e: Samples, count: int, worst: float = np.inf) -> Sa
     3 count exponentials leave room for what is none.  For known rates E is linear in the rest, which ranks the
     rates and gives the parameters.  None also where a few of the samples refuse the fit, as for one mode.
     """
-    stride = -(-s.size // COARSE)
-    coarse_s, coarse_e = s[::stride], e[::stride]
-    best = refine(_starts(s, e, coarse_s, coarse_e, count), sum_and_jacobian, coarse_s, coarse_e, worst)
-    if best is None or (np.isfinite(worst) and fails(best, sum_and_jacobian, s, e)):
-        return None
-    return best if stride == 1 else minimise(best, sum_and_jacobian, s, e)[0]
+    return best_of_starts(partial(_starts, s, e, count), sum_and_jacobian, s, e, worst)
 
 
-def _starts(s: Samples, e: Samples, coarse_s: Samples, coarse_e: Samples, count: int) -> list[Samples]:
+def _starts(s: Samples, e: Samples, count: int, coarse_s: Samples, coarse_e: Samples) -> list[Samples]:
     """Return the best parameter vectors to start from."""
     poles = rates(s, e, (3 * count,))
     hopeless = _HOPELESS * float(np.sum((coarse_e - np.mean(coarse_e)) ** 2))

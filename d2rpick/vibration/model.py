@@ -114,6 +114,12 @@ class Evidence(NamedTuple):
     parts: SignedParts | None = None
     signed: PartVibration | None = None
 
+    @property
+    def has_model(self) -> bool:
+        """Whether at some td more than the samples of the energy may be relied on."""
+        fit = self.fit
+        return bool(self.signed or (fit and fit.mode and self.span and not fit.reason))
+
 
 def model_at(history: History, td: float, evidence: Evidence) -> Vibration:
     """Give the best model that can be relied on at ``td``."""

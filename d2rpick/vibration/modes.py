@@ -136,7 +136,8 @@ def sum_and_jacobian(parameters: Samples, s: Samples) -> tuple[Samples, Samples]
         own, by = energy_and_jacobian(np.array([omega, alpha, cosine, sine, 0.0, 0.0]), s, 4)
         energy += own
         jacobian[0] += by[1]
-        jacobian[3 * i + 1 : 3 * i + 4] = by[[0, 2, 3]]
+        jacobian[3 * i + 1] = by[0]
+        jacobian[3 * i + 2 : 3 * i + 4] = by[2:]
     return energy, jacobian
 
 

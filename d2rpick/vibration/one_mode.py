@@ -198,15 +198,19 @@ def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Sam
 
     The parameters are omega, alpha, cosine, sine, energy_plastic, preload of a `Mode` with its origin at s = 0.
     """
-    omega, alpha, cosine, sine, plastic, preload = parameters
+    omega, alpha, cosine, sine, plastic, preload = parameters.tolist()
     angle, decay = omega * s, np.exp(-alpha / 2 * s)
     cos, sin = decay * np.cos(angle), decay * np.sin(angle)
     swing = cosine * cos + sine * sin
     q = preload + swing
-    jacobian = np.ones((size, s.size))
-    jacobian[0] = 2 * q * s * (sine * cos - cosine * sin)
-    jacobian[1] = -q * s * swing
-    jacobian[2] = 2 * q * cos
-    jacobian[3] = 2 * q * sin
-    jacobian[5:] = 2 * q
+    twice = q + q
+    jacobian = np.empty((size, s.size))  # written in place: this is where identification spends its time
+    by_rate = np.multiply(twice, s, out=jacobian[0])
+    np.multiply(by_rate, swing, out=jacobian[1])
+    jacobian[1] *= -0.5
+    by_rate *= sine * cos - cosine * sin
+    np.multiply(twice, cos, out=jacobian[2])
+    np.multiply(twice, sin, out=jacobian[3])
+    jacobian[4:5] = 1.0
+    jacobian[5:] = twice
     return plastic + q * q, jacobian

@@ -30,6 +30,8 @@ _MOST_OFF_CENTRE = 0.5
 # Every other sample is left out again and again while minima are unclear: in fine output a zero drowns in the error
 # of the solver, 1e-5 of the highest energy, and the root is round there.  But minima stay this many samples apart.
 _LEAST_APART = 8
+# Signs of five samples about a minimum where the deformation turns nowhere, just before the minimum, just after it.
+_TURNS = np.array([[1, 1, 1, 1, 1], [-1, -1, 1, 1, 1], [-1, -1, -1, 1, 1]])
 # Parts without a sign are left out where they hold no more than this share of the energy: D changes by 0.2 at most,
 # the default tolerance.
 MOST_UNSIGNED = 0.01
@@ -168,10 +170,7 @@ def _zeros_of(time: Samples, root: Samples) -> _Zeros:
     early, late = at < 2, at >= root.size - 2
     inner = at[~early & ~late]
     around = inner[:, np.newaxis] + np.arange(-2, 3)
-    times, roots = time[around], root[around]
-    plain = _bend(times, roots)
-    before = _bend(times, roots * np.array([-1, -1, 1, 1, 1]))
-    after = _bend(times, roots * np.array([-1, -1, -1, 1, 1]))
+    plain, before, after = _bends(time[around], root[around] * _TURNS[:, np.newaxis])
     turned = np.minimum(before, after)
     zero = plain > _CLEARLY * turned
     doubt = ~zero & (turned <= _CLEARLY * plain)
@@ -194,10 +193,10 @@ def _spacing(values: Samples) -> float:
     return values.size / max(1, _minima(values).size)
 
 
-def _bend(times: Samples, values: Samples) -> Samples:
-    """Largest second divided difference of each row of five samples."""
-    slopes = np.diff(values) / np.diff(times)
-    return np.asarray(np.abs(np.diff(slopes)).max(axis=1, initial=0.0))
+def _bends(times: Samples, values: Samples) -> Samples:
+    """Largest second difference of the slopes in each row of five samples, of any number of tables of such rows."""
+    slopes = (values[..., 1:] - values[..., :-1]) / (times[:, 1:] - times[:, :-1])
+    return np.asarray(np.abs(slopes[..., 1:] - slopes[..., :-1]).max(axis=-1, initial=0.0))
 
 
 @dataclass(frozen=True, eq=False)

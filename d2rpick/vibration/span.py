@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from math import ceil, log
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
 _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
 # Ends before td, as shares of what comes before it: td itself may lie in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
+# They lie on marks that are the same for every td, so that neighbouring td share the windows and what was fitted to
+# them: each mark is so much of the way to the one after it, as far from td as the last beginning at most.
+_MARKS = 0.87
 # A window that an oscillator describes shows so many periods at least, and holds most of the samples it was fitted to:
 # less may be an accident, or the moment in which a record passes from one thing to another.
 _LEAST_PERIODS, _MOST = 1.25, 0.8
@@ -75,7 +79,7 @@ def described_span(
     fit : Identification
         Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
     """
-    quick, up_to_td = partial(fitter, quick=True), Span(bounds.start, td)
+    quick, up_to_td = partial(fitter, quick=True), Span(bounds.start, _mark(td, bounds))
     refused = {}
     for window in _windows(td, bounds, whole=whole):
         span, fit = _grow(history, td, window, bounds, fitter if window == up_to_td else quick)
@@ -127,14 +131,25 @@ def identify_within(history: History, window: Span) -> Identification:
 
 def _windows(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
     """Windows to try: around td, the longest first, then before td."""
-    beginnings = [bounds.start, *(td - share * (td - bounds.start) for share in (() if whole else _BEGINNINGS))]
-    ends = [bounds.end, td, *(td + share * (bounds.end - td) for share in (() if whole else _ENDS))]
-    around = {Span(beginning, end) for beginning in beginnings for end in ends}
+    start, end = bounds
+    beginnings = [start, *(_mark(td - share * (td - start), bounds) for share in (() if whole else _BEGINNINGS))]
+    ends = [end, _mark(td, bounds), *(_mark(td + share * (end - td), bounds, 1) for share in (() if whole else _ENDS))]
+    around = {Span(beginning, late) for beginning in beginnings for late in ends if beginning < late}
+    around.add(Span(start, _mark(td, bounds)))
     yield from sorted(around, key=lambda window: window.start - window.end)
     if not whole:
         for share in _EARLIER_ENDS:
-            end = td - share * (td - bounds.start)
-            yield from (Span(beginning, end) for beginning in beginnings if beginning < end)
+            early = _mark(td - share * (td - start), bounds)
+            yield from (Span(beginning, early) for beginning in dict.fromkeys(beginnings) if beginning < early)
+
+
+def _mark(time: float, bounds: Span, after: int = 0) -> float:
+    """Give the last mark that is not after ``time``, or the one ``after`` it; where there is none, the time itself."""
+    share = (time - bounds.start) / (bounds.end - bounds.start) if bounds.end > bounds.start else 0.0
+    if not 0 < share <= 1:
+        return time
+    place = ceil(log(share) / log(_MARKS)) - after
+    return bounds.start + (bounds.end - bounds.start) * _MARKS ** max(place, 0)
 
 
 def _grow(

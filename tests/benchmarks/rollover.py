@@ -21,10 +21,10 @@ import numpy as np
 
 from d2rpick.models.rollover.as_history import suggestion_for
 from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.run import Window, simulate
+from d2rpick.models.rollover.run import RigidWindow, simulate
 from tests.rehearsals import SETS, Rehearsal, rehearse
 
-WINDOW = Window(0.0970, 0.370)  # what suggest recommends for the default
+WINDOW = RigidWindow(0.0970, 0.370)  # what suggest recommends for the default
 HEAD = (
     " #  stiffness  yield  damping  speed  mesh  released  landed     td       tr  roll error  of worst  "
     "announced   mean     off"

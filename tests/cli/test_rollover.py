@@ -16,7 +16,7 @@ import pytest
 from d2rpick.cli import rollover
 from d2rpick.cli.progress import Count
 from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.run import Window, simulate
+from d2rpick.models.rollover.run import RigidWindow, simulate
 from d2rpick.report import figures_models
 from tests.command import answer, codes, run
 
@@ -85,7 +85,7 @@ def test_a_box_that_falls_is_switched_in_several_windows(tmp_path: Path) -> None
 
 
 def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
-    window = Window(0.05, 0.2)
+    window = RigidWindow(0.05, 0.2)
     reference, switched = (simulate(Parameters(mesh=4), 0.25, *rigid, interval=5e-4) for rigid in ((), (window,)))
     figure = figures_models.draw_rollover(Parameters(mesh=4), reference, switched, (window,))
     outlines, roll, roll_off, height, height_off = figure.axes

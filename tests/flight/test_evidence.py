@@ -207,6 +207,26 @@ def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
     assert quiet is None or quiet.start >= start
 
 
+@pytest.mark.parametrize("part", ["bottom", "walls", "lid", "springs"])
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.85, 0.95, 0.98])
+def test_the_energy_alone_of_a_tumbling_box_never_begins_before_an_impact(part: str, share: float) -> None:
+    whole = history_of("openradioss/car_drop/drop2T01.gz", part)
+    history = History(whole.time, whole.energy, ("drop",), "csv", "E")
+    for start, end in ((0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)):
+        quiet = quiet_time(history, start + share * (end - start))
+        assert quiet is None or quiet.start >= start
+
+
+def test_a_contact_between_two_flights_on_one_level_ends_the_first() -> None:
+    time = np.linspace(0, 1, 2001)
+    load = 400 * np.exp(-(((time - 0.2) / 0.05) ** 2))
+    contact = 80 * np.exp(-(((time - 0.8) / 0.01) ** 2))  # brief, in the last quarter before td
+    energy = 190 + 5 * np.sin(250 * time) + load + contact
+    quiet = quiet_time(History(time, np.where(time < 0.1, 0, energy), ("run",), "csv", "E"), 0.95)
+    assert quiet
+    assert quiet.start > 0.81
+
+
 def test_what_stays_of_a_contact_energy_is_no_flight_where_a_load_of_another_kind_works() -> None:
     time = np.linspace(0, 1, 501)
     touched = np.where(time < 0.2, 5 * time, 1.0)

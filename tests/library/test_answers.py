@@ -139,9 +139,22 @@ def test_a_study_and_a_check_say_what_the_command_line_says(tmp_path: Path) -> N
     assert checked.to_frame()["rule"].tolist() == [one["rule"] for one in theirs["findings"]]
 
 
+def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(tmp_path: Path) -> None:
+    table = pd.read_csv("sample_data/rollover_box.csv")
+    names = {"momentum_x": "a7", "momentum_z": "a8"}
+    table.rename(columns=names).to_csv(tmp_path / "run.csv", index=False)
+    channels = {"x_momentum": "a7", "z_momentum": "a8"}
+    found = d2.suggest(d2.read(tmp_path / "run.csv", channels=channels), td=0.37)
+    assert found.flight.source == "momentum"
+    same(found.to_dict(), answer(*found.command))
+    assert found.to_frame()["tr"].tolist() == d2.suggest(d2.from_frame(table), td=0.37).to_frame()["tr"].tolist()
+
+
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
+        (lambda: loose.read(ENERGY, channels={"joy": "z"}), ValueError, "channels names 'joy', one of"),
+        (lambda: loose.read(ENERGY, channels={"kinetic_energy": 1.5}), TypeError, "kinetic_energy is 1.5"),
         (
             lambda: loose.suggest(d2.read(ENERGY), td=0.06, td_window=(0.06, 0.07)),
             TypeError,

@@ -57,8 +57,8 @@ def test_a_wrong_number_does_not_agree() -> None:
 
 
 def test_the_better_pair_has_no_residual() -> None:
-    assert published.better_pair() == pytest.approx((paper.BETTER_TR, paper.BETTER_TD), rel=1e-12)
-    assert published.residual(published.better_pair()) < 1e-12
+    assert published.pair_at_peak() == pytest.approx((paper.BETTER_TR, paper.BETTER_TD), rel=1e-12)
+    assert published.residual(published.pair_at_peak()) < 1e-12
     assert published.residual(published.PUBLISHED) == pytest.approx(0.963, abs=1e-3)
 
 
@@ -123,8 +123,9 @@ def test_after_td_the_better_pair_continues_the_motion_and_the_published_one_doe
 
 def test_the_saving_is_predicted_beside_what_was_measured() -> None:
     for run_ in saving.RUNS:
-        assert run_.by_cost == pytest.approx(run_.measured, abs=0.05)
-    assert saving.RUNS[1].by_count - saving.RUNS[1].measured > 0.1
+        assert run_.by_cost == pytest.approx(run_.measured, abs=0.025)
+    assert all(run_.by_count - run_.measured > 0.02 for run_ in saving.RUNS[:3])
+    assert sorted(saving.RUNS, key=lambda run_: run_.by_cost) == sorted(saving.RUNS, key=lambda run_: run_.measured)
 
 
 def test_the_figures_of_the_box_say_what_a_coarse_box_does(monkeypatch: pytest.MonkeyPatch) -> None:

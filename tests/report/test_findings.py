@@ -29,7 +29,7 @@ def results(tmp_path: Path) -> list[Checked]:
 
 
 def test_table(results: list[Checked], tmp_path: Path) -> None:
-    lines = report.as_table(results, tmp_path).split("\n")
+    lines = report.as_table(report.Checks(results, tmp_path)).split("\n")
     assert lines[0] == "main.k"
     assert "  part 1: rigid from 0.02 to 0.5 (main.k:14)" in lines
     assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
@@ -38,7 +38,7 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
 
 
 def test_json(results: list[Checked], tmp_path: Path) -> None:
-    content = json.loads(report.as_json(results, tmp_path, ["check", "main.k"]))
+    content = json.loads(report.as_json(report.Checks(results, tmp_path), ["check", "main.k"]))
     jsonschema.validate(content, json.loads(files("d2rpick").joinpath("schemas/check-1.json").read_text()))
     assert content["decks"] == ["main.k", "good/main.k"]
     assert [window["td"] for window in content["windows"]] == [0.5, None, 0.09]
@@ -47,7 +47,7 @@ def test_json(results: list[Checked], tmp_path: Path) -> None:
 
 
 def test_github(results: list[Checked], tmp_path: Path) -> None:
-    lines = report.as_github(results, tmp_path).split("\n")
+    lines = report.as_github(report.Checks(results, tmp_path)).split("\n")
     assert lines[1].startswith("::error file=main.k,line=23,col=28,title=D2R101::TIME1 is 0.5")
     assert lines[0].startswith("::notice file=main.k")
 
@@ -60,7 +60,7 @@ def junit_is_valid(text: str) -> None:
 
 
 def test_junit(results: list[Checked], tmp_path: Path) -> None:
-    text = report.as_junit(results, tmp_path)
+    text = report.as_junit(report.Checks(results, tmp_path))
     junit_is_valid(text)
     suites = ET.fromstring(text)
     assert [(suite.get("name"), suite.get("tests"), suite.get("failures")) for suite in suites] == [
@@ -68,7 +68,7 @@ def test_junit(results: list[Checked], tmp_path: Path) -> None:
         ("good/main.k", "1", "0"),
     ]
     assert [failure.get("type") for failure in suites.iter("failure")] == ["D2R101"]
-    strict = ET.fromstring(report.as_junit(results, tmp_path, Severity.INFO))
+    strict = ET.fromstring(report.as_junit(report.Checks(results, tmp_path, fail_on=Severity.INFO)))
     assert len(list(strict.iter("failure"))) == 2
 
 
@@ -80,7 +80,7 @@ def sarif_is_valid(text: str) -> None:
 
 
 def test_sarif(results: list[Checked], tmp_path: Path) -> None:
-    text = report.as_sarif(results, tmp_path)
+    text = report.as_sarif(report.Checks(results, tmp_path))
     sarif_is_valid(text)
     (run,) = json.loads(text)["runs"]
     assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == list(RULES)
@@ -92,8 +92,8 @@ def test_sarif(results: list[Checked], tmp_path: Path) -> None:
 
 def test_paths_outside_are_absolute(results: list[Checked], tmp_path: Path) -> None:
     elsewhere = tmp_path / "else where"
-    assert f"::error file={tmp_path}/main.k" in report.as_github(results, elsewhere)
-    assert f"file://{tmp_path}/main.k" in report.as_sarif(results, elsewhere)
+    assert f"::error file={tmp_path}/main.k" in report.as_github(report.Checks(results, elsewhere))
+    assert f"file://{tmp_path}/main.k" in report.as_sarif(report.Checks(results, elsewhere))
 
 
 @given(st.text(), st.text(st.characters(exclude_characters="\0"), min_size=1))
@@ -102,13 +102,13 @@ def test_any_text_makes_a_valid_report(message: str, name: str) -> None:
     finding = Finding("D2R001", Severity.ERROR, message, name, name, 1, 1)
     result = [Checked(name, (), (finding,))]
     root = Path("/some folder")
-    ET.fromstring(report.as_junit(result, root).encode("utf-8", "replace"))
-    sarif_is_valid(report.as_sarif(result, root))
-    assert report.as_github(result, root).count("\n") == 0
-    json.loads(report.as_json(result, root, []))
+    ET.fromstring(report.as_junit(report.Checks(result, root)).encode("utf-8", "replace"))
+    sarif_is_valid(report.as_sarif(report.Checks(result, root)))
+    assert report.as_github(report.Checks(result, root)).count("\n") == 0
+    json.loads(report.as_json(report.Checks(result, root), []))
 
 
 def test_nothing_found_is_a_report_too(tmp_path: Path) -> None:
-    sarif_is_valid(report.as_sarif([], tmp_path))
-    junit_is_valid(report.as_junit([], tmp_path))
-    assert report.as_github([], tmp_path) == ""
+    sarif_is_valid(report.as_sarif(report.Checks([], tmp_path)))
+    junit_is_valid(report.as_junit(report.Checks([], tmp_path)))
+    assert report.as_github(report.Checks([], tmp_path)) == ""

@@ -3,24 +3,37 @@
 from __future__ import annotations
 
 import importlib
+from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick.report.formats import FORMATS
 from tests.command import ENERGY, run
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 COMMANDS = {
-    "suggestion": ("suggest", "--td", "0.064"),
-    "verdict": ("verify", "--tr", "0.0135867", "--td", "0.0687534"),
-    "overview": ("info",),
-    "study": ("study", "--td", "0.064"),
-    "plan": ("plan",),
+    "suggestion": ("suggest", "--td", "0.064", ENERGY),
+    "verdict": ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY),
+    "overview": ("info", ENERGY),
+    "study": ("study", "--td", "0.064", ENERGY),
+    "plan": ("plan", ENERGY),
+    "trade_off": ("explore", "--steps", "5", ENERGY),
+    "reproduction": ("reproduce", "--section", "5", "--overwrite", "--output-dir"),
+    "rollover": ("rollover", "--scan"),
+    "findings": ("check", "--exit-zero", "sample_data/switching.k", "--history", "sample_data/energy.glstat"),
 }
 
 
-@pytest.mark.parametrize(("result", "form"), [(result, form) for result in FORMATS for form in FORMATS[result]])
-def test_every_form_is_written(result: str, form: str) -> None:
-    written = run(*COMMANDS[result], "-f", form, ENERGY)
+# A scan takes seconds: tests/cli/test_rollover.py writes one in each of its forms.
+QUICK = [(result, form) for result in FORMATS for form in FORMATS[result] if result != "rollover"]
+
+
+@pytest.mark.parametrize(("result", "form"), QUICK)
+def test_every_form_is_written(result: str, form: str, tmp_path: Path) -> None:
+    folder = [str(tmp_path)] if result == "reproduction" else []
+    written = run(*COMMANDS[result], *folder, "-f", form)
     assert written.exit_code == 0, written.stderr
     assert written.stdout.strip()
 
@@ -28,6 +41,6 @@ def test_every_form_is_written(result: str, form: str) -> None:
 @pytest.mark.parametrize("result", FORMATS)
 def test_commands_offer_the_forms_of_their_result(result: str) -> None:
     command = importlib.import_module(f"d2rpick.cli.{COMMANDS[result][0]}").command
-    (choice,) = (option.type.choices for option in command.params if option.name == "output_format")
+    (choice,) = (list(option.type.choices) for option in command.params if option.name == "output_format")
     assert [form for form in choice if form != "card"] == list(FORMATS[result])
     assert choice[0] == "table"

@@ -13,11 +13,10 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.verify import verify
-from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.studies.common import fewest_digits
 from d2rpick.studies.row import OK, Row
-from d2rpick.studies.study import Question, ask, failed, find_runs, outline, summarise
+from d2rpick.studies.study import Question, ask, failed, find_runs, summarise
 from tests import variants
 from tests.command import BOX, GLSTAT
 from tests.reading import read_history
@@ -81,17 +80,6 @@ def test_a_process_that_did_not_answer_is_a_row() -> None:
 def test_another_version_gives_no_answer() -> None:
     with pytest.raises(Exception, match=r"d2rpick 0\.0\.1 asks d2rpick"):
         ask(replace(ASKED, tool_version="0.0.1"), "run")
-
-
-@given(st.integers(3, 3000), st.integers(0, 100))
-def test_an_outline_keeps_the_ends_of_the_energy_and_stays_small(states: int, seed: int) -> None:
-    energy = np.random.default_rng(seed).standard_normal(states)
-    history = History(np.arange(states, dtype=float), energy, ("made",), "made", "energy")
-    time, drawn = outline(history)
-    assert time.size == min(states, 400)
-    assert (drawn.min(), drawn.max()) == (energy.min(), energy.max())
-    assert np.all(np.diff(time) >= 0)
-    assert np.all(energy[time.astype(int)] == drawn)
 
 
 # Many runs.

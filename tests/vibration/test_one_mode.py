@@ -90,8 +90,10 @@ def test_at_extrema_the_deformation_stands_still_and_between_them_it_does_not(mo
 def test_peaks_are_higher_than_their_neighbourhood(mode: Mode) -> None:
     peaks = np.array(mode.peaks(-0.5, 2.0))
     h = 1e-3 / mode.omega
+    # a peak next to zero lies between two zeros that may be as near
+    high = peaks[mode.elastic_energy(peaks) > 1e-4 * np.max(mode.elastic_energy(T))]
     for side in (-h, h):
-        assert np.all(mode.energy(peaks) > mode.energy(peaks + side))
+        assert np.all(mode.energy(high) > mode.energy(high + side))
 
 
 @given(MODES, st.floats(-0.999, 0.999))  # a level that is touched is met by rounding or not

@@ -36,7 +36,7 @@ _SOLVER = (
 )
 
 
-class Leg(NamedTuple):
+class EngineFile(NamedTuple):
     """An engine run: its number, its end, and its largest step where the bodies are rigid in it, else None."""
 
     number: int
@@ -74,7 +74,7 @@ def cards(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] =
     return PrintedCard(text, windows, files)
 
 
-def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[Leg]:
+def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[EngineFile]:
     """Give the engine runs that the windows ask for; a window from 0 on needs none before it."""
     caps = [step_cap or float(f"{(td - tr) / _CAP_SHARE:.2g}") for tr, td in windows]
     switches = zip(windows, caps, strict=True)
@@ -82,10 +82,10 @@ def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[L
     if len(stops) >= _MOST_LEGS:
         raise DeckError(f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected")
     numbered = enumerate([*stops, (end, None)], start=1)
-    return [Leg(number, stop, cap) for number, (stop, cap) in numbered]
+    return [EngineFile(number, stop, cap) for number, (stop, cap) in numbered]
 
 
-def _engine(leg: Leg, name: str, listed: Sequence[str]) -> Iterator[str]:
+def _engine(leg: EngineFile, name: str, listed: Sequence[str]) -> Iterator[str]:
     yield f"/RUN/{name}/{leg.number}"
     yield f"{leg.stop!r:>20}"
     yield "/RBODY/ON" if leg.cap else "/RBODY/OFF"

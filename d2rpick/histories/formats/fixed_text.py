@@ -120,6 +120,7 @@ class Blocks:
         data, end = self._data, self._end  # not self: a circle would keep the file open
         self.layout = lru_cache(maxsize=16)(lambda at, size: grammar.describe(data[at : min(at + size, end)]))
         self._compared = grammar.compare_all
+        self._trusted = False  # whether a part of each block was compared for numbers that were asked for
         self.states, self.complete = 0, True
         self.notes: tuple[str, ...] = ()
         self.rest: Stretch | None = None
@@ -142,6 +143,8 @@ class Blocks:
         FormatError
             If a state lacks one of the numbers, has it twice, or has something else in its place.
         """
+        if self._trusted and not self._compared:  # who asks again will go on asking: one comparison is for all
+            self._compare_in_full()
         values = np.empty((self.states, len(names)))
         addresses = values.view(np.int64)  # each address gives way to the number found there
         row = 0
@@ -154,6 +157,7 @@ class Blocks:
             starts = run.start + run.stride * np.arange(run.repeats)
             np.add(starts[:, None], offsets, out=addresses[row : row + run.repeats])
             row += run.repeats
+        self._trusted = self._trusted or bool(anchors)
         self._fetch(values.reshape(-1), names)
         return values
 

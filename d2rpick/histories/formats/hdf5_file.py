@@ -55,11 +55,11 @@ def _opened_leg(source: Source, selection: Selection) -> Database:
     return SavedBinout(source.name, branches) if branches else Columns(file, source.name, selection)
 
 
-def _branches(file: Path | BinaryIO, source: str) -> dict[str, Branch]:
+def _branches(file: Path | BinaryIO, source: str) -> dict[str, PartGroup]:
     """Open the glstat and matsum branches that lasso-python saved; none in files of other layouts."""
     with _opened(file, source) as opened:
         return {
-            name: Branch(file, source, opened, name)
+            name: PartGroup(file, source, opened, name)
             for name in _BRANCHES
             if f"{name}/time" in opened
             and f"{name}/internal_energy" in opened
@@ -146,7 +146,7 @@ class SavedBinout(SolverFile):
     notes: tuple[str, ...] = ()
     digits = DIGITS[8]
 
-    def __init__(self, source: str, branches: dict[str, Branch]) -> None:
+    def __init__(self, source: str, branches: dict[str, PartGroup]) -> None:
         self.source = source
         self._glstat, self._matsum = (branches.get(name) for name in _BRANCHES)
         first = self._glstat or self._matsum
@@ -173,13 +173,13 @@ class SavedBinout(SolverFile):
         """One quantity of some parts, shape (m, len(ids))."""
         return self._branch(self._matsum, "matsum").part_channel(quantity, ids)
 
-    def _branch(self, branch: Branch | None, name: str) -> Branch:
+    def _branch(self, branch: PartGroup | None, name: str) -> PartGroup:
         if branch is None:
             raise FormatError(f"{self.source}: no {name} in this saved binout; name the run's own files")
         return branch
 
 
-class Branch:
+class PartGroup:
     """The glstat or matsum branch of a file that lasso-python saved."""
 
     def __init__(self, file: Path | BinaryIO, source: str, opened: h5py.File, name: str) -> None:

@@ -35,6 +35,9 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "x_momentum": "x-mom",
     "y_momentum": "y-mom",
     "z_momentum": "z-mom",
+    "x_rbvelocity": "x-rbv",
+    "y_rbvelocity": "y-rbv",
+    "z_rbvelocity": "z-rbv",
     "hourglass_energy": "hgeng",
     "eroded_internal_energy": "eroded_ie",
 }

@@ -14,6 +14,8 @@ from d2rpick.histories.names import is_time
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from numpy.typing import NDArray
+
     from d2rpick.histories.formats.layout import Layout
     from d2rpick.histories.formats.text import Text
     from d2rpick.histories.history import Samples
@@ -24,16 +26,13 @@ def plain_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) ->
 
     None unless each row has its number of cells and no line stands between them.
     """
-    columns = [np.empty(text.count(begin)) for _ in used]
-    row = 0
+    tables = []
     for piece in text.pieces(begin):
         values = _plain_piece(piece, layout, used)
         if values is None:
             return None
-        for column, own in zip(columns, values.T, strict=True):
-            column[row : row + len(values)] = own
-        row += len(values)
-    return columns if row else None
+        tables.append(values)
+    return [np.concatenate([table[:, place] for table in tables]) for place in range(len(used))] if tables else None
 
 
 def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples | None:
@@ -41,21 +40,21 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
         if b"." in piece:
             return None
         piece = piece.replace(b",", b".")
-    if piece.isspace():
-        return None  # numpy warns of it
+    if piece.isspace() or b'"' in piece:
+        return None  # numpy warns of the one, and a separator in quotes is none
     whole = piece.decode("latin-1")  # no other character than those of latin-1 belongs to a number
-    lines = whole.split("\n")[:-1]
-    taken, closed = [*range(layout.columns)], False
+    lines, taken = whole.split("\n")[:-1], [*range(layout.columns)]
+    closed = False
     if layout.separator:
-        # Separators are counted over all rows, and each row has a last column: so each has its number of cells.  A
-        # comment would show in the first one.
-        closed = lines[0].endswith(layout.separator)
-        if whole.count(layout.separator) != len(lines) * (layout.columns - 1 + closed):
+        marks = _separators(piece, layout)
+        if marks is None:
             return None
-        if closed and whole.count(f"{layout.separator}\n") != len(lines):
-            return None
-        if closed or len(used) < layout.columns - 2:
-            taken = sorted({0, *used, layout.columns - 1})
+        closed = marks.shape[1] == layout.columns
+        taken = sorted({0, *used})  # a comment would show in the first column
+        if taken[-1] < layout.columns - 1:  # what follows is not taken apart
+            starts = np.cumsum([0, *(len(line) + 1 for line in lines[:-1])]).tolist()
+            cuts = marks[:, taken[-1]].tolist()
+            lines = [whole[start:cut] for start, cut in zip(starts, cuts, strict=True)]
     chosen = taken if closed or len(taken) < layout.columns else None
     try:
         table = np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=chosen)
@@ -64,6 +63,20 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
     if table.shape != (len(lines), len(taken)):
         return None  # it passes over blank lines
     return table if taken == [*used] else table[:, np.searchsorted(taken, used)]
+
+
+def _separators(piece: bytes, layout: Layout) -> NDArray[np.intp] | None:
+    """Places of the separators of each row, of shape (rows, k); None unless all rows have their number of cells."""
+    assert layout.separator
+    signs = np.frombuffer(piece, np.uint8)
+    marks, ends = np.flatnonzero(signs == ord(layout.separator)), np.flatnonzero(signs == ord("\n"))
+    closed = piece.startswith(layout.separator.encode("latin-1"), int(ends[0]) - 1)  # rows end with a separator
+    each = layout.columns - 1 + closed
+    if marks.size != ends.size * each:
+        return None
+    table = marks.reshape(-1, each)
+    alike = np.all(table[:, -1] < ends) and np.all(table[1:, 0] > ends[:-1])
+    return table if alike and (not closed or np.all(table[:, -1] == ends - 1)) else None
 
 
 def checked_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Samples:

@@ -19,7 +19,10 @@ _UTF8: Final = b"\xef\xbb\xbf"
 HEAD: Final = 10_000
 
 # Bytes at a time: their cells stay in the processor's cache.
-_PIECE: Final = 1 << 16
+_PIECE: Final = 1 << 17
+
+# A text of no more bytes is looked at as a whole to judge the printed format.
+_SHORT: Final = 1 << 16
 
 # How many lines from the start, the end and between are looked at to judge the printed format.
 _SAMPLE: Final = 100
@@ -69,11 +72,6 @@ class Text:
                 return self._end
         return at
 
-    def count(self, begin: int) -> int:
-        """How many lines there are from byte ``begin`` on."""
-        ends = self._data.count(b"\n", begin, self._end)
-        return ends + (self._end > begin and not self._data.endswith(b"\n", 0, self._end))
-
     def take_rest(self) -> None:
         """Count the last line, which has no end, as whole."""
         self._end = len(self._data)
@@ -94,7 +92,7 @@ class Text:
     def sample(self, begin: int) -> list[str]:
         """Lines behind byte ``begin`` from the start, the end and evenly between; all of a short text."""
         data, end = self._data, self._end
-        if end - begin <= _PIECE:
+        if end - begin <= _SHORT:
             return [] if begin >= end else self._text(data[begin:end]).removesuffix("\n").split("\n")
         starts, first, last = [], begin, end
         for _ in range(_SAMPLE):

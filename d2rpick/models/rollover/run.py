@@ -21,7 +21,7 @@ MOST_STEPS = 5_000_000
 
 
 @dataclass(frozen=True)
-class Window:
+class RigidWindow:
     """The box is rigid from ``tr`` to ``td`` [s]; RangeError unless 0 <= tr <= td."""
 
     tr: float
@@ -32,7 +32,7 @@ class Window:
             raise RangeError(f"tr {self.tr:g} and td {self.td:g} must be in this order after the start at 0")
 
 
-def simulate(parameters: Parameters, t_end: float, *windows: Window, interval: float = INTERVAL) -> Record:
+def simulate(parameters: Parameters, t_end: float, *windows: RigidWindow, interval: float = INTERVAL) -> Record:
     """Compute a run from 0 to ``t_end``, with a state every ``interval`` [s].
 
     RangeError when it takes too many steps, or when ``windows`` overlap or are not in order.
@@ -53,7 +53,7 @@ def simulate(parameters: Parameters, t_end: float, *windows: Window, interval: f
     return proceed(motion, t_end, *windows)
 
 
-def proceed(motion: Motion, t_end: float, *windows: Window) -> Record:
+def proceed(motion: Motion, t_end: float, *windows: RigidWindow) -> Record:
     """Go on with ``motion`` to ``t_end`` [s], switching at the first step at or after the times of ``windows``."""
     last = motion.every * (motion.step_at(t_end) // motion.every)
     rigid, deformable = {motion.step_at(one.tr) for one in windows}, {motion.step_at(one.td) for one in windows}

@@ -10,7 +10,7 @@ import numpy as np
 from d2rpick.errors import RangeError
 from d2rpick.models.rollover.motion import Motion
 from d2rpick.models.rollover.record import BOX
-from d2rpick.models.rollover.run import Window, proceed, run_to
+from d2rpick.models.rollover.run import RigidWindow, proceed, run_to
 from d2rpick.studies.workers import answers, cores, on_cores
 
 if TYPE_CHECKING:
@@ -85,14 +85,16 @@ def scan(
                 following += 1
 
 
-def _branches(motion: Motion, times: Iterable[float], td: float, end: float) -> Iterator[tuple[Motion, float, Window]]:
+def _branches(
+    motion: Motion, times: Iterable[float], td: float, end: float
+) -> Iterator[tuple[Motion, float, RigidWindow]]:
     """Advance the reference from one tr to the next, and leave a copy of it at each."""
     for tr in times:
         run_to(motion, tr)
-        yield motion.copy(), end, Window(tr, td)
+        yield motion.copy(), end, RigidWindow(tr, td)
 
 
-def _switched(branch: tuple[Motion, float, Window]) -> Record:
+def _switched(branch: tuple[Motion, float, RigidWindow]) -> Record:
     return proceed(*branch)
 
 

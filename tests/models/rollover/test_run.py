@@ -14,7 +14,7 @@ from d2rpick.models.rollover.model import GRAVITY, Parameters, Truss, build
 from d2rpick.models.rollover.motion import Motion
 from d2rpick.models.rollover.record import BOX
 from d2rpick.models.rollover.rigid import RigidBody
-from d2rpick.models.rollover.run import Window, proceed, run_to, simulate
+from d2rpick.models.rollover.run import RigidWindow, proceed, run_to, simulate
 from d2rpick.models.rollover.scan import compare, comparison_end, scan, scan_times
 
 COARSE = Parameters(mesh=4, damping=1.0)
@@ -45,10 +45,10 @@ def test_by_default_the_trip_is_over_and_the_ground_comes_when_they_do_in_the_st
     assert np.abs(run.imbalance).max() < 0.01
 
 
-@pytest.mark.parametrize("windows", [(), (Window(0.03, 0.2),), (Window(0.1, 0.2), Window(0.3, 0.35))])
+@pytest.mark.parametrize("windows", [(), (RigidWindow(0.03, 0.2),), (RigidWindow(0.1, 0.2), RigidWindow(0.3, 0.35))])
 @pytest.mark.parametrize("parameters", [COARSE, Parameters(mesh=6, stiffness=2e6, yield_strain=2e-3)])
 def test_energy_is_balanced_within_one_percent_through_trip_flight_and_landing(
-    parameters: Parameters, windows: tuple[Window, ...]
+    parameters: Parameters, windows: tuple[RigidWindow, ...]
 ) -> None:
     run = simulate(parameters, 0.45, *windows, interval=INTERVAL)
     assert run.landed is not None
@@ -58,9 +58,9 @@ def test_energy_is_balanced_within_one_percent_through_trip_flight_and_landing(
 FALLING = Parameters(mesh=4, speed=0.5, drop=0.4, tilt=40.0, ground_stiffness=2e6)
 
 
-@pytest.mark.parametrize("windows", [(), (Window(0.0, 0.28),), (Window(0.0, 0.28), Window(0.45, 0.5))])
+@pytest.mark.parametrize("windows", [(), (RigidWindow(0.0, 0.28),), (RigidWindow(0.0, 0.28), RigidWindow(0.45, 0.5))])
 def test_a_box_that_falls_bounces_and_its_energy_is_balanced_however_often_it_is_switched(
-    windows: tuple[Window, ...],
+    windows: tuple[RigidWindow, ...],
 ) -> None:
     run = simulate(FALLING, 1.2, *windows, interval=INTERVAL)
     assert np.abs(run.imbalance).max() < 0.01
@@ -75,14 +75,14 @@ def test_a_box_that_falls_bounces_and_its_energy_is_balanced_however_often_it_is
 
 def test_a_free_fall_locks_in_nothing_and_moves_no_landing() -> None:
     whole = simulate(FALLING, 0.9, interval=INTERVAL)
-    switched = simulate(FALLING, 0.9, Window(0.0, 0.28), interval=INTERVAL)
+    switched = simulate(FALLING, 0.9, RigidWindow(0.0, 0.28), interval=INTERVAL)
     assert whole.internal_energy[whole.time < 0.28].max() < 1e-9
     np.testing.assert_allclose(np.ravel(switched.landings[:2]), np.ravel(whole.landings[:2]), atol=1e-4)
 
 
 def test_windows_that_overlap_are_refused() -> None:
     with pytest.raises(RangeError, match="begins before the one up to"):
-        simulate(COARSE, 0.3, Window(0.1, 0.2), Window(0.15, 0.25))
+        simulate(COARSE, 0.3, RigidWindow(0.1, 0.2), RigidWindow(0.15, 0.25))
 
 
 @pytest.mark.parametrize("parameters", [COARSE, FALLING])
@@ -154,13 +154,13 @@ def test_a_rigid_phase_of_no_length_takes_the_vibration_velocity_and_nothing_els
 
 
 def test_a_window_of_no_length_is_a_run_that_goes_on() -> None:
-    run = simulate(COARSE, 0.2, Window(0.1, 0.1), interval=INTERVAL)
+    run = simulate(COARSE, 0.2, RigidWindow(0.1, 0.1), interval=INTERVAL)
     assert run.lost_energy[-1] > 0
     assert run.internal_energy[run.time > 0.1, BOX].std() > 0
 
 
 def test_while_it_is_rigid_the_box_keeps_its_energy_and_computes_no_bars() -> None:
-    whole, switched = (simulate(COARSE, 0.3, *windows, interval=INTERVAL) for windows in ((), (Window(0.1, 0.3),)))
+    whole, switched = (simulate(COARSE, 0.3, *windows, interval=INTERVAL) for windows in ((), (RigidWindow(0.1, 0.3),)))
     rigid = switched.time > 0.1
     assert np.ptp(switched.internal_energy[rigid, BOX]) < 1e-9
     structure = build(COARSE)
@@ -281,7 +281,7 @@ def test_contact_sleeps_in_the_flight_and_misses_nothing() -> None:
 def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> None:
     reference = simulate(COARSE, 0.42, interval=INTERVAL)
     times, td = [0.02, 0.06, 0.15], 0.36
-    alone = [compare(reference, simulate(COARSE, 0.42, Window(tr, td), interval=INTERVAL), tr, td) for tr in times]
+    alone = [compare(reference, simulate(COARSE, 0.42, RigidWindow(tr, td), interval=INTERVAL), tr, td) for tr in times]
     assert list(scan(COARSE, reference, times[::-1], td, jobs=1)) == alone
     assert list(scan(COARSE, reference, times, td, jobs=2)) == alone
     assert abs(alone[0].roll_error) > abs(alone[2].roll_error)
@@ -310,6 +310,6 @@ def test_what_is_no_model_or_no_window_is_refused() -> None:
     with pytest.raises(RangeError, match="softer bars"):
         simulate(Parameters(stiffness=1e12), 100)
     with pytest.raises(RangeError, match="must be in this order"):
-        Window(0.2, 0.1)
+        RigidWindow(0.2, 0.1)
     with pytest.raises(RangeError, match="end of the flight"):
         comparison_end(simulate(COARSE, 0.05), 0.06)

@@ -1,0 +1,100 @@
+"""How good a recommended pair is, in one word: what is left open, or lost, whatever tr is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.choice.warnings import POOR_KINETIC_SHARE
+from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
+
+if TYPE_CHECKING:
+    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.expectation import Expectation
+    from d2rpick.choice.situation import Situation
+    from d2rpick.histories.history import Samples
+
+# From the worst to the best.
+GRADES: Final = ("poor", "fair", "good")
+# Of the vibration [-].  A residual of a half is a quarter of its energy; beyond, the error is what an engineer sees of
+# the motion after td.  A good pair keeps what the tolerance on tr asks for by default.
+_MOST_FAIR, _MOST_GOOD = 0.5, 0.2
+# Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
+_BAND: Final = 0.25
+
+
+class Quality(NamedTuple):
+    """A ``grade``, one of `GRADES`, and the ``reasons`` why it is none better; empty for "good"."""
+
+    grade: str
+    reasons: tuple[str, ...] = ()
+
+
+def quality_of(situation: Situation, best: Candidate, expected: Expectation | None) -> Quality:
+    """Grade the recommended tr of a td.
+
+    ``expected`` is what the energy alone tells of the time after td, None on another basis.
+    """
+    if situation.at_rest:
+        return Quality("good")
+    poor = tuple(_poor(situation, best, expected))
+    if poor:
+        return Quality("poor", poor)
+    fair = tuple(_fair(situation, best))
+    return Quality("fair" if fair else "good", fair)
+
+
+def _poor(situation: Situation, best: Candidate, expected: Expectation | None) -> list[str]:
+    found = []
+    if best.residual is not None and best.residual > _MOST_FAIR:
+        found.append(f"the vibration after td is off by {best.residual:.0%}")
+    if expected and expected.kinetic_share > POOR_KINETIC_SHARE:
+        found.append(f"about {expected.kinetic_share:.0%} of the vibration energy is kinetic at td")
+    if situation.basis == "energy":
+        found += _of_record(situation)
+    return found
+
+
+def _of_record(situation: Situation) -> list[str]:
+    """Why the samples of the flight up to td are none that a level can be read from."""
+    start = situation.flight.start
+    _, energy = situation.history.between(-np.inf if start is None else start, situation.td)
+    found = []
+    if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
+        found.append("the record falls below zero, as no internal energy does")
+    states = states_per_period(energy)
+    if states is not None and states < MIN_SAMPLES_PER_PERIOD:
+        found.append(
+            f"the record has {states:.2g} states per period, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level"
+        )
+    return found
+
+
+def _fair(situation: Situation, best: Candidate) -> list[str]:
+    found = []
+    if best.residual is None:
+        found.append("the sign of the deformation is unknown")
+    elif best.residual > _MOST_GOOD:
+        found.append(f"the vibration after td is off by {best.residual:.0%}")
+    if best.residual_high is not None and best.residual_high > _MOST_FAIR:
+        found.append(f"with a further mode hidden in the record it may be off by {best.residual_high:.0%}")
+    if not situation.flight.certain:
+        found.append("the flight is not certain")
+    return found
+
+
+def states_per_period(energy: Samples) -> float | None:
+    """How many samples a period of the energy has on average: it passes its mean twice in one; None without a period.
+
+    Examples
+    --------
+    >>> round(states_per_period(np.sin(np.arange(1000) * 2 * np.pi / 8) ** 2))
+    4
+    """
+    if energy.size < 2:
+        return None
+    off = energy - energy.mean()
+    side = np.sign(off[np.abs(off) > _BAND * off.std()])
+    passes = np.flatnonzero(np.diff(side)).size
+    return 2 * energy.size / passes if passes > 1 else None

@@ -1,0 +1,165 @@
+"""What each td costs: the best tr over a grid of td and at the peaks of the energy, error against rigid time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.offer import offer_of
+from d2rpick.choice.ranking import EQUALLY_GOOD
+from d2rpick.choice.suggest_td import longest_flight, looking, within_flight
+from d2rpick.choice.warnings import Caution, cautions_of
+from d2rpick.vibration.fits import Fits
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.offer import Offer
+    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.histories.history import Samples
+
+# Decimals of an error that people read.
+_READ: Final = 3
+# td in an even grid: on paper and on a screen a curve of so many points is smooth.
+STEPS: Final = 200
+# Another td is worth a step where it leaves at most this share of the error, and that is more than people pass over.
+_MUCH_LESS: Final = 0.5
+# A step that gives up more of the rigid time than this leads to a pair that nobody asked for.
+_LEAST_KEPT: Final = 0.5
+
+
+class TradeOff(NamedTuple):
+    """Answer of ``explore``: offers by ascending td in ``td_window``, which keeps the margin before a contact [time].
+
+    ``asked`` is that of the td that was asked for; ``recommended`` that of the pair that ``suggest`` chooses there,
+    ``suggestion`` in full.  ``start``: what a step is measured from, the td asked for or else the one that saves most;
+    ``step``: the nearest unbeaten td with half the error, else the recommended one where it has less.
+    """
+
+    situation: Situation
+    suggestion: Suggestion
+    td_window: tuple[float, float]
+    offers: tuple[Offer, ...]
+    cautions: tuple[Caution, ...]
+    asked: Offer | None = None
+    recommended: Offer | None = None
+    start: Offer | None = None
+    step: Offer | None = None
+
+
+def explore_of(
+    reference: Reference,
+    settings: Settings,
+    td_window: tuple[float, float] | None = None,
+    *,
+    td: float | None = None,
+    steps: int = STEPS,
+) -> TradeOff:
+    """Find what each td offers.
+
+    Parameters
+    ----------
+    reference : Reference
+    settings : Settings
+    td_window : (float, float), optional
+        Where td is looked for [time].  Default: the longest flight.
+    td : float, optional
+        Offered too, and what others are compared with [time].
+    steps : int
+        So many td on an even grid; beside them every peak of the energy or, of more than ``steps`` of them, the highest
+        in each interval of the grid.
+
+    Raises
+    ------
+    RangeError
+        If td or the window lies outside the record, or no flight is seen.
+    """
+    history = reference.history
+    window = longest_flight(history, settings) if td_window is None else td_window
+    fits = Fits()
+    look = looking(history, settings, fits)
+    situation, inside = within_flight(look, history, window)
+    suggestion = suggest_of(reference, window, settings, fits=fits)
+    chosen = suggestion.recommended.td if suggestion.recommended else None
+    times, peaks = _times(situation, inside, steps)
+    named = [time for time in (td, chosen) if time is not None]
+    offers = [offer_of(look(time), peak=time in peaks) for time in np.unique([*times, *named]).tolist()]
+    offers = [replace(one, recommended=one.td == chosen) for one in _marked(offers)]
+    asked = next((one for one in offers if one.td == td), None)
+    start = asked or max(filter(_found, offers), key=lambda one: one.rigid_time or 0.0, default=None)
+    return TradeOff(
+        situation=situation,
+        suggestion=suggestion,
+        td_window=inside,
+        offers=tuple(offers),
+        cautions=tuple(_cautions(situation, window, inside, offers)),
+        asked=asked,
+        recommended=next((one for one in offers if one.recommended), None),
+        start=start,
+        step=_step(start, offers) if start else None,
+    )
+
+
+def _times(situation: Situation, window: tuple[float, float], steps: int) -> tuple[Samples, set[float]]:
+    """Grid of td and peaks of the energy, ascending, and which of them are peaks."""
+    grid = np.linspace(*window, steps + 1)[1:]  # nothing can be rigid before the first
+    peaks = np.array(situation.peaks(*window))
+    if peaks.size > steps:
+        height = situation.vibration.energies(peaks)
+        place = np.searchsorted(grid, peaks)
+        order = np.lexsort((-height, place))
+        peaks = peaks[order[np.diff(place[order], prepend=-1) > 0]]
+    return np.union1d(grid, peaks), set(peaks.tolist())
+
+
+def _found(offer: Offer) -> bool:
+    """Whether there is something to compare: a pair that saves something."""
+    return offer.best is not None and offer.error is not None and not offer.best.same_swing
+
+
+def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
+    """Mark the offers that nothing beats; errors of deformations and of energies are not compared."""
+    unbeaten = set()
+    for known in (True, False):
+        group = [one for one in offers if _found(one) and (one.basis != "energy") == known]
+        least = np.inf
+        for one in sorted(group, key=lambda one: (-(one.rigid_time or 0.0), _printed(one))):
+            if _printed(one) < least:
+                unbeaten.add(one.td)
+                least = _printed(one)
+    return (replace(one, unbeaten=one.td in unbeaten) for one in offers)
+
+
+def _printed(offer: Offer) -> float:
+    """The error, to the digits that people read."""
+    return np.inf if offer.error is None else round(offer.error, _READ)
+
+
+def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
+    """Give the nearest unbeaten td with half the error, else the recommended one where it has less, else None."""
+    error = np.inf if start.error is None else start.error
+    kept = _LEAST_KEPT * (start.rigid_time or 0.0)
+    alike = [one for one in offers if start.best is None or (one.basis == "energy") == (start.basis == "energy")]
+    less = [one for one in alike if _found(one) and (one.error or 0.0) < error - EQUALLY_GOOD]
+    halved = [one for one in less if one.unbeaten and (one.error or 0.0) <= _MUCH_LESS * error]
+    near = [one for one in halved if (one.rigid_time or 0.0) >= kept]
+    return min(near, key=lambda one: abs(one.td - start.td), default=next((o for o in less if o.recommended), None))
+
+
+def _cautions(
+    situation: Situation, window: tuple[float, float], inside: tuple[float, float], offers: Sequence[Offer]
+) -> Iterator[Caution]:
+    """What to be aware of in all of the window; of a single td the offer tells."""
+    of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
+    yield from (one for one in cautions_of(situation) if one.code not in of_td)
+    if inside[1] < window[1]:
+        kept = window[1] - inside[1]
+        yield Caution("margin-kept", f"td up to {inside[1]:.6g}: {kept:.3g} are kept clear up to {window[1]:.6g}")
+    if not any(map(_found, offers)):
+        yield Caution("no-candidate", "no td in the window has an acceptable tr that saves anything")

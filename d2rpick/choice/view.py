@@ -1,0 +1,114 @@
+"""What of a record one looks at to see a choice: the flight around td, and how high the energy stands there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.choice.situation import Situation
+    from d2rpick.flight.flight import Flight
+    from d2rpick.histories.history import History, Samples
+
+# Shown beyond each end of the flight, as a share of it: enough to see load and landing begin.
+_BEYOND = 0.06
+# Beyond this ratio of the highest energy to the level, the level would vanish on a linear axis; a logarithmic one ends
+# at this part of the level.
+LOGARITHMIC = 20.0
+BELOW_LEVEL = 100.0
+# Room above and below the curve, as a share of its height.
+_ROOM = 0.08
+# By this share of a flight its ends may be off: the load or the landing may stand there already.
+_UNSURE = 0.01
+
+
+class View(NamedTuple):
+    """From ``start`` to ``end`` [time]; there the flight has energies from ``low`` to ``high``, the record ``highest``.
+
+    ``cut`` tells what stands above the flight: "landing", "load" or "" where nothing does.
+    """
+
+    start: float
+    end: float
+    low: float
+    high: float
+    highest: float
+    cut: str
+
+
+class Scale(NamedTuple):
+    """Lowest and highest value in sight, with some room [energy]; ``logarithmic``: how the axis between them runs."""
+
+    low: float
+    high: float
+    logarithmic: bool
+
+
+def merged(windows: Sequence[tuple[float, float]], gap: float) -> list[tuple[float, float]]:
+    """Join windows, ascending, that are less than ``gap`` apart [time]: noise makes hundreds that no eye tells apart.
+
+    Examples
+    --------
+    >>> merged([(0.0, 1.0), (1.1, 2.0), (3.0, 4.0)], 0.5)
+    [(0.0, 2.0), (3.0, 4.0)]
+    """
+    joined = list(windows[:1])
+    for start, end in windows[1:]:
+        if start - joined[-1][1] < gap:
+            joined[-1] = joined[-1][0], end
+        else:
+            joined.append((start, end))
+    return joined
+
+
+def scale_of(low: float, high: float, level: float) -> Scale:
+    """Give the scale that shows values from ``low`` to ``high``, and a ``level`` on which the eye must rest [energy].
+
+    Examples
+    --------
+    >>> scale_of(1.0, 2.0, 1.5), scale_of(0.0, 1000.0, 1.0).logarithmic
+    (Scale(low=0.92, high=2.08, logarithmic=False), True)
+    """
+    if level > 0 and high > LOGARITHMIC * level:
+        return Scale(max(low, level / BELOW_LEVEL), high * LOGARITHMIC**_ROOM, logarithmic=True)
+    room = _ROOM * (high - low or abs(high) or 1.0)
+    return Scale(low - room, high + room, logarithmic=False)
+
+
+def view_of(situation: Situation, tr: float | None = None) -> View:
+    """Give what shows the flight of a situation, its td and a tr."""
+    span = situation.evidence.span
+    times = [situation.td, *(() if tr is None else (tr,))]
+    known = max(span.end, situation.td) if span else None
+    return view(situation.history, situation.flight, times, known)
+
+
+def view(history: History, flight: Flight, times: list[float], known: float | None = None) -> View:
+    """Give what shows a flight and ``times`` [time]; a flight whose end was not seen lasts to ``known``, or the last.
+
+    Where no flight is known, the whole record is shown.
+    """
+    first, last = float(history.time[0]), float(history.time[-1])
+    if flight.start is None:
+        inner = first, last
+    else:
+        end = flight.end if flight.end is not None else known if known is not None else last
+        inner = min(flight.start, *times), max(end, *times)
+    beyond = _BEYOND * (inner[1] - inner[0])
+    start, end = max(first, inner[0] - beyond), min(last, inner[1] + beyond)
+    flown = _flown(history, flight, inner)
+    low, high = float(flown.min()), float(flown.max())
+    time, energy = history.between(start, end)
+    highest = float(energy.max())
+    later = flight.end is not None and float(time[energy.argmax()]) >= flight.end
+    return View(start, end, low, high, highest, "" if highest <= high else "landing" if later else "load")
+
+
+def _flown(history: History, flight: Flight, inner: tuple[float, float]) -> Samples:
+    """Energies in the flight, but for its ends; of all that is shown where it has no state."""
+    start = inner[0] if flight.start is None else flight.start
+    end = inner[1] if flight.end is None else flight.end
+    off = _UNSURE * (end - start)
+    flown = history.between(start + off, end - off)[1]
+    return flown if flown.size else history.between(*inner)[1]

@@ -1,0 +1,220 @@
+"""How far a body is out of place at td because parts of it were frozen elsewhere.
+
+A part that moves against the rest, an engine on its mounts, is frozen where it is at tr.  The centre of mass flies as
+if nothing had been switched, so the rest of the body is off by the part's share of the mass times its displacement
+against the rest from tr to td, in the frame that turns with the body (THEORY.md section 12).  Displacements come from
+the velocities of the parts, which are their momenta over their masses.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import chain
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.flight.rotation import least_rests, least_ways, off_the_circle, steady_rotation
+from d2rpick.flight.window import FEWEST
+from d2rpick.histories.samples import integral, window
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from d2rpick.flight.flight import Flight
+    from d2rpick.histories.history import History, Momenta, Part, Samples
+
+    Places = NDArray[np.intp]
+
+# Rotations are looked for on so many states at most; the displacements come from all of them.
+_STATES: Final = 200
+# Parts that are tried as the one that moves against the others, by what a rotation and by what rest leaves over.
+_TRIED: Final = 2
+# Without a further part that moves, the others leave over no more than this of what they did with it.
+_MORE_RIGID: Final = 0.5
+# Less than this share of all that the parts do, r^2, is nothing: a thousandth of the ways.
+_NOTHING: Final = 1e-6
+# A rotation by which the others move a tenth of what the part does changes its displacement by no more.
+_NOTABLE_WAY: Final = 0.1
+# A body shows no rotation where one part has more than this share of it.
+_MOST_OF_BODY: Final = 0.95
+# Parts of a smaller share of the mass move the others too little to be asked about that.
+_HEAVY: Final = 0.05
+# A body that has flown so many times its error is not out of place: that is a third of the margin before a contact,
+# 3 % of the flight, within which runs have moved their landing.
+MOST_OF_PATH: Final = 0.01
+
+
+class Drift:
+    """How far a body is off where the parts that move against it are: differences count, from tr to td.
+
+    Attributes
+    ----------
+    time : array of shape (n,)
+        Of the states in flight [time].
+    place : array of shape (n, 3)
+        Of the body against where a rigid body would be, in the frame that turns with it, up to a constant [length].
+    path : array of shape (n,)
+        How far the centre of mass has flown [length].
+    part : Part
+        The part that moves against the others, of several the one with most effect.
+    doubt : float
+        What may be wrong with the differences, since the others are not one rigid body either [length].
+    """
+
+    def __init__(self, time: Samples, place: Samples, path: Samples, part: Part, doubt: float) -> None:
+        self.time, self.place, self.path, self.part, self.doubt = time, place, path, part, doubt
+
+    def errors(self, tr: Samples, td: float) -> Samples:
+        """Distances of the body at td from where it should be, for times tr (k,) [length]; NaN outside the flight."""
+        there = np.stack([np.interp([*tr.tolist(), td], self.time, axis) for axis in self.place.T], axis=1)
+        inside = (tr >= self.time[0]) & (tr <= self.time[-1]) & (self.time[0] <= td <= self.time[-1])
+        return np.where(inside, np.linalg.norm(there[:-1] - there[-1], axis=1), np.nan)
+
+    @property
+    def name(self) -> str:
+        """Title of the part, or its number."""
+        return self.part.title or f"part {self.part.id}"
+
+    @cached_property
+    def limit(self) -> float:
+        """From which error on the body is out of place [length]."""
+        return MOST_OF_PATH * float(self.path[-1])
+
+
+def drift_of(momenta: Momenta, masses: Samples, members: Sequence[int], flight: tuple[float, float]) -> Drift | None:
+    """Find how the body drifts in flight against where a rigid one would be.
+
+    The parts that move against the others are those without which the others are most nearly one rigid body that
+    turns at a constant rate; together they have at most half of the mass.
+
+    Parameters
+    ----------
+    momenta : Momenta
+        Of single parts.
+    masses : array of shape (parts,)
+        Of the same parts; NaN where unknown [mass].
+    members : sequence of int
+        Places of the parts that become one rigid body.
+    flight : (float, float)
+        When they fly freely [time].
+
+    Returns
+    -------
+    Drift or None
+        None where it is not known: a mass is not, there are fewer than three parts, or two with hardly any mass beside
+        the third, or the others are no rigid body by far.
+    """
+    inside = window(momenta.time, *flight)
+    time, mass = momenta.time[inside], masses[list(members)]
+    if momenta.parts is None or time.size < FEWEST or not np.isfinite(mass).all():
+        return None
+    members = [i for i, m in zip(members, mass.tolist(), strict=True) if m > 0]
+    mass = masses[members]
+    if not _shows_rotation(mass):
+        return None
+    velocity = momenta.values[inside][:, members] / mass[:, np.newaxis]
+    centre = np.average(velocity, axis=1, weights=mass)
+    ways = integral(time, (velocity - centre[:, np.newaxis]).reshape(time.size, -1)).reshape(velocity.shape)
+    stride = -(-time.size // _STATES)
+    moving, rate, rest = _apart(time[::stride], ways[::stride], mass)
+    if not moving:
+        return None
+    share = float(mass[moving].sum() / mass.sum())
+    path = integral(time, np.linalg.norm(centre, axis=1))
+    doubt = share * float(np.sqrt(rest / (mass.sum() * (1 - share) * -(-time.size // stride))))
+    offsets = _offsets(time, ways, mass, moving, rate)
+    part = momenta.parts[members[moving[int(np.argmax(np.square(offsets).sum(axis=(0, 2))))]]]
+    found = Drift(time, offsets.sum(axis=1), path, part, doubt)
+    return found if doubt <= found.limit else None
+
+
+def _offsets(time: Samples, ways: Samples, mass: Samples, moving: Sequence[int], rate: Samples) -> Samples:
+    """How far each of the moving parts pushes the others off, shape (n, moving, 3) [length]."""
+    others = np.setdiff1d(np.arange(mass.size), moving)
+    shares = mass[list(moving), np.newaxis] / mass.sum()
+    against = ways[:, list(moving)] - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
+    return np.asarray(-shares * off_the_circle(time, against, rate))
+
+
+def _apart(time: Samples, ways: Samples, mass: Samples) -> tuple[list[int], Samples, float]:
+    """Find the parts that move against the others, the rate at which these turn, and their rest; none if unknown."""
+    moving: list[int] = []
+    rate, rest = np.zeros(3), np.inf
+    while True:
+        found = _next_apart(time, ways, mass, np.setdiff1d(np.arange(mass.size), moving))
+        if found is None or found.rest > _MORE_RIGID * rest:
+            return moving, rate, rest
+        part, rate, rest, _ = found
+        moving.append(part)
+
+
+class _Apart(NamedTuple):
+    """A part that is left out, how the others turn and what is left of them, and how far the part pushes them off."""
+
+    part: int
+    rate: Samples
+    rest: float
+    effect: float
+
+
+def _next_apart(time: Samples, ways: Samples, mass: Samples, left: Places) -> _Apart | None:
+    """Of the parts that are left, find that without which the others are most nearly rigid.
+
+    A slide of one part may look like a rotation of all: of those alike in this, the one with most effect counts.
+    """
+    about, masses = _about_centre(ways[:, left], mass[left]), mass[left]
+    orders = (np.argsort(least_rests(time, about, masses)), np.argsort(least_ways(about, masses)))
+    may = [[one for one in left[order].tolist() if _may_leave(mass, left, one)][:_TRIED] for order in orders]
+    found = [_without(time, ways, mass, left, part) for part in dict.fromkeys(chain(*may))]
+    nothing = _NOTHING * float(np.sum(masses[:, np.newaxis] * (about - about.mean(axis=0)) ** 2))
+    least = min((one.rest for one in found), default=0.0) + nothing
+    alike = [one for one in found if _MORE_RIGID * one.rest <= least]
+    return max(alike, key=lambda one: one.effect, default=None)
+
+
+def _without(time: Samples, ways: Samples, mass: Samples, left: Places, part: int) -> _Apart:
+    """Leave one part out and see how the others turn."""
+    others = left[left != part]
+    way = ways[:, [part]] - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
+    least = _NOTABLE_WAY**2 * mass[others].sum() * float(np.sum((way - way.mean(axis=0)) ** 2))
+    rate, rest = steady_rotation(time, _about_centre(ways[:, others], mass[others]), mass[others], least)
+    return _Apart(part, rate, rest, float(mass[part] * np.linalg.norm(off_the_circle(time, way, rate))))
+
+
+def _about_centre(ways: Samples, mass: Samples) -> Samples:
+    return np.asarray(ways - np.average(ways, axis=1, weights=mass)[:, np.newaxis])
+
+
+def _may_leave(mass: Samples, left: Places, part: int) -> bool:
+    """Whether the others have half of the mass, not nearly all of it in one part."""
+    others = mass[left[left != part]]
+    return bool(2 * others.sum() >= mass.sum() and others.max() <= _MOST_OF_BODY * others.sum())
+
+
+def _shows_rotation(mass: Samples) -> bool:
+    """Whether the body without any of the heavy parts still shows how it turns."""
+    if mass.size < 3:
+        return False
+    places = np.arange(mass.size)
+    heavy = places[(mass >= _HEAVY * mass.sum()) & (2 * mass <= mass.sum())]
+    return all(_may_leave(mass, places, part) for part in heavy.tolist())
+
+
+def drift_in_flight(history: History, flight: Flight, parts: Sequence[Part] | None = None) -> Drift | None:
+    """Find the drift of the body that ``parts``, or those to be switched, become in a flight.
+
+    None also where the momentum of single parts does not show the flight.
+    """
+    momenta, masses = next((one for one in history.momenta if one.parts is not None), None), history.masses
+    if momenta is None or momenta.parts is None or masses is None or flight.parts is None or flight.refusal:
+        return None
+    flying = {part.id for part in flight.parts}
+    wanted = {momenta.parts[i].id for i in momenta.chosen} if parts is None else {part.id for part in parts}
+    members = [i for i in momenta.moving if momenta.parts[i].id in flying & wanted]  # the ground does not fly
+    start, end = (
+        bound if seen is None else seen for bound, seen in zip(momenta.time[[0, -1]], flight[:2], strict=True)
+    )
+    return drift_of(momenta, masses, members, (float(start), float(end)))

@@ -1,0 +1,139 @@
+"""The steady rotation of a body that flies, as the ways of its parts about its centre show it.
+
+While it turns at a constant rate, each part of a rigid body goes round on a circle.  What is left of the ways when
+these are taken off is how the parts move against each other, seen from a frame that turns with the body.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.histories.samples import bent, integral
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import Samples
+
+# A rotation counts where it explains three quarters of how the parts move: less may be their vibration.
+_SHOWN: Final = 0.25
+# Steps of Gauss and Newton; a dozen bring a good start to the last digit.
+_MOST_STEPS: Final = 25
+# Change of the rate, as a share of one turn over the record, by which derivatives are taken and below which it ends.
+_SMALL: Final = 1e-6
+# Directions in which arms move by less than this share of the others, squared, cannot be told: along the axis.
+_ALONG_AXIS: Final = 1e-6
+
+
+class Rotation(NamedTuple):
+    """``rate`` (3,) at which a body turns [rad/time]; ``rest`` is the sum of m r^2 over parts and states beside it."""
+
+    rate: Samples
+    rest: float
+
+
+def steady_rotation(time: Samples, ways: Samples, masses: Samples, least: float = 0.0) -> Rotation:
+    """Find the constant rate of rotation that explains the ways of the parts of a body about its centre best.
+
+    Parameters
+    ----------
+    time : array of shape (n,)
+        [time]
+    ways : array of shape (n, parts, 3)
+        Displacements against the centre of mass, up to a constant each [length].
+    masses : array of shape (parts,)
+        [mass]
+    least : float, optional
+        Ways whose sum of m r^2 over parts and states is no more show no rotation [mass length^2].
+
+    Returns
+    -------
+    Rotation
+        At rate 0 where no rotation explains three quarters of the ways.
+    """
+    weights = np.sqrt(masses)[:, np.newaxis]
+    stood = float(np.sum(_rest(time, ways, np.zeros(3), weights) ** 2))
+    if stood <= least:
+        return Rotation(np.zeros(3), stood)
+    rate = _first_guess(time, ways, masses)
+    rest = _rest(time, ways, rate, weights)
+    small, damping = _SMALL * 2 * np.pi / float(time[-1] - time[0]), 1e-3
+    for _ in range(_MOST_STEPS):
+        changes = [(_rest(time, ways, rate + small * axis, weights) - rest).ravel() / small for axis in np.eye(3)]
+        slope = np.stack(changes, axis=1)
+        normal = slope.T @ slope
+        damped = normal + damping * np.trace(normal) * np.eye(3) / 3 + np.finfo(float).tiny * np.eye(3)
+        step = -np.linalg.solve(damped, slope.T @ rest.ravel())
+        trial = _rest(time, ways, rate + step, weights)
+        if float(np.sum(trial**2)) <= float(np.sum(rest**2)):
+            rate, rest, damping = rate + step, trial, damping / 10
+        else:
+            damping *= 10
+        if float(np.abs(step).max()) <= small:
+            break
+    turned = float(np.sum(rest**2))
+    return Rotation(rate, turned) if turned <= _SHOWN * stood else Rotation(np.zeros(3), stood)
+
+
+def off_the_circle(time: Samples, ways: Samples, rate: Samples) -> Samples:
+    """Give what is left of ways (n, parts, 3) beside a circle at a rate, in the frame that turns, without its mean.
+
+    The circle of each is that which leaves the least: its place at the start, the arm, is not known otherwise.
+    """
+    frame = _frame(time, rate)
+    turned = ways @ frame
+    frame, turned = frame - frame.mean(axis=0), turned - turned.mean(axis=0)
+    normal = np.tensordot(frame, frame, axes=((0, 2), (0, 2)))
+    right = np.tensordot(turned, frame, axes=((0, 2), (0, 2)))
+    arms = right @ np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True)
+    return np.asarray(turned - arms @ frame)
+
+
+def least_ways(ways: Samples, masses: Samples) -> Samples:
+    """Give for each part the m r^2 of the others about their own centre, in a frame at rest (parts,)."""
+    return np.asarray(_without_each(masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses))
+
+
+def least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
+    """Estimate for each part how little of that a rotation of the others leaves over (parts,).
+
+    In a rotation the velocity changes by rate x way, so that ways less their straight lines are rate x their integrals:
+    linear in the rate, with normal equations that lose one part easily.
+    """
+    square, right, normal = (_without_each(one, masses) for one in _linear(time, ways, masses))
+    solved = np.einsum("pij,pj->pi", np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True), right)
+    return np.asarray(square - np.einsum("pi,pi->p", right, solved))
+
+
+def _without_each(terms: Samples, masses: Samples) -> Samples:
+    """Sum quadratic terms (parts, ...) of ways about the centre over all parts but one, about the centre of these."""
+    return np.asarray(terms.sum(axis=0) - (terms.T / (1 - masses / masses.sum())).T)
+
+
+def _first_guess(time: Samples, ways: Samples, masses: Samples) -> Samples:
+    _, right, normal = (one.sum(axis=0) for one in _linear(time, ways, masses))
+    return np.asarray(np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True) @ right)
+
+
+def _linear(time: Samples, ways: Samples, masses: Samples) -> tuple[Samples, Samples, Samples]:
+    """Terms of the linear equations of each part: squares (parts,), right sides (parts, 3), normal (parts, 3, 3)."""
+    flat = ways.reshape(time.size, -1)
+    left, arm = (bent(time, values).reshape(ways.shape) for values in (flat, integral(time, flat)))
+    square = masses * np.einsum("npi,npi->p", left, left)
+    right = masses[:, np.newaxis] * np.cross(arm, left).sum(axis=0)
+    outer = np.einsum("npi,npj->pij", arm, arm)
+    normal = np.trace(outer, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(3) - outer
+    return square, right, masses[:, np.newaxis, np.newaxis] * normal
+
+
+def _rest(time: Samples, ways: Samples, rate: Samples, weights: Samples) -> Samples:
+    return np.asarray(weights * off_the_circle(time, ways, rate))
+
+
+def _frame(time: Samples, rate: Samples) -> Samples:
+    """Axes, shape (n, 3, 3), of a frame that turns at ``rate``: a row vector times it is the vector in that frame."""
+    size = float(np.linalg.norm(rate))
+    x, y, z = rate / size if size > 0 else np.zeros(3)
+    angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # across @ v is the cross product axis x v
+    return np.asarray(np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * (across @ across))

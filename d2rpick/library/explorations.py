@@ -1,0 +1,159 @@
+"""What each td costs, of a run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Unpack
+
+from d2rpick.library import arguments
+from d2rpick.library.answers import explorer_of, page_record, selection_for, written
+from d2rpick.library.frames import frame_of
+from d2rpick.library.repeat import asking, command_line
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from d2rpick.choice.offer import Offer
+    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.library.arguments import Choosing, Parts
+    from d2rpick.library.runs import Run
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """Answer of `explore`; nothing of it changes.
+
+    ``offers`` are by ascending td, each with ``tr``, ``error``, ``rigid_time``, ``unbeaten``, ``quality`` and its
+    measures in ``best``; ``recommended`` is the one that `suggest` chooses, ``step`` the nearest unbeaten td with
+    half the error of ``start``, the td asked for or else the one that saves most.  ``answer`` says it in a sentence.
+    """
+
+    run: Run = field(repr=False)
+    offers: tuple[Offer, ...] = field(repr=False)
+    recommended: Offer | None
+    start: Offer | None = field(repr=False)
+    step: Offer | None = field(repr=False)
+    warnings: tuple[Caution, ...]
+    command: tuple[str, ...] = field(repr=False)
+    _asking: tuple[str, ...] = field(repr=False)
+    _core: TradeOff = field(repr=False)
+
+    @property
+    def answer(self) -> str:
+        """The shortest sensible answer."""
+        from d2rpick.report.trade_off import answer
+
+        return answer(self._core)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the JSON document of the command line as a dictionary; its schema is named in it."""
+        found: dict[str, Any] = json.loads(self.to_json())
+        return found
+
+    def to_json(self) -> str:
+        """Give the JSON document of ``d2rpick explore``, schema d2rpick/explore/1."""
+        from d2rpick.report.trade_off import as_json
+
+        return as_json(self._core, self.command)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give a row per td, a column per single value of ``offers`` in the JSON; what is not known is NaN.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> table = d2.explore(d2.read("sample_data/energy.csv"), td_window=(0.06, 0.07), steps=10).to_frame()
+        >>> table.query("recommended")[["tr", "td"]].round(6).values.tolist()
+        [[0.013587, 0.068753]]
+        """
+        from d2rpick.report.trade_off import COLUMNS
+
+        return frame_of(self.to_dict()["offers"], COLUMNS, source=list(self._core.situation.history.source))
+
+    def plot(self) -> Figure:
+        """Draw energy, error and rigid time over td, as a matplotlib Figure."""
+        from d2rpick.report.figures_trade_off import draw_trade_off
+
+        return draw_trade_off(self._core)
+
+    def report(self, path: arguments.Path) -> Path:
+        """Write the answer to one HTML page that needs no network; an existing file is replaced."""
+        from d2rpick.choice.judged_card import CardRequest, input_for
+        from d2rpick.report.trade_off_page import as_page, drawn
+
+        core = self._core
+        pair, explorer = core.suggestion.recommended, explorer_of([core], self._asking)
+        card = input_for(core.suggestion.situation, pair.tr, CardRequest()) if pair else None
+        return written(path, as_page(core, page_record(self.run, self.command, drawn(core), card, explorer)))
+
+
+def explore(
+    run: Run,
+    td: float | None = None,
+    *,
+    td_window: tuple[float, float] | None = None,
+    steps: int = 200,
+    parts: Parts | None = None,
+    flying: Parts | None = None,
+    **choosing: Unpack[Choosing],
+) -> Exploration:
+    """Find what each td costs, as ``d2rpick explore`` does.
+
+    Parameters
+    ----------
+    run : Run
+        As `read` gives it, without switching.
+    td : float, optional
+        Explored too, and what others are compared with [time].
+    td_window : (float, float), optional
+        Where td is looked for [time].  Default: the longest flight.
+    steps : int
+        Number of evenly spaced td; peaks of the energy come on top.
+    parts, flying, **choosing
+        As for `suggest`.
+
+    Returns
+    -------
+    Exploration
+
+    Raises
+    ------
+    D2RPickError
+        If the run has no such parts or energy, a time lies outside the record, or no flight is seen.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> found = d2.explore(d2.read("sample_data/energy.csv"), td=0.064, td_window=(0.06, 0.07), steps=100)
+    >>> round(found.step.td - found.start.td, 4)
+    0.0048
+    """
+    from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.trade_off import explore_of
+
+    asked = None if td is None else arguments.number("td", td)
+    window = None if td_window is None else arguments.window("td_window", td_window)
+    count = int(arguments.number("steps", steps, 1))
+    settings = arguments.settings(choosing)
+    selection = selection_for(run, parts, flying)
+    core = explore_of(Reference.of(run.files, selection), settings, window, td=asked, steps=count)
+    times = [] if asked is None else ["--td", repr(asked)]
+    times += ["--td-window", *map(repr, window)] if window else []
+    return Exploration(
+        run=run,
+        offers=core.offers,
+        recommended=core.recommended,
+        start=core.start,
+        step=core.step,
+        warnings=core.cautions,
+        command=command_line("explore", (*times, "--steps", str(count)), run, selection, choosing),
+        _asking=asking(run, selection, choosing),
+        _core=core,
+    )

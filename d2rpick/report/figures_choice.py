@@ -1,0 +1,141 @@
+"""Figures of a choice and of a verdict: the flight with its level, what is acceptable in it, and the motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from matplotlib.figure import Figure
+
+from d2rpick.choice.replayed import replayed_motion
+from d2rpick.choice.view import merged, scale_of, view_of
+from d2rpick.histories.outline import outline
+from d2rpick.report.figures import (
+    FLIGHT,
+    GOOD,
+    REFERENCE,
+    SIZES,
+    STRETCHES,
+    SWITCHED,
+    finish,
+    mark_times,
+    plain,
+    show_span,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.replayed import Motion
+    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.choice.verify import Verdict
+    from d2rpick.choice.view import View
+
+# Up to so many candidates are told apart as marks; beyond, what is acceptable is a band.
+_FEW: Final = 20
+# Share of the axes at their foot in which the band lies, clear of the curve.
+_BAND: Final = 0.045
+
+
+def draw_suggestion(answer: Suggestion, *, narrow: bool = False) -> Figure:
+    """Energy in the flight with its level at td, candidates or acceptable windows, the choice; below it the motion."""
+    best = answer.chosen
+    few = answer.windows is None and len(answer.candidates) <= _FEW
+    shown = tuple(answer.candidates) if few else (best,) if best else ()
+    bands = () if few else answer.acceptable_windows
+    return _draw(answer.situation, best.tr if best else None, shown, bands, narrow=narrow)
+
+
+def draw_better(answer: Suggestion, *, narrow: bool = False) -> Figure:
+    """Draw the same for the better pair; there must be one."""
+    assert answer.better_pair is not None
+    return _draw(answer.situation.at(answer.better_pair.td), answer.better_pair.tr, narrow=narrow)
+
+
+def draw_verdict(answer: Verdict, *, narrow: bool = False) -> Figure:
+    """Energy in the flight with its level at td and the pair that was judged; below it the motion after that pair."""
+    return _draw(answer.situation, answer.candidate.tr, (answer.candidate,), narrow=narrow)
+
+
+def _draw(
+    situation: Situation,
+    tr: float | None,
+    candidates: Sequence[Candidate] = (),
+    bands: Sequence[tuple[float, float]] = (),
+    *,
+    narrow: bool = False,
+) -> Figure:
+    motion = None if tr is None else replayed_motion(situation, tr)
+    width, one, two = SIZES[narrow]
+    figure = Figure(figsize=(width, two if motion else one), layout="constrained")
+    panels = list(figure.subplots(2 if motion else 1, 1, sharex=True, squeeze=False)[:, 0])
+    seen = view_of(situation, tr)
+    _draw_energy(panels[0], situation, seen, candidates, bands)
+    if motion:
+        _draw_motion(panels[1], motion)
+    unit = situation.history.time_unit
+    panels[-1].set_xlabel(f"time [{unit}]" if unit else "time")
+    for panel in panels:
+        finish(panel, legend=not narrow)
+    _show(panels[0], situation, seen)
+    for panel in panels:
+        mark_times(panel, tr, situation.td, narrow=narrow)
+    if narrow:  # a legend inside would hide the curves
+        _legend_below(figure, panels)
+    return figure
+
+
+def _show(axes: Axes, situation: Situation, seen: View) -> None:
+    """Show the flight; the level belongs to it, also where td lies beyond."""
+    level = situation.energy_td
+    scale = scale_of(min(seen.low, level), max(seen.high, level), level)
+    show_span(axes, (seen.start, seen.end), scale, (seen.cut, seen.highest))
+
+
+def _draw_energy(
+    axes: Axes,
+    situation: Situation,
+    seen: View,
+    candidates: Sequence[Candidate],
+    bands: Sequence[tuple[float, float]],
+) -> None:
+    history, level, flight, span = situation.history, situation.energy_td, situation.flight, situation.evidence.span
+    drawn = outline(*history.between(seen.start, seen.end), stretches=STRETCHES)
+    if flight.start is not None:
+        known = span.end if span else situation.td  # without a contact, as far as it was seen
+        end = known if flight.end is None else flight.end
+        axes.axvspan(flight.start, end, color=FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
+    axes.plot(*drawn, color=REFERENCE, linewidth=1, label=plain(history.channel))
+    axes.axhline(level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
+    for number, band in enumerate(merged(bands, (seen.end - seen.start) / STRETCHES)):
+        label = "_" if number else "acceptable tr"
+        axes.axvspan(*band, ymax=_BAND, facecolor=GOOD, linewidth=0, label=label)
+    for acceptable, fill, name in ((True, GOOD, "acceptable"), (False, "none", "not acceptable")):
+        some = [one for one in candidates if one.acceptable == acceptable]
+        if some:
+            label = name if len(candidates) > 1 else "tr"
+            axes.scatter(
+                [one.tr for one in some], [one.energy for one in some], s=28, linewidths=0.7, facecolors=fill,
+                edgecolors=GOOD, zorder=3, label=label,
+            )  # fmt: skip
+    axes.set_ylabel("internal energy")
+
+
+def _draw_motion(axes: Axes, motion: Motion) -> None:
+    for values, colour, name in (
+        (motion.reference, REFERENCE, "without switching"),
+        (motion.switched, SWITCHED, "switched"),
+    ):
+        axes.plot(motion.time, values, color=colour, linewidth=1, label=name)
+    axes.set_ylabel("deformation [√energy]")
+
+
+def _legend_below(figure: Figure, panels: Sequence[Axes]) -> None:
+    """Put one legend of all panels below them, and leave fewer numbers on the time axis."""
+    panels[-1].locator_params(axis="x", nbins=4)
+    known = [dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True)) for panel in panels]
+    handles = {name: handle for one in known for name, handle in one.items()}
+    figure.legend(handles.values(), handles, loc="outside lower left", ncols=2, fontsize="small", frameon=False)

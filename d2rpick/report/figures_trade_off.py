@@ -1,0 +1,52 @@
+"""The figure of a trade-off: energy, error and rigid time over td."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from d2rpick.histories.outline import outline
+from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, STRETCHES, SWITCHED, finish
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from d2rpick.choice.trade_off import TradeOff
+
+_SIZES: Final = {False: (10.0, 7.0), True: (4.2, 7.5)}
+_ERRORS: Final = {True: "shortfall at td", False: "residual"}
+
+
+def draw_trade_off(found: TradeOff, *, narrow: bool = False) -> Figure:
+    """Draw the energy in the window of td, and below it error and rigid time of the best pair for each td."""
+    figure = Figure(figsize=_SIZES[narrow], layout="constrained")
+    energy, error, rigid = figure.subplots(3, sharex=True)
+    history = found.situation.history
+    inner = history.between(*found.td_window)
+    energy.plot(*outline(*inner, stretches=STRETCHES), color=REFERENCE, linewidth=1)
+    energy.set(ylabel="internal energy")
+    by_energy = bool(found.offers) and all(one.basis == "energy" for one in found.offers)
+    _curve(error, found, [one.error for one in found.offers])
+    error.set(ylabel=_ERRORS[by_energy], ylim=(0, None))
+    _curve(rigid, found, [one.rigid_time for one in found.offers])
+    unit = history.time_unit
+    rigid.set(ylabel="rigid time", xlabel=f"td [{unit}]" if unit else "td", ylim=(0, None))
+    for axes in (energy, error, rigid):
+        for one, colour, name in ((found.asked, FLIGHT, "td asked for"), (found.recommended, SWITCHED, "recommended")):
+            if one:
+                axes.axvline(one.td, color=colour, linewidth=1, linestyle="--", label=name)
+        finish(axes, legend=False)
+    known = dict(zip(*reversed(error.get_legend_handles_labels()), strict=True))
+    figure.legend(known.values(), known, loc="outside lower left", ncols=2 if narrow else 4, frameon=False)
+    return figure
+
+
+def _curve(axes: Axes, found: TradeOff, values: list[float | None]) -> None:
+    """Draw one measure of all offers, with gaps where it is unknown, and mark those that nothing beats."""
+    td = np.array([one.td for one in found.offers])
+    shown = np.array([np.nan if value is None else value for value in values])
+    best = np.array([one.unbeaten for one in found.offers], dtype=bool)
+    axes.plot(td, shown, color=REFERENCE, linewidth=0.8, label="best pair for each td")
+    axes.plot(td[best], shown[best], "o", color=GOOD, markersize=4, label="nothing beats it")

@@ -1,0 +1,190 @@
+"""The answer of ``explore`` as table, JSON, CSV and Markdown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from d2rpick.report import keys, tables
+from d2rpick.report.situation import frame, mechanics, read_line
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.choice.offer import Offer
+    from d2rpick.choice.trade_off import TradeOff
+
+SCHEMA = "d2rpick/explore/1"
+HEAD = ("", "td", "peak", "tr", "error", "level error", "K", "rigid", "of record", "run time", "tolerance", "quality")
+# A change of the rigid time below this share is none that people read.
+_NO_CHANGE: Final = 5e-4
+# An error that falls to about this share of itself is halved; much further, it is as good as gone.
+_HALF: Final = (0.45, 0.5)
+
+
+def as_table(found: TradeOff, limit: int) -> str:
+    """What was read, some ``limit`` of the offers that nothing beats, and the answer in a sentence."""
+    shown = some_of(found, limit)
+    table = tables.as_text(HEAD, rows(shown)) if shown else "nothing to offer"
+    lines = [read_line(found.situation.history), *_heading(found), "", table]
+    left = len(found.offers) - len(shown)
+    if left:
+        lines.append(f"... and {left} more td (--limit; csv and json have all)")
+    return "\n".join([*lines, "", answer(found)])
+
+
+def as_markdown(found: TradeOff, limit: int) -> str:
+    """The same offers as a Markdown table, and the answer below it."""
+    return "\n\n".join([tables.as_markdown(HEAD, rows(some_of(found, limit))), answer(found)])
+
+
+def as_csv(found: TradeOff) -> str:
+    """All offers, a column for each key of ``offers`` in the JSON output that is a single value."""
+    return tables.as_csv(COLUMNS, ([offer(one)[name] for name in COLUMNS] for one in found.offers)).rstrip("\n")
+
+
+def as_json(found: TradeOff, command: Sequence[str]) -> str:
+    """Everything by schema d2rpick/explore/1."""
+    return tables.as_json(as_document(found, command))
+
+
+def as_document(found: TradeOff, command: Sequence[str]) -> dict[str, Any]:
+    """Give what the JSON holds."""
+    chosen = found.recommended
+    about = mechanics(found.situation)
+    return {
+        **frame(found.situation, SCHEMA, command, found.cautions),
+        "td": found.asked.td if found.asked else None,
+        "td_window": list(found.td_window),
+        "flight": about["flight"],
+        "oscillator": about["oscillator"],
+        "modes": about["modes"],
+        "answer": answer(found),
+        "recommended": {"tr": chosen.tr, "td": chosen.td} if chosen else None,
+        "start": found.start.td if found.start else None,
+        "step": found.step.td if found.step else None,
+        "offers": [offer(one) for one in found.offers],
+    }
+
+
+def offer(one: Offer) -> dict[str, Any]:
+    """Keys of one offer: its td, and what ``suggest`` says of the recommended tr."""
+    best = keys.of_candidate(one.best) if one.best else dict.fromkeys(keys.CANDIDATE)
+    windows = one.windows
+    return {
+        "td": one.td,
+        "peak": one.peak,
+        "tr": one.tr,
+        "error": one.error,
+        "unbeaten": one.unbeaten,
+        "recommended": one.recommended,
+        **keys.of_quality(one.quality),
+        "basis": one.basis,
+        "energy_td": one.energy_td,
+        "kinetic_share": one.kinetic_share,
+        **{name: best[name] for name in _MEASURES},
+        "reason": one.reason,
+        "acceptable_windows": None
+        if windows is None
+        else [{"start": one.start, "end": one.end, "share": one.share} for one in windows],
+        "expected": keys.of_expected(one.expected),
+    }
+
+
+_MEASURES: Final = ("kind", *keys.MEASURES, "tr_low", "tr_high", "same_swing")
+_LISTS: Final = ("quality_reasons", "acceptable_windows", "expected")
+# Columns of the csv and of a frame.
+COLUMNS: Final = (
+    *("td", "peak", "tr", "error", "unbeaten", "recommended", "quality", "basis", "energy_td", "kinetic_share"),
+    *_MEASURES,
+    "reason",
+)
+
+
+def answer(found: TradeOff) -> str:
+    """The shortest sensible answer in a sentence: which td, and what another one costs.
+
+    Examples
+    --------
+    td = 0.064: 0.0041 later, at td = 0.0681, the residual falls from 0.957 to 0.17, and the rigid time grows by 6.6 %
+    """
+    start, step = found.start, found.step
+    if start is None:
+        return "no td in the window has an acceptable tr"
+    named = f"td = {start.td:.6g}" + ("" if found.asked else " saves the most")
+    if start.best is None:
+        what = f"{named} has no acceptable tr"
+        return what if step is None else f"{what}; {_away(start, step)} has, {step.tr:.6g}"
+    what = f"{named}, {_error(start)}" if not found.asked else f"{named}: {_error(start)}"
+    if step is None:
+        return f"{what}; no other td in the window halves that"
+    return f"{what}; {_away(start, step)} {_less(start, step)} and {_cost(start, step)}"
+
+
+def _away(start: Offer, step: Offer) -> str:
+    """Where the step leads."""
+    apart = step.td - start.td
+    return f"{abs(apart):.2g} {'later' if apart > 0 else 'earlier'} (tr = {step.tr:.6g}, td = {step.td:.6g})"
+
+
+def _less(start: Offer, step: Offer) -> str:
+    """What the step does to the error."""
+    assert start.error is not None or step.error is not None
+    if start.error is None:
+        return "brings the level below twice the mean energy"
+    assert step.error is not None
+    halves = _HALF[0] * start.error <= step.error <= _HALF[1] * start.error
+    return f"{'halves the error' if halves else 'cuts the error'} to {step.error:.3f}"
+
+
+def _cost(start: Offer, step: Offer) -> str:
+    """What the step does to the rigid time."""
+    assert start.rigid_time is not None
+    assert step.rigid_time is not None
+    change = step.rigid_time / start.rigid_time - 1
+    if abs(change) < _NO_CHANGE:
+        return "costs no rigid time"
+    return f"costs {-change:.1%} of the rigid time" if change < 0 else f"makes the rigid time {change:.1%} longer"
+
+
+def _error(one: Offer) -> str:
+    """The error of an offer, with its name."""
+    if one.error is None:
+        return "a level above twice the mean energy"
+    if one.basis == "energy":
+        return f"error {tables.measure(one.error)} of the level at td"
+    return f"residual {tables.measure(one.error)}"
+
+
+def _heading(found: TradeOff) -> list[str]:
+    low, high = found.td_window
+    return [f"td       {len(found.offers)} times from {low:.6g} to {high:.6g}"]
+
+
+def some_of(found: TradeOff, limit: int) -> list[Offer]:
+    """Offers that the answer names, and evenly over those that nothing beats as many as make ``limit``."""
+    named = {one.td for one in (found.asked, found.recommended, found.start, found.step) if one}
+    best = [one.td for one in found.offers if one.unbeaten and one.td not in named]
+    room = min(max(limit - len(named), 0), len(best))
+    named.update(best[round((place + 0.5) * len(best) / room - 0.5)] for place in range(room))
+    return [one for one in found.offers if one.td in named]
+
+
+def rows(offers: Sequence[Offer]) -> list[list[tables.Cell]]:
+    """Cells of some offers, below ``HEAD``; the recommended one has a star."""
+    return [
+        [
+            "*" if one.recommended else " ",
+            one.td,
+            "peak" if one.peak else "",
+            one.tr,
+            tables.measure(one.error),
+            tables.measure(one.best.level_error if one.best else None),
+            tables.measure(one.kinetic_share),
+            one.rigid_time,
+            f"{one.best.rigid_fraction:.1%}" if one.best else None,
+            f"{one.best.run_time_share:.0%}" if one.best and one.best.run_time_share is not None else None,
+            f"{one.best.timing_tolerance:.1e}" if one.best and one.best.timing_tolerance is not None else None,
+            one.quality.grade if one.quality else one.reason,
+        ]
+        for one in offers
+    ]

@@ -1,0 +1,107 @@
+"""Every td of a trade-off is answered as ``suggest`` answers it, and what is marked as unbeaten is."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from d2rpick.choice.of_run import Reference, read
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.choice.trade_off import explore_of
+from d2rpick.histories.history import History
+from d2rpick.histories.selection import Selection
+from tests.command import ROOT
+
+if TYPE_CHECKING:
+    from d2rpick.choice.offer import Offer
+    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.histories.run import Run
+
+SAMPLES = {
+    "energy.csv": Selection(),
+    "energy.glstat": Selection(),
+    "rollover.csv": Selection(energy=("boxIE_J",)),
+    "rolloverT01.gz": Selection(parts=("box",)),
+    "rollover_box.matsum": Selection(parts=("box",)),
+}
+
+
+def reference(history: History) -> Reference:
+    """Give a record that was made in memory as if it had been read: a run without databases."""
+    bare = SimpleNamespace(databases=(), parts=(), sources=("made",))
+    return Reference(cast("Run", bare), history)
+
+
+def check(found: TradeOff, history: History, asked: Settings, offers: list[Offer]) -> None:
+    """Hold offers against what ``suggest`` says of their td."""
+    for one in offers:
+        alone = suggest(history, one.td, asked)
+        assert one.best == alone.chosen
+        assert (one.basis, one.energy_td, one.kinetic_share) == (
+            alone.situation.basis, alone.situation.energy_td, alone.situation.kinetic_share,
+        )  # fmt: skip
+        assert one.windows == alone.windows
+        assert one.expected == alone.expected
+        assert one.quality == alone.quality
+        assert (one.reason is None) == (alone.recommended is not None)
+    assert all(low.td < high.td for low, high in pairwise(found.offers))
+    unbeaten(found)
+
+
+def unbeaten(found: TradeOff) -> None:
+    """Hold the marks against every other offer."""
+    for known in (True, False):
+        pairs = [
+            (one.unbeaten, round(one.error, 3), one.best.rigid_time)
+            for one in found.offers
+            if one.best and one.error is not None and not one.best.same_swing and (one.basis != "energy") == known
+        ]
+        for marked, error, rigid in pairs:
+            beaten = any((e < error and r >= rigid) or (e <= error and r > rigid) for _, e, r in pairs)
+            assert marked != beaten
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_every_td_of_a_sample_is_answered_as_suggest_answers_it(name: str) -> None:
+    known = read([str(ROOT / "sample_data" / name)], SAMPLES[name])
+    found = explore_of(known, Settings(), steps=12)
+    low, high = found.td_window
+    assert {round(one.td, 12) for one in found.offers} >= {round(t, 12) for t in np.linspace(low, high, 13)[1:]}
+    assert sum(one.recommended for one in found.offers) == 1
+    check(found, known.history, Settings(), [*found.offers][:: len(found.offers) // 6])
+
+
+@st.composite
+def histories(draw: st.DrawFn) -> History:
+    """Energy of some modes after a load that may ring, with or without noise, damping and a contact at the end."""
+    states = draw(st.integers(60, 400))
+    time = np.linspace(0.0, 1.0, states)
+    energy = np.zeros(states)
+    for _ in range(draw(st.integers(1, 4))):
+        rate, share, phase = draw(st.floats(1.5, 12.0)), draw(st.floats(0.2, 1.0)), draw(st.floats(0.0, 3.1))
+        energy += share * np.sin(2 * np.pi * rate * time + phase) ** 2
+    energy *= np.exp(-draw(st.floats(0.0, 1.5)) * time)
+    energy[time < draw(st.floats(0.0, 0.3))] += draw(st.floats(0.0, 5.0))
+    energy[time > draw(st.floats(0.8, 1.2))] += draw(st.floats(0.0, 5.0))
+    noise = np.random.default_rng(draw(st.integers(0, 99))).standard_normal(states)
+    share = draw(st.sampled_from([0.0, 0.003, 0.1]))
+    return History(time, energy + share * noise, ("made",), "made", "E")
+
+
+@settings(max_examples=12, deadline=None)
+@given(histories(), st.floats(0.3, 0.7), st.sampled_from([None, 0.1]))
+def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
+    history: History, td: float, after: float | None
+) -> None:
+    asked = Settings(after=after)
+    found = explore_of(reference(history), asked, (td - 0.15, td + 0.15), td=td, steps=6)
+    assert found.asked is not None
+    assert found.asked.td == td
+    check(found, history, asked, [found.asked, *found.offers[::5]])

@@ -1,0 +1,65 @@
+"""What is looked at to see a choice, and the motion that is drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.examine import examine
+from d2rpick.choice.replayed import replayed_motion
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.view import view
+from d2rpick.flight.flight import Flight
+from d2rpick.histories.history import History
+from tests.command import ENERGY
+from tests.reading import read_history
+
+TIME = np.linspace(0, 10, 1001)
+# a load until 2, a ripple about 1, a landing at 8
+RECORD = np.where(TIME < 2, 50, np.where(TIME < 8, 1 + 0.1 * np.sin(9 * TIME), 500))
+
+
+def made(energy: np.ndarray[tuple[int], np.dtype[np.float64]] = RECORD) -> History:
+    return History(TIME, energy, ("made",), "made", "energy")
+
+
+def test_the_flight_is_shown_and_what_stands_above_it_is_named() -> None:
+    seen = view(made(), Flight(2.0, 8.0, "given"), [7.0])
+    assert (seen.start, seen.end) == pytest.approx((1.64, 8.36))
+    assert (seen.low, seen.high) == pytest.approx((0.9, 1.1), abs=1e-3)
+    assert (seen.highest, seen.cut) == (500, "landing")
+    early = view(made(np.where(TIME < 2, 900, RECORD)), Flight(2.0, 8.0, "given"), [7.0])
+    assert (early.highest, early.cut) == (900, "load")
+
+
+def test_times_beyond_the_flight_are_shown_too() -> None:
+    seen = view(made(), Flight(2.0, 8.0, "given"), [1.0, 9.0])
+    assert seen.start < 1
+    assert seen.end > 9
+    assert seen.high < 2
+
+
+def test_without_a_flight_the_whole_record_is_shown_and_nothing_is_cut() -> None:
+    assert view(made(), Flight(None, None, None), [5.0]) == (0.0, 10.0, RECORD.min(), 500, 500, "")
+
+
+def test_a_flight_without_an_end_lasts_as_far_as_it_is_known() -> None:
+    assert view(made(), Flight(2.0, None, "oscillator"), [3.0], known=6.0).end == pytest.approx(6.24)
+    assert view(made(), Flight(2.0, None, "momentum"), [3.0]).end == 10
+
+
+def test_the_motion_is_that_of_the_record_until_tr_rigid_then_and_continuous() -> None:
+    situation = examine(read_history([ENERGY]), 0.064, Settings())
+    tr = 0.0128853
+    time = np.linspace(0.0, 0.1, 4001)
+    motion = replayed_motion(situation, tr, time)
+    assert motion is not None
+    states = np.linspace(0.0, 0.1, 1001)  # those of the record
+    whole = replayed_motion(situation, tr, states)
+    assert whole is not None
+    np.testing.assert_allclose(whole.reference**2, situation.history.energies_at(states), rtol=1e-5, atol=1e-6)
+    before, rigid = time <= tr, (time >= tr) & (time <= 0.064)
+    np.testing.assert_array_equal(motion.switched[before], motion.reference[before])
+    assert np.ptp(motion.switched[rigid]) < 1e-9
+    assert np.abs(np.diff(motion.switched)).max() < 0.1
+    assert replayed_motion(examine(read_history([ENERGY]), 0.064, Settings(replay=False)), tr) is None

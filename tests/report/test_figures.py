@@ -1,0 +1,84 @@
+"""Figures say one thing each: the flight, what is acceptable in it, runs told apart."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from matplotlib.patches import Rectangle
+
+import d2rpick as d2
+from d2rpick.report.figures_study import draw_study
+from d2rpick.studies.common import Common
+from d2rpick.studies.row import Row
+from d2rpick.studies.study import Study
+from tests.command import BOX, ENERGY
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def texts(axes: Axes) -> list[str]:
+    return [text.get_text() for text in axes.texts]
+
+
+def marks(axes: Axes) -> list[int]:
+    return [len(np.asarray(one.get_offsets())) for one in axes.collections]
+
+
+def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> None:
+    answer = d2.suggest(d2.read(BOX), td=0.37, parts="box")
+    assert len(answer.candidates) > 20
+    (axes,) = answer.plot().axes
+    assert axes.get_ylim()[1] < 4
+    assert axes.get_xlim() == pytest.approx((0.0736, 0.3989), abs=1e-3)
+    assert "landing, up to 1248 \u2191" in texts(axes)
+    assert marks(axes) == [1]  # the recommended one alone
+    assert answer._core.windows is not None
+    bands = [one for one in axes.patches if isinstance(one, Rectangle) and one.get_height() < 0.1]
+    assert len(bands) == len(answer._core.windows)
+
+
+def test_few_candidates_are_marks_acceptable_or_not() -> None:
+    answer = d2.suggest(d2.read(ENERGY), td=0.064)
+    energy, motion = answer.plot().axes
+    acceptable = sum(one.acceptable for one in answer.candidates)
+    assert marks(energy) == [acceptable, len(answer.candidates) - acceptable]
+    assert len(motion.lines) == 4  # both motions, tr and td
+
+
+def row(name: str, tr: float, level: float = 1.0) -> Row:
+    time = np.linspace(0, 1, 50)
+    energy = level * (1 + 0.1 * np.sin(20 * time)) + 500 * (time > 0.95)
+    return Row(name, "ok", tr=tr, energy_td=level, curve=np.stack([time, energy]))
+
+
+def study(*rows: Row) -> Study:
+    return Study(0.8, None, rows, None, None, Common(None, None, "made"), ())
+
+
+def test_up_to_ten_runs_have_a_name_and_a_look_of_their_own() -> None:
+    (axes,) = draw_study(study(*(row(f"runs/{i}/glstat", 0.2 + i / 100, 1 + i) for i in range(10)))).axes
+    lines = axes.lines[:10]
+    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 10
+    assert {*texts(axes)} >= {str(i) for i in range(10)}
+    assert axes.get_ylim()[1] < 20  # the landing is cut
+    heights = sorted(text.xyann[1] for text in axes.texts if text.get_text().isdigit())  # type: ignore[attr-defined]
+    assert min(np.diff(heights)) > 0.05
+
+
+def test_of_many_runs_those_that_stand_out_are_named() -> None:
+    rows = [row(f"run{i}", 0.2 + i / 1000) for i in range(30)]
+    (axes,) = draw_study(study(*rows, row("odd", 0.5))).axes
+    assert "odd" in texts(axes)
+    assert "run3" not in texts(axes)
+    assert axes.collections[0].get_label() == "internal energy of 31 runs"
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_runs_of_any_energy_can_be_drawn(narrow: bool) -> None:
+    rows = [row("zero", 0.2, 0.0), row("one", 0.2), row("large", 0.3, 1e6)]
+    figure = draw_study(study(*rows), narrow=narrow)
+    figure.canvas.draw()
+    assert draw_study(study()).axes
