@@ -131,7 +131,8 @@ def test_the_saving_is_predicted_beside_what_was_measured() -> None:
 def test_the_figures_of_the_box_say_what_a_coarse_box_does(monkeypatch: pytest.MonkeyPatch) -> None:
     coarse = Parameters(mesh=4)
     every = tuple(published_box.variants_of(coarse))
-    some = (every[0], every[2], every[4], every[-1])  # two that act after td, two before
+    some = (every[0], every[2], every[6], every[-1])  # two that act after td, two before
+    assert [one.before for one in some] == [False, False, True, True]
     monkeypatch.setattr(published_box, "variants_of", lambda _: iter(some))
     made = {exhibit.name: exhibit for exhibit in (make() for _, make in published_box.exhibits_of(coarse)[1:])}
     assert [exhibit.figure for exhibit in made.values()] == ["2a, b", "2c", "8", "section 4"]
