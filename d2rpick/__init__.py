@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from d2rpick.library.checking import check as check
     from d2rpick.library.explorations import Exploration as Exploration
     from d2rpick.library.explorations import explore as explore
+    from d2rpick.library.part_tables import PartTable as PartTable
+    from d2rpick.library.part_tables import parts as parts
     from d2rpick.library.plans import Plan as Plan
     from d2rpick.library.plans import plan as plan
     from d2rpick.library.runs import Run as Run
@@ -44,6 +46,7 @@ _HOME = {
     **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "library.answers"),
     **dict.fromkeys(("Findings", "check"), "library.checking"),
     **dict.fromkeys(("Exploration", "explore"), "library.explorations"),
+    **dict.fromkeys(("PartTable", "parts"), "library.part_tables"),
     **dict.fromkeys(("Plan", "plan"), "library.plans"),
     **dict.fromkeys(("Run", "from_frame", "read"), "library.runs"),
     **dict.fromkeys(("Study", "study"), "library.studies"),

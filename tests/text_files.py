@@ -29,8 +29,9 @@ def glstat_line(label: str, value: float) -> bytes:
 
 
 def glstat_blocks(times: ArrayLike, energies: ArrayLike) -> list[bytes]:
-    """One block per state: controller line, values (other than the energy: their rank), two blank lines."""
+    """One block per state: controller line, values (other than the energies: their rank), two blank lines."""
     rest = {label: glstat_line(label, rank) for rank, label in enumerate(LABELS)}
+    rest["spring and damper energy"] = glstat_line("spring and damper energy", 1e-20)
     fixed = [rest[label] for label in LABELS]
     place = LABELS.index("internal energy")
     before, behind = b"".join(fixed[:place]), b"".join(fixed[place + 1 :]) + LAST

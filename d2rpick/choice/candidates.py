@@ -43,6 +43,8 @@ class Candidate(NamedTuple):
     expected run time over that of the reference.  ``same_swing``: the energy turns less than twice from tr to td, so
     that hardly anything is saved.  ``residual_high``: how large the residual may be if what the oscillator leaves over
     is a further mode.  ``parts``: what each part has of the mismatch, empty where single parts are not known.
+    ``position_error``: how far the body is out of place at td [length], because ``position_error_part`` is frozen
+    elsewhere.
     """
 
     rank: int
@@ -68,6 +70,8 @@ class Candidate(NamedTuple):
     same_swing: bool = False
     parts: tuple[PartMatch, ...] = ()
     residual_high: float | None = None
+    position_error: float | None = None
+    position_error_part: str | None = None
 
     @property
     def error(self) -> float:
@@ -81,7 +85,8 @@ class Candidates(Sequence[Candidate]):
     """Candidates of one td in some order: columns of what decides, each of shape (n,), made for all of them at once.
 
     ``tr`` [time]; ``energy`` [energy]; ``level_error`` [-], NaN where an energy is not positive; ``reach``: how far
-    the true time may lie away [time]; ``same_swing``; ``moments`` and ``known``, as the vibration gave them.
+    the true time may lie away [time]; ``same_swing``; ``position_error`` [length], NaN where unknown; ``moments`` and
+    ``known``, as the vibration gave them.
     ``recommended`` is the place of the one that is, ``ranked`` tells whether the order is that of the ranks.
     """
 
@@ -93,6 +98,7 @@ class Candidates(Sequence[Candidate]):
     level_error: Samples
     reach: Samples
     same_swing: NDArray[np.bool_]
+    position_error: Samples
     objections: tuple[Objection, ...]
     recommended: int | None = None
     ranked: bool = False
@@ -113,6 +119,7 @@ class Candidates(Sequence[Candidate]):
             level_error=level_error,
             reach=vibration.reach(moments),
             same_swing=(situation.turns_since(tr) < 2) & (not situation.at_rest),
+            position_error=situation.position_errors(tr),
             objections=tuple(objections(situation, tr, known, level_error)),
         )
 
@@ -146,9 +153,18 @@ class Candidates(Sequence[Candidate]):
             level_error=self.level_error[order],
             reach=self.reach[order],
             same_swing=self.same_swing[order],
+            position_error=self.position_error[order],
             objections=tuple(one.ordered(order) for one in self.objections),
             ranked=True,
         )
+
+    @property
+    def out_of_place(self) -> NDArray[np.bool_]:
+        """Which of them leave the body so far out of place that it is worth a warning."""
+        drift = self.situation.drift
+        if drift is None:
+            return np.zeros(len(self), dtype=bool)
+        return np.asarray(self.position_error > drift.limit)
 
     def recommending(self, place: int) -> Candidates:
         """Give the same with another one recommended."""
@@ -170,9 +186,11 @@ class Candidates(Sequence[Candidate]):
     def _made(self, i: int) -> Candidate:
         situation, found, known = self.situation, self.moments[i], self.known[i]
         history, td, tr = situation.history, situation.td, found.tr
-        energy, level, reach, same_swing = (
-            column[i].item() for column in (self.energy, self.level_error, self.reach, self.same_swing)
+        energy, level, reach, same_swing, off = (
+            column[i].item()
+            for column in (self.energy, self.level_error, self.reach, self.same_swing, self.position_error)
         )
+        drift = None if np.isnan(off) else situation.drift
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
         parts = situation.vibration.part_matches(tr) if known else ()
         against = tuple(one.sentence(i) for one in self.objections if one.holds[i])
@@ -200,6 +218,8 @@ class Candidates(Sequence[Candidate]):
             same_swing=same_swing,
             parts=parts,
             residual_high=known and known.residual_high,
+            position_error=off if drift else None,
+            position_error_part=drift.name if drift else None,
         )
 
 

@@ -36,7 +36,7 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
     if history.time.size < 3:
         found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
         raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
-    history.energy_at(td)
+    history.energy_at(td, "td")
     largest = float(np.abs(history.energy).max())
     if largest > _LARGEST:
         raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")

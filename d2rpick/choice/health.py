@@ -45,7 +45,7 @@ _COUNTING_REFERENCE = 0.1
 
 @dataclass(frozen=True)
 class Health:
-    """How a run stands; fields are the keys of the JSON output, None for what the files do not have.
+    """How a run stands up to the time ``until``; fields are the keys of the JSON output, None for what is not written.
 
     Shares are of the peak internal energy of the model (``part_hourglass_share``: of ``part``, the worst of those
     chosen); the ratio is the total energy over the initial energy and the external work.  The last three are over
@@ -68,9 +68,15 @@ class Health:
     window_eroded: float | None = None
     reason: str | None = None
     window_reason: str | None = None
+    until: float | None = None
 
 
-def assess(balance: Balance, window: tuple[float, float] | None = None, locked: float | None = None) -> Health:
+def assess(
+    balance: Balance,
+    window: tuple[float, float] | None = None,
+    locked: float | None = None,
+    until: float | None = None,
+) -> Health:
     """Judge the balance of a run.
 
     Parameters
@@ -80,13 +86,15 @@ def assess(balance: Balance, window: tuple[float, float] | None = None, locked: 
         Free flight, or the rigid window [time].
     locked : float, optional
         Mean energy of the chosen parts in the window; without it that of the model [energy].
+    until : float, optional
+        Where the balance ends, to be said with each of its figures [time].
     """
     peak = _peak(balance)
     if balance.internal is not None and peak is None:
         reason = (
             "the internal energy never exceeds a millionth of the energy of the run, so shares of it are meaningless"
         )
-        return Health(**_ratio(balance), window=window, reason=reason)
+        return Health(**_ratio(balance), window=window, reason=reason, until=until)
     return Health(
         hourglass_share=_share(balance.hourglass, peak),
         **_worst_part(balance),
@@ -97,6 +105,7 @@ def assess(balance: Balance, window: tuple[float, float] | None = None, locked: 
         window=window,
         **(_in_window(balance, *window, locked) if window else {}),
         window_reason=_too_short(balance, window) if window else None,
+        until=until,
     )
 
 
@@ -111,27 +120,31 @@ def _too_short(balance: Balance, window: tuple[float, float]) -> str | None:
 def cautions_of_health(health: Health) -> Iterator[Caution]:
     """What of the health of a run should be known, with stable codes."""
     rest = "do not rely on the internal energy"
+    up_to = "" if health.until is None else f" up to {health.until:.6g}"
     if _above(health.hourglass_share, MOST_HOURGLASS):
         share = f"{health.hourglass_share:.0%}"
-        yield Caution("hourglass", f"hourglass energy reaches {share} of the internal energy: {rest}")
+        yield Caution("hourglass", f"hourglass energy reaches {share} of the internal energy{up_to}: {rest}")
     if health.part and _above(health.part_hourglass_share, MOST_HOURGLASS):
         who = health.part.title or f"part {health.part.id}"
         share = f"{health.part_hourglass_share:.0%}"
-        yield Caution("part-hourglass", f"hourglass energy of {who} reaches {share} of its internal energy: {rest}")
+        yield Caution(
+            "part-hourglass", f"hourglass energy of {who} reaches {share} of its internal energy{up_to}: {rest}"
+        )
     low, high = health.energy_ratio_min, health.energy_ratio_max
     if low is not None and high is not None and (low < 1 - MOST_IMBALANCE or high > 1 + MOST_IMBALANCE):
-        found = f"total energy over initial energy and external work ranges from {low:.3g} to {high:.3g}"
+        found = f"total energy over initial energy and external work ranges from {low:.3g} to {high:.3g}{up_to}"
         yield Caution("energy-ratio", f"{found}: the run gains or loses energy")
     if _above(health.negative_sliding_share, MOST_NEGATIVE_SLIDING):
         share = f"{health.negative_sliding_share:.0%}"
         yield Caution(
-            "negative-sliding", f"contact energy falls to -{share} of the internal energy: check for penetrations"
+            "negative-sliding",
+            f"contact energy falls to -{share} of the internal energy{up_to}: check for penetrations",
         )
     if _above(health.sliding_share, MOST_SLIDING):
-        found = f"contact energy reaches {health.sliding_share:.0%} of the internal energy"
+        found = f"contact energy reaches {health.sliding_share:.0%} of the internal energy{up_to}"
         yield Caution("sliding", f"{found}; only friction can explain that")
     if _above(health.eroded_share, MOST_WORK):
-        found = f"deleted elements hold {health.eroded_share:.0%} of the internal energy"
+        found = f"deleted elements hold {health.eroded_share:.0%} of the internal energy{up_to}"
         yield Caution("eroded-energy", f"{found}: it counts as internal energy of the model but does not spring back")
     yield from _of_window(health)
 

@@ -40,7 +40,8 @@ class Reference(NamedTuple):
     def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read of another run of the model the parts that this one has, whatever words they were asked for by."""
         ids = tuple(str(part.id) for part in self.history.parts or ())
-        return Reference.of(run, selection._replace(parts=ids) if ids else selection)
+        springs = tuple(str(part.id) for part in self.history.springs)
+        return Reference.of(run, selection._replace(parts=ids, springs=springs) if ids else selection)
 
 
 _Answer = TypeVar("_Answer", Suggestion, Verdict)
@@ -120,7 +121,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
         start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
-    health = assess(balance, window, locked)
+    health = assess(balance, window, locked, td)
     return answer._replace(health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
 
 

@@ -147,7 +147,7 @@ def _health(run: Run, flights: Sequence[FreeFlight]) -> Health | None:
     if balance is None:
         return None
     longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)
-    return assess(balance, (longest.start, longest.end) if longest else None)
+    return assess(balance, (longest.start, longest.end) if longest else None, until=float(balance.time[-1]))
 
 
 def _flights(run: Run, selection: Selection) -> tuple[tuple[str, FreeFlight], ...]:

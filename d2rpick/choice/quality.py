@@ -48,7 +48,7 @@ def quality_of(situation: Situation, best: Candidate, expected: Expectation | No
 def _poor(situation: Situation, best: Candidate, expected: Expectation | None) -> list[str]:
     found = []
     if best.residual is not None and best.residual > _MOST_FAIR:
-        found.append(f"{best.residual:.0%} of the vibration after td is wrong")
+        found.append(f"the vibration after td is off by {best.residual:.0%}")
     if expected and expected.kinetic_share > POOR_KINETIC_SHARE:
         found.append(f"about {expected.kinetic_share:.0%} of the vibration energy is kinetic at td")
     if situation.basis == "energy":
@@ -76,9 +76,9 @@ def _fair(situation: Situation, best: Candidate) -> list[str]:
     if best.residual is None:
         found.append("the sign of the deformation is unknown")
     elif best.residual > _MOST_GOOD:
-        found.append(f"{best.residual:.0%} of the vibration after td is wrong")
+        found.append(f"the vibration after td is off by {best.residual:.0%}")
     if best.residual_high is not None and best.residual_high > _MOST_FAIR:
-        found.append(f"up to {best.residual_high:.0%} of it if a further mode is hidden in the record")
+        found.append(f"with a further mode hidden in the record it may be off by {best.residual_high:.0%}")
     if not situation.flight.certain:
         found.append("the flight is not certain")
     return found

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.settings import Settings
     from d2rpick.flight.flight import Flight
+    from d2rpick.flight.position_error import Drift
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.model import Vibration
 
@@ -73,6 +74,20 @@ class Situation:
             return False
         deformed = self.vibration.unknown is None
         return nothing_vibrates(self.history, start, self.td, self.settings.tolerance, deformed=deformed)
+
+    @cached_property
+    def drift(self) -> Drift | None:
+        """How the body that the parts to be switched become drifts in the flight; None where that is not known."""
+        if self.flight.parts is None:
+            return None
+        from d2rpick.flight.position_error import drift_in_flight  # not above: a table has no parts
+
+        return self.fits.once(("drift", *self.flight[:2]), lambda: drift_in_flight(self.history, self.flight))
+
+    def position_errors(self, times: Samples) -> Samples:
+        """How far the body is out of place at td when it is frozen at each of ``times`` [length]; NaN where unknown."""
+        drift = self.drift
+        return np.full(times.shape, np.nan) if drift is None else drift.errors(times, self.td)
 
     def errors(self, times: Samples) -> Samples:
         """What a tolerance is held against, of the shape of ``times`` [-]: at rest nothing, else the vibration's."""

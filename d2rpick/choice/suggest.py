@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
-from d2rpick.choice.ranking import best_of, over_limits, rank
+from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, over_limits, rank
 from d2rpick.choice.verify import verify_at
-from d2rpick.choice.warnings import Caution, cautions_of
+from d2rpick.choice.warnings import Caution, cautions_of, out_of_place
 from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 # Pairs at other peaks that may turn out not to verify when the record is examined there, before it is given up.
 _MOST_REFUSED = 3
-# Decimals of a residual that people read.
-READ = 3
 
 
 class Pair(NamedTuple):
@@ -96,13 +94,19 @@ class Suggestion(NamedTuple):
 
     @property
     def clearly_better(self) -> Pair | None:
-        """The better pair where it is another one and better than that recommended, to the digits people read."""
+        """The better pair where it is better than that recommended by more than what counts as equally good.
+
+        Residuals are compared; on basis "energy" the amplitudes of the levels at td.
+        """
         better, own = self.better_pair, self.recommended
         if better is None or own is None:
             return better
         if better.residual is not None and own.residual is not None:
-            return better if round(better.residual, READ) < round(own.residual, READ) else None
-        return better if f"{better.td:.6g}" != f"{own.td:.6g}" else None
+            bound = self.chosen.residual_high if self.chosen else None
+            uncertain = 0.0 if bound is None else bound - own.residual
+            return better if own.residual - better.residual > max(EQUALLY_GOOD, uncertain) else None
+        levels = [max(self.situation.vibration.energy(td), 0.0) ** 0.5 for td in (better.td, own.td)]
+        return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
 
 
 def suggest(history: History, td: float, settings: Settings) -> Suggestion:
@@ -118,7 +122,9 @@ def suggest_at(situation: Situation, *, with_better: bool = True) -> Suggestion:
         candidates = candidates.recommending(best.rank - 1)
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
-    if not best:
+    if best:
+        cautions += out_of_place(situation, best.position_error)
+    else:
         cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
     if with_better and not better:
         cautions.append(Caution("no-better-td", "no peak of the energy in the flight has an acceptable tr"))

@@ -13,7 +13,7 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.margin import margin_before_contact
-from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, rank
+from d2rpick.choice.ranking import best_of, like_quality, rank
 from d2rpick.choice.reach_back import longest_rigid_times
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
 from d2rpick.errors import RangeError
@@ -104,7 +104,7 @@ def within_flight(look: Look, history: History, window: tuple[float, float]) -> 
     RangeError when the window lies outside the record.
     """
     for time in window:
-        history.energy_at(time)
+        history.energy_at(time, "td_window")
     situation = _flying(look, window)
     return situation, (window[0], _latest(situation, window))
 
@@ -147,7 +147,7 @@ def _by_residual(situation: Situation, window: tuple[float, float], look: Look) 
     highest = sorted(peaks, key=lambda t: -situation.vibration.energy(t))[:_MOST_PEAKS]
     pairs = _acceptable(look(td) for td in dict.fromkeys((*highest, *peaks[-_MOST_PEAKS:])))
     pairs = pairs or _acceptable(map(look, window))
-    limit = min((best.error for _, best in pairs), default=0.0) + EQUALLY_GOOD
+    limit = min((best.error for _, best in pairs), default=0.0) + like_quality(situation)
     alike = [pair for pair in pairs if pair[1].error <= limit]
     return _td(_longest(alike)), _td(_longest(pairs))
 

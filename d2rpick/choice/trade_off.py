@@ -10,7 +10,6 @@ import numpy as np
 from d2rpick.choice.of_run import suggest_of
 from d2rpick.choice.offer import offer_of
 from d2rpick.choice.ranking import EQUALLY_GOOD
-from d2rpick.choice.suggest import READ
 from d2rpick.choice.suggest_td import longest_flight, looking, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
 from d2rpick.vibration.fits import Fits
@@ -25,6 +24,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.history import Samples
 
+# Decimals of an error that people read.
+_READ: Final = 3
 # td in an even grid: on paper and on a screen a curve of so many points is smooth.
 STEPS: Final = 200
 # Another td is worth a step where it leaves at most this share of the error, and that is more than people pass over.
@@ -128,16 +129,16 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
     for known in (True, False):
         group = [one for one in offers if _found(one) and (one.basis != "energy") == known]
         least = np.inf
-        for one in sorted(group, key=lambda one: (-(one.rigid_time or 0.0), _read(one))):
-            if _read(one) < least:
+        for one in sorted(group, key=lambda one: (-(one.rigid_time or 0.0), _printed(one))):
+            if _printed(one) < least:
                 unbeaten.add(one.td)
-                least = _read(one)
+                least = _printed(one)
     return (replace(one, unbeaten=one.td in unbeaten) for one in offers)
 
 
-def _read(offer: Offer) -> float:
+def _printed(offer: Offer) -> float:
     """The error, to the digits that people read."""
-    return np.inf if offer.error is None else round(offer.error, READ)
+    return np.inf if offer.error is None else round(offer.error, _READ)
 
 
 def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from d2rpick.choice.candidates import Candidate, judge
 from d2rpick.choice.examine import examine
 from d2rpick.choice.ranking import keeps, kept, over_limits
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of
+from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of, out_of_place
 from d2rpick.errors import RangeError
 from d2rpick.vibration.moments import Moment
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.health import Health
+    from d2rpick.choice.quality import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
@@ -37,6 +38,16 @@ class Verdict(NamedTuple):
     switched: Comparison | None = None
     health: Health | None = None
 
+    @property
+    def quality(self) -> Quality | None:
+        """How good the pair is; None where it does not verify."""
+        if not self.verified:
+            return None
+        from d2rpick.choice.expectation import expectation  # not above: a verdict in a study does without them
+        from d2rpick.choice.quality import quality_of
+
+        return quality_of(self.situation, self.candidate, expectation(self.situation, self.candidate.energy))
+
 
 def verify(history: History, tr: float, td: float, settings: Settings) -> Verdict:
     """Judge one pair; RangeError when a time lies outside the record or tr is not before td."""
@@ -48,7 +59,7 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
     """Judge one pair in a situation that is known; RangeError when tr lies outside the record or is not before td."""
     settings, td = situation.settings, situation.td
     _in_order(tr, td)
-    situation.history.energy_at(tr)
+    situation.history.energy_at(tr, "tr")
     (candidate,) = judge(situation, [Moment(tr, "given", None)])
     known = situation.flight.start is not None
     share = situation.kinetic_share
@@ -64,7 +75,7 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
         td_ok=td_ok,
         verified=keeps(situation, candidate),
         reasons=reasons,
-        cautions=tuple(cautions_of(situation)),
+        cautions=(*cautions_of(situation), *out_of_place(situation, candidate.position_error)),
     )
 
 

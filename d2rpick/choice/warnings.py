@@ -79,6 +79,17 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
         yield Caution("td-after-contact", f"td = {td:.6g} lies after {end_of_flight(situation)}")
 
 
+def out_of_place(situation: Situation, error: float | None) -> Iterator[Caution]:
+    """Say so where a part that is frozen elsewhere puts the body off at td by ``error`` [length], too much."""
+    drift = situation.drift
+    if drift is None or error is None or error <= drift.limit:
+        return
+    share, last = error / float(drift.path[-1]), float(drift.time[-1] - drift.time[0])
+    found = f"{drift.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
+    off = f"there the body is off by {error:.3g}, {share:.1%} of its path in the flight"
+    yield Caution("out-of-place", f"{found}: {off}; the next contact may move by {share * last:.2g}")
+
+
 def end_of_load(situation: Situation) -> str:
     """Words for ``earliest_tr``: the start of the flight, and the margin where one is kept."""
     return f"the end of the load at {situation.flight.start:.6g}{_margin(situation)}"

@@ -20,11 +20,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 COMMANDS: Final = (
-    "suggest", "explore", "plan", "verify", "replay", "info", "extract", "card", "check", "rule", "study", "reproduce",
-    "rollover",
+    "suggest", "explore", "plan", "parts", "calibrate", "verify", "replay", "info", "extract", "card", "check", "rule",
+    "study", "reproduce", "rollover",
 )  # fmt: skip
 COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended
+_LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
 EXAMPLES: Final = """\b
 Examples:
   d2rpick suggest --td 0.064 sample_data/energy.csv
@@ -123,11 +124,31 @@ def _one_line(error: Exception) -> str:
     return str(error)
 
 
+_VERSIONS: Final = "Show the version, and those of the libraries it stands on, and exit."
+
+
+def _versions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    """Print the versions that a bug report needs."""
+    if not value or ctx.resilient_parsing:
+        return
+    from importlib.metadata import PackageNotFoundError, version
+    from platform import platform, python_version
+
+    click.echo(f"d2rpick, version {__version__}")
+    click.echo(f"Python {python_version()}, {platform()}")
+    for library in _LIBRARIES:
+        try:
+            click.echo(f"{library} {version(library)}")
+        except PackageNotFoundError:
+            click.echo(f"{library} is not installed")
+    ctx.exit()
+
+
 @click.group(
     cls=_Group,
     epilog=EXAMPLES,
     context_settings={"auto_envvar_prefix": "D2RPICK", "help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-@click.version_option(__version__, prog_name="d2rpick")
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_versions, help=_VERSIONS)
 def d2rpick() -> None:
     """Choose the times of deformable-to-rigid switching from the internal energy of one reference run."""

@@ -44,6 +44,7 @@ Examples:
 @shared.history_options
 @shared.choosing_options
 @card_options
+@shared.MIN_QUALITY
 @shared.output_options(*FORMATS["trade_off"])
 @click.pass_context
 def command(
@@ -53,6 +54,7 @@ def command(
     td_window: tuple[float, float] | None,
     steps: int,
     limit: int,
+    min_quality: str | None,
     output_format: str,
     exit_zero: bool,
     **options: Any,
@@ -85,7 +87,9 @@ def command(
         output.write(extras.report, text_bytes(with_options(_page(found, run, options))))
     text = write("trade_off", output_format, found, Shown(ctx.meta["d2rpick.command"], limit))
     output.result(in_words(text, output_format))
-    return finish(ctx, objection=found.recommended is None, exit_zero=exit_zero)
+    chosen = found.recommended
+    poor = chosen is None or shared.falls_short(chosen.quality, min_quality)
+    return finish(ctx, objection=poor, exit_zero=exit_zero)
 
 
 def _page(found: TradeOff, run: Run, options: dict[str, Any]) -> str:

@@ -2,84 +2,27 @@
 
 from __future__ import annotations
 
-import math
 import os
+from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from d2rpick.cli import values
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from click.shell_completion import CompletionItem
-
+    from d2rpick.choice.quality import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.histories.opening import Run, Selection
     from d2rpick.vibration.oscillator import Oscillator
 
+# Kinds of values, under the names by which commands ask for them.
+FILE, NAMES, PARTS = values.FILE, values.NAMES, values.PARTS
+TIME, POSITIVE, NOT_NEGATIVE, FRACTION = values.TIME, values.POSITIVE, values.NOT_NEGATIVE, values.FRACTION
+FORMATS = values.FORMATS
 Decorated = Any  # a command function; click's decorators do not say more
-
-if TYPE_CHECKING:
-    FloatType = click.ParamType[float]
-else:
-    FloatType = click.ParamType  # generic from click 8.4 on
-
-
-class Number(FloatType):
-    """A finite number with a point, not below ``low`` (or above it, when ``above``) and not above ``high``."""
-
-    name = "number"
-
-    def __init__(self, low: float = -math.inf, high: float = math.inf, *, above: bool = False) -> None:
-        self.low, self.high, self.above = low, high, above
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Read a number or fail with what was found and what was expected."""
-        try:
-            number = float(value)
-        except ValueError:
-            self.fail(f"{value!r} is not a number", param, ctx)
-        if not math.isfinite(number):
-            self.fail(f"{value!r} is not a finite number", param, ctx)
-        if number < self.low or (self.above and number == self.low):
-            self.fail(
-                f"{value} was found, a number {'above' if self.above else 'of at least'} {self.low:g} was expected",
-                param,
-                ctx,
-            )
-        if number > self.high:
-            self.fail(f"{value} was found, a number of at most {self.high:g} was expected", param, ctx)
-        return number
-
-
-# of d2rpick.histories.opening, which is too heavy to be imported for --help; a test holds them together
-FORMATS = ("binout", "radioss-th", "glstat", "matsum", "hdf5", "csv")
-
-
-class File(click.types.StringParamType):
-    """Name of a file or folder, for the shell to complete."""
-
-    envvar_list_splitter = ";"
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
-        """Leave it to the shell."""
-        from click.shell_completion import CompletionItem
-
-        return [CompletionItem(incomplete, type="file")]
-
-
-class Names(click.types.StringParamType):
-    """Names that are separated by semicolons in an environment variable, since labels hold blanks."""
-
-    envvar_list_splitter = ";"
-
-
-NAMES = Names()
-FILE = File()
-TIME = Number()
-POSITIVE = Number(0.0, above=True)
-NOT_NEGATIVE = Number(0.0)
-FRACTION = Number(0.0, high=1.0)
 
 
 def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
@@ -101,6 +44,9 @@ _TOLERANCE = click.option(
     help="Limit on the lock-in error, or on the level error where no oscillator is known.",
 )  # fmt: skip
 EXIT_ZERO = click.option("--exit-zero", is_flag=True, help="Exit with 0 instead of 1 when the answer is an objection.")
+MIN_QUALITY = click.option(
+    "--min-quality", type=click.Choice(["good", "fair"]), help="Exit with 1 where the pair is worse than that."
+)
 _FORMAT = click.option(
     "-F", "--input-format", type=click.Choice(["auto", *FORMATS]), default="auto", show_default=True,
     help="Format of the history; auto recognises it by content.",
@@ -115,7 +61,7 @@ _CHANNEL = click.option(
     help="Channel of another quantity, where its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
 )  # fmt: skip
 _FLYING = click.option(
-    "--flying", metavar="IDS", multiple=True, type=NAMES, help="Parts that fly together with the switched parts."
+    "--flying", metavar="IDS", multiple=True, type=PARTS, help="Parts that fly together with the switched parts."
 )
 
 
@@ -139,7 +85,7 @@ def reading_options(function: Decorated) -> Decorated:
     return _stack(
         _FORMAT, _TIME, _ENERGY,
         click.option(
-            "--part", metavar="IDS", multiple=True, type=NAMES,
+            "--part", metavar="IDS", multiple=True, type=PARTS,
             help="Parts to switch: number (3,7), range (10-19), title, `flying` or `all`; energies are added.",
         ),
         _FLYING, _CHANNEL,
@@ -181,10 +127,18 @@ def file_options(function: Decorated) -> Decorated:
         click.option("--overwrite", is_flag=True, help="Replace existing files."),
         click.option("-q", "--quiet", is_flag=True, help="Print no notes and warnings to stderr."),
         click.option(
-            "--debug", is_flag=True, expose_value=False, callback=_remember_debug,
+            "-v", "--verbose", is_flag=True, expose_value=False, callback=_remember("verbose"),
+            help="Say on stderr what was read and how long it took.",
+        ),
+        click.option(
+            "--show-settings", is_flag=True, expose_value=False, callback=_remember("show-settings"),
+            help="Print every option with its value and its source, and do nothing else.",
+        ),
+        click.option(
+            "--debug", is_flag=True, expose_value=False, callback=_remember("debug"),
             help="Show the traceback of an error.",
         ),
-    )(function)  # fmt: skip
+    )(_unless_shown(function))  # fmt: skip
 
 
 def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
@@ -346,7 +300,10 @@ def _typed(option: click.Parameter, value: Any) -> list[str]:
 
 
 def repeat() -> list[str]:
-    """Give the command line that was typed, and before it the environment variables that set options."""
+    """Give the command line that was typed, and before it the environment variables that set options.
+
+    It may replace the files that it has written, so that it can be typed again.
+    """
     context = click.get_current_context()
     source = click.core.ParameterSource.ENVIRONMENT
     names = [
@@ -355,7 +312,14 @@ def repeat() -> list[str]:
         if context.get_parameter_source(name) is source
     ]
     variables = [f"{name}={os.environ[name]}" for name in names]
-    return [*(["env", *variables] if variables else []), "d2rpick", *context.meta["d2rpick.command"]]
+    words = list(context.meta["d2rpick.command"])
+    if not context.params["overwrite"] and any(context.params.get(name) for name in _WRITTEN):
+        words.insert(words.index("--") if "--" in words else len(words), "--overwrite")
+    return [*(["env", *variables] if variables else []), "d2rpick", *words]
+
+
+# Options that write files, which the same command would find the next time.
+_WRITTEN = ("output_file", "plot", "report", "write_deck")
 
 
 def oscillator(options: dict[str, Any]) -> Oscillator | None:
@@ -388,8 +352,8 @@ def settings(options: dict[str, Any]) -> Settings:
     if len(chosen) > 1:
         raise click.UsageError(f"{chosen[0]} and {chosen[1]} exclude each other")
     cost_share, step_ratio = options.get("cost_share"), options.get("step_ratio")
-    if step_ratio is not None and cost_share is None:
-        raise click.UsageError("--step-ratio needs --cost-share too: the run time needs both")
+    if step_ratio is not None and cost_share is None and not options.get("deck"):
+        raise click.UsageError("--step-ratio needs --cost-share or --deck too: the run time needs both")
     if window and not window[0] < window[1]:
         raise click.UsageError(f"--fit-window {window[0]:g} {window[1]:g} is empty; give the lower time first")
     return Settings(
@@ -407,6 +371,15 @@ def settings(options: dict[str, Any]) -> Settings:
     )
 
 
+def falls_short(quality: Quality | None, wanted: str | None) -> bool:
+    """Whether a pair is worse than --min-quality asks for."""
+    if wanted is None or quality is None:
+        return False
+    from d2rpick.choice.quality import GRADES
+
+    return GRADES.index(quality.grade) < GRADES.index(wanted)
+
+
 def _each(value: Any) -> tuple[Any, ...]:
     return value if isinstance(value, tuple) else (value,)
 
@@ -415,5 +388,25 @@ def _dashed(name: str) -> str:
     return name.replace("_", "-")
 
 
-def _remember_debug(ctx: click.Context, _: click.Parameter, value: bool) -> None:
-    ctx.meta["d2rpick.debug"] = value
+def _remember(name: str) -> Callable[[click.Context, click.Parameter, bool], None]:
+    """Keep a flag that no command asks for itself."""
+
+    def keep(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+        ctx.meta[f"d2rpick.{name}"] = value
+
+    return keep
+
+
+def _unless_shown(function: Decorated) -> Decorated:
+    """Let a command show its settings instead of running, where that is asked for."""
+
+    @wraps(function)
+    def run(*args: Any, **kwargs: Any) -> Any:
+        context = click.get_current_context()
+        if not context.meta.get("d2rpick.show-settings"):
+            return function(*args, **kwargs)
+        from d2rpick.cli.settings_shown import show
+
+        return show(context)
+
+    return run

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from d2rpick.cli import deck_cost, plan_deck
 from d2rpick.cli import options as shared
-from d2rpick.cli import plan_deck
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
@@ -75,19 +75,24 @@ def command(
     from d2rpick.choice.plan import plan_of
 
     _check_usage(output_format, options, every=every, done=done, before=before)
-    options = plan_deck.for_deck(options)
-    prints = prints_card(options, "card" if options["deck"] else output_format)
+    form = "card" if options["write_deck"] else output_format
+    options = plan_deck.for_deck(options) if form == "card" else options
+    prints = prints_card(options, form)
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
         output = Output.of(options, *run.sources, *(name for name in (done, *before) if name not in (None, "-")))
+        model = deck_cost.model_of(options)
+        options = deck_cost.with_recommended(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
         earlier = reference.like(asked._replace(names=before).open(), asked.selection) if before else None
     windows = _windows(done) if done else ()
     plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
+    plan = plan._replace(cautions=(*plan.cautions, *unknown))
     output.notes(reference.history.notes, plan.cautions)
     _beside(plan, reference, options, output)
-    checked, passed = _deck(plan, reference, options, every=every) if options["deck"] else ("", True)
+    checked, passed = _deck(plan, reference, options, every=every) if options["write_deck"] else ("", True)
     if checked and output_format != "table":
         click.echo(checked, err=True)
     if output_format == "card":
@@ -100,12 +105,12 @@ def command(
 
 def _check_usage(form: str, options: dict[str, Any], *, every: bool, done: str | None, before: tuple[str, ...]) -> None:
     """Raise UsageError where options make no sense together, before a file is opened."""
-    if every and form not in ("value", "card") and not options["deck"]:
+    if every and form not in ("value", "card") and not options["write_deck"]:
         raise click.UsageError("--all belongs to -f value, -f card and --write-deck; other forms hold every window")
     plan_deck.check_usage(options["deck"], options["write_deck"])
     if before and done is None:
         raise click.UsageError("--before compares the landings of a switched run; name its windows with --done")
-    if (form == "card" or options["deck"]) and not (options["part"] or options["node"]):
+    if (form == "card" or options["write_deck"]) and not (options["part"] or options["node"]):
         what = "-f card" if form == "card" else "--write-deck"
         raise click.UsageError(f"{what} needs --part, the parts that are switched (Radioss: --node, their main nodes)")
 

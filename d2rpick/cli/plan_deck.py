@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli.deck_cost import cost_options
 
 if TYPE_CHECKING:
     from d2rpick.choice.plan import Plan
@@ -15,27 +16,18 @@ if TYPE_CHECKING:
 
 
 def deck_options(function: shared.Decorated) -> shared.Decorated:
-    """``--deck`` and ``--write-deck``."""
-    options = (
-        click.option(
-            "--deck", metavar="DECK", type=shared.FILE,
-            help="Main deck of the run (Radioss: its starter or engine file), for --write-deck.",
-        ),
-        click.option(
-            "--write-deck", metavar="DIR", type=shared.FILE,
-            help="Write a copy of --deck with the cards of the windows into this folder, and check it.",
-        ),
+    """``--deck``, ``--weights`` and ``--write-deck``."""
+    write = click.option(
+        "--write-deck", metavar="DIR", type=shared.FILE,
+        help="Write a copy of --deck with the cards of the windows into this folder, and check it.",
     )  # fmt: skip
-    for option in reversed(options):
-        function = option(function)
-    return function
+    return cost_options(write(function))
 
 
 def check_usage(deck: str | None, folder: str | None) -> None:
-    """Raise UsageError where one of the two options stands alone."""
-    if (deck is None) != (folder is None):
-        given, missing = ("--write-deck", "--deck") if deck is None else ("--deck", "--write-deck")
-        raise click.UsageError(f"{given} needs {missing}: the deck, and the folder for its copy with the cards")
+    """Raise UsageError where there is no deck to be copied."""
+    if folder is not None and deck is None:
+        raise click.UsageError("--write-deck needs --deck, the deck that is copied with the cards")
 
 
 def for_deck(options: dict[str, Any]) -> dict[str, Any]:

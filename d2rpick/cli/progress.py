@@ -5,7 +5,10 @@ from __future__ import annotations
 import sys
 from contextlib import contextmanager
 from dataclasses import dataclass
+from time import perf_counter
 from typing import TYPE_CHECKING, Final
+
+import click
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -22,8 +25,11 @@ def reading(names: Sequence[str], *, quiet: bool) -> Iterator[None]:
     """
     what = "standard input" if names[0] == "-" else names[0]
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    start = perf_counter()
     with _telling(lambda seconds: f"reading {what}{more} ... {seconds:.0f} s", quiet=quiet):
         yield
+    if click.get_current_context().meta.get("d2rpick.verbose"):
+        click.echo(f"read {what}{more} in {perf_counter() - start:.2f} s", err=True)
 
 
 @dataclass

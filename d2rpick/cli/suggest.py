@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from d2rpick.cli import deck_cost
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.explorer import explorer_of
@@ -46,9 +47,11 @@ Examples:
     show_default=True,
     help="Number of rows in the table; json and csv have all.",
 )
+@deck_cost.cost_options
 @shared.history_options
 @shared.choosing_options
 @card_options
+@shared.MIN_QUALITY
 @shared.output_options(*FORMATS["suggestion"], "card")
 @click.pass_context
 def command(
@@ -57,6 +60,7 @@ def command(
     td: float | None,
     td_window: tuple[float, float] | None,
     limit: int,
+    min_quality: str | None,
     output_format: str,
     exit_zero: bool,
     **options: Any,
@@ -81,8 +85,12 @@ def command(
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
         output = Output.of(options, *run.sources)
+        model = deck_cost.model_of(options)
+        options = deck_cost.with_recommended(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
     answer = suggest_of(reference, td_window if td is None else td, settings)
+    answer = answer._replace(cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
         from d2rpick.report import figures, figures_choice
@@ -90,11 +98,13 @@ def command(
         output.write(extras.plot, figures.render(figures_choice.draw_suggestion(answer), extras.plot))
     if extras.report:
         output.write(extras.report, text_bytes(with_options(_page(answer, reference, options))))
+    poor = shared.falls_short(answer.quality, min_quality)
     if output_format == "card":
-        return finish(ctx, objection=not _card(answer, run, options, output), exit_zero=exit_zero)
+        passed = _card(answer, run, options, output)
+        return finish(ctx, objection=not passed or poor, exit_zero=exit_zero)
     text = write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit))
     output.result(in_words(text, output_format))
-    return finish(ctx, objection=answer.recommended is None, exit_zero=exit_zero)
+    return finish(ctx, objection=answer.recommended is None or poor, exit_zero=exit_zero)
 
 
 def _only_in_environment(ctx: click.Context, option: str, *, overruled_by: str) -> bool:

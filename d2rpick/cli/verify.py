@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from d2rpick.cli import deck_cost
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
 from d2rpick.cli.explorer import explorer_of
@@ -52,14 +53,16 @@ class _Verify(click.Command):
     type=shared.FILE,
     help="Compare a finished switched run with the reference; takes all names up to the next option.",
 )
+@deck_cost.cost_options
 @shared.history_options
 @shared.choosing_options
 @card_options
+@shared.MIN_QUALITY
 @shared.output_options(*FORMATS["verdict"])
 @click.pass_context
 def command(
-    ctx: click.Context, /, tr: float, td: float, switched: tuple[str, ...], output_format: str, exit_zero: bool,
-    **options: Any,
+    ctx: click.Context, /, tr: float, td: float, switched: tuple[str, ...], min_quality: str | None, output_format: str,
+    exit_zero: bool, **options: Any,
 ) -> None:  # fmt: skip
     """Judge one pair of switch times against the HISTORY of a run without switching."""
     from d2rpick.choice.of_run import Reference, compare_with, verify_of
@@ -67,15 +70,20 @@ def command(
     prints = prints_card(options, output_format)
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
     extras = shared.Extras.of(options)
-    finished = shared.Reading.of(options)._replace(names=switched) if switched else None
     with reading(asked.names, quiet=asked.quiet):
-        run, other = asked.open(), finished.open() if finished else None
+        run = asked.open()
+        model = deck_cost.model_of(options)
+        options = deck_cost.with_recommended(run, options, settings, model)
+        finished = shared.Reading.of(options)._replace(names=switched) if switched else None
+        other = finished.open() if finished else None
         output = Output.of(options, *run.sources, *(other.sources if other else ()))
         reference = Reference(run, energy_of(run, options, prints=prints))
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
     answer = verify_of(reference, tr, td, settings)
     if other and finished:
         with reading(finished.names, quiet=asked.quiet):
             answer = compare_with(answer, reference, reference.like(other, finished.selection))
+    answer = answer._replace(cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
         from d2rpick.report import figures, figures_choice
@@ -85,7 +93,8 @@ def command(
         output.write(extras.report, text_bytes(with_options(_page(answer, reference, other, options))))
     text = write("verdict", output_format, answer, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))
-    finish(ctx, objection=not answer.verified, exit_zero=exit_zero)
+    poor = not answer.verified or shared.falls_short(answer.quality, min_quality)
+    finish(ctx, objection=poor, exit_zero=exit_zero)
 
 
 def _page(answer: Verdict, reference: Reference, switched: Run | None, options: dict[str, Any]) -> str:

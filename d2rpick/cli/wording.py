@@ -11,7 +11,10 @@ OPTIONS: Final = {
     "energy": "--energy",
     "fit_window": "--fit-window",
     "parts": "--part",
+    "td": "--td",
+    "td_window": "--td-window",
     "time": "--time",
+    "tr": "--tr",
     "write_as": "--write-as",
 }
 _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}

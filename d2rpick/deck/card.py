@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Transform:
-    """What ``*INCLUDE_TRANSFORM`` does to a file: offsets of its ids, factor of its times."""
+    """What ``*INCLUDE_TRANSFORM`` does to a file: offsets of its ids, factor of its times.
+
+    ``scaled``: any unit of the file is another one.
+    """
 
     node: int = 0
     part: int = 0
@@ -24,6 +27,7 @@ class Transform:
     set_: int = 0
     rest: int = 0
     time: float = 1.0
+    scaled: bool = False
 
     def inside(self, outer: Transform) -> Transform:
         """Return this transform of a file that is itself included by a transformed one."""
@@ -34,6 +38,7 @@ class Transform:
             self.set_ + outer.set_,
             self.rest + outer.rest,
             self.time * outer.time,
+            self.scaled or outer.scaled,
         )
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.rows import Field, Problem, Row
 
 _CONTINUED = " +"
+_FACTORS, _OF_TIME = 3, 1  # of mass, time and length
 UNKNOWN_KIND = "this kind of include is not read"
 
 
@@ -64,11 +65,13 @@ def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, .
     """Numbers of ``*INCLUDE_TRANSFORM``; a row left out, a blank and a factor 0 mean no change."""
     places = ((0, 0), (0, 2), (0, 3), (0, 4), (1, 0))
     offsets = [card.integer(rows[row], position) if row < len(rows) else None for row, position in places]
-    factor = card.real(rows[2], 1, 1.0) if len(rows) > 2 else None
+    factors = [card.real(rows[2], at, 1.0) for at in range(_FACTORS)] if len(rows) > 2 else []
+    factor = factors[_OF_TIME] if factors else None
     node, part, material, set_, rest = (value.value if value else 0 for value in offsets)
     time = (factor.value if factor else 0.0) or 1.0
     problems = tuple((value.field, value.problem) for value in (*offsets, factor) if value and value.problem)
-    return Transform(node, part, material, set_, rest, time), problems
+    scaled = any(one.value not in (0.0, 1.0) for one in factors)
+    return Transform(node, part, material, set_, rest, time, scaled), problems
 
 
 class Folders:

@@ -73,6 +73,11 @@ class Drift:
         inside = (tr >= self.time[0]) & (tr <= self.time[-1]) & (self.time[0] <= td <= self.time[-1])
         return np.where(inside, np.linalg.norm(there[:-1] - there[-1], axis=1), np.nan)
 
+    @property
+    def name(self) -> str:
+        """Title of the part, or its number."""
+        return self.part.title or f"part {self.part.id}"
+
     @cached_property
     def limit(self) -> float:
         """From which error on the body is out of place [length]."""
@@ -208,7 +213,7 @@ def drift_in_flight(history: History, flight: Flight, parts: Sequence[Part] | No
         return None
     flying = {part.id for part in flight.parts}
     wanted = {momenta.parts[i].id for i in momenta.chosen} if parts is None else {part.id for part in parts}
-    members = [i for i, part in enumerate(momenta.parts) if part.id in flying & wanted]
+    members = [i for i in momenta.moving if momenta.parts[i].id in flying & wanted]  # the ground does not fly
     start, end = (
         bound if seen is None else seen for bound, seen in zip(momenta.time[[0, -1]], flight[:2], strict=True)
     )

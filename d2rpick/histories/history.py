@@ -184,7 +184,8 @@ class History:
 
     ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.
     Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
-    in them was taken for the energy, ``parts`` whose energy it is, None for the whole model.  ``complete``
+    in them was taken for the energy, ``parts`` whose energy it is, None for the whole model;
+    ``springs`` are those of them whose energy is left out.  ``complete``
     is False when a file stopped inside a state; ``notes`` say in plain sentences what was left out or assumed.
     ``files`` are the contents that were read.
     Where the energy is a sum, ``part_names`` (k,) and ``part_energies`` (n, k) are its terms that are not always zero.
@@ -198,6 +199,7 @@ class History:
     format: str
     channel: str
     parts: tuple[Part, ...] | None = None
+    springs: tuple[Part, ...] = ()
     time_precision: Precision = EXACT
     energy_precision: Precision = EXACT
     time_unit: str = ""
@@ -269,18 +271,27 @@ class History:
     def _turns(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         return find_turns(self.energy)
 
-    def energy_at(self, time: float) -> float:
-        """Energy at ``time``, linear between the states; RangeError outside the record."""
+    def energy_at(self, time: float, argument: str = "") -> float:
+        """Energy at ``time``, linear between the states; RangeError outside the record, naming the ``argument``."""
         if not self.time[0] <= time <= self.time[-1]:
             span = f"{self.time[0]:g} to {self.time[-1]:g}"
             from d2rpick.histories.legs import later_legs  # not above: pathlib costs start-up
 
             legs = later_legs(self.source) if time > self.time[-1] else []
             more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
+            more = more or (self._in_another_unit(time, argument) if argument else "")
             raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}{more}")
         before = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
         cell = slice(before, before + 2)  # of whole arrays that are read-only, numpy would make copies
         return float(np.interp(time, self.time[cell], self.energy[cell]))
+
+    def _in_another_unit(self, time: float, argument: str) -> str:
+        """Ask whether an argument was given in another unit, in which it lies in the record."""
+        for unit, size in (("ms", 1e-3), ("us", 1e-6)):
+            value = float(f"{time * size:.12g}")
+            if value > 0 and self.time[0] <= value <= self.time[-1]:
+                return f"; was it meant in {unit}? Then give `{argument}` {value:g}, in the unit of the record"
+        return ""
 
     def energies_at(self, times: Samples) -> Samples:
         """Energies at many times within the record, linear between the states, of their shape."""

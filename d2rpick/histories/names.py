@@ -193,6 +193,19 @@ def resolve(wanted: str, known: Sequence[str], where: str) -> str:
     raise FormatError(f"{where}: no {wanted!r}{near_miss(wanted, known)}; there are: {listing(known)}")
 
 
+def in_seconds(text: str) -> float | None:
+    """Read a time that is given with its unit [s]; None where it is none.
+
+    Examples
+    --------
+    >>> in_seconds("64ms"), in_seconds("0.064 s"), in_seconds("64"), in_seconds("forms")
+    (0.064, 0.064, None, None)
+    """
+    found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|ms|us|µs)\s*", text, re.ASCII)
+    sizes = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
+    return float(f"{float(found[1]) * sizes[found[2]]:.12g}") if found else None
+
+
 def near_miss(wanted: str, known: Sequence[str]) -> str:
     """Ask for the name that was perhaps meant, or say nothing."""
     import difflib

@@ -127,6 +127,19 @@ class Run:
         found = next((one for one in self.momenta(parts, None) if (one.parts is not None) == of_parts), None)
         return Track(found.time, found.of(found.chosen)) if found else None
 
+    @cached_property
+    def springs(self) -> tuple[Part, ...]:
+        """Parts of springs and dampers, as far as their energies tell."""
+        from d2rpick.histories.springs import springs_among
+
+        holder = self._with_parts()
+        if holder is None:
+            return ()
+        try:
+            return springs_among(self.databases, self.parts, self.part_energies(self.parts), holder.part_time)
+        except FormatError:  # not in every state
+            return ()
+
     def part_energies(self, parts: Sequence[Part]) -> Samples:
         """Internal energies of some parts, shape (n, parts), at the times of their history [energy]."""
         return self._of_holder("internal_energy", parts)
@@ -163,12 +176,14 @@ class Run:
         if all(database.span is None for database in self.databases):
             raise FormatError(f"{self.name}: no states; did the run reach its first output?")
         if selection.parts:
-            return self._of_parts(select_parts(selection.parts, self._holder().parts, self.name))
+            chosen = select_parts(selection.parts, self._holder().parts, self.name)
+            springs = self.springs if selection.springs is None else _numbered(selection.springs, self.parts)
+            return self._of_parts(chosen, springs)
         if selection.energy:
             return self._of_channels(selection.energy)
         for database in self.databases:
             if database.energy_channel is not None:
-                return self._of_channels((database.energy_channel,))
+                return self._without_springs(database, database.energy_channel)
         return self._of_all_parts()
 
     def _holder(self) -> Legs:
@@ -182,15 +197,37 @@ class Run:
     def _with_parts(self) -> Legs | None:
         return next((database for database in self.databases if database.parts), None)
 
-    def _of_parts(self, chosen: tuple[Part, ...]) -> History:
+    def _of_parts(self, chosen: tuple[Part, ...], springs: tuple[Part, ...] = ()) -> History:
         holder = self._holder()
         energies = self.part_energies(chosen)
+        left_out = np.array([part in springs for part in chosen])
+        if not energies[:, ~left_out].any():  # springs are all that has energy
+            left_out[:] = False
         idle = [part for part, energy in zip(chosen, energies.T, strict=True) if not energy.any()]
         notes = (f"without any internal energy: part {menu(idle)}; rigid, or without elements?",) if idle else ()
-        channel = "internal energy of " + ", ".join(part.title or f"part {part.id}" for part in chosen)
-        names = [part.title or f"part {part.id}" for part in chosen]
+        every = [part.title or f"part {part.id}" for part in chosen]
+        names, apart = ([name for name, out in zip(every, left_out, strict=True) if out == of] for of in (False, True))
+        channel = "internal energy of " + ", ".join(names)
+        if apart:
+            notes = (*notes, _left_out(", ".join(apart)))
+        energies = energies[:, ~left_out]
         history = self._made(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
-        return _with_terms(history, names, energies)
+        return _with_terms(
+            replace(history, springs=tuple(part for part, out in zip(chosen, left_out, strict=True) if out)),
+            names,
+            energies,
+        )
+
+    def _without_springs(self, database: Legs, channel: str) -> History:
+        """Take the energy of the whole model, less that of springs and dampers where it has other energy too."""
+        from d2rpick.histories.springs import spring_energy
+
+        whole, springs = self._of_channels((channel,)), spring_energy(database)
+        if springs is None:
+            return whole
+        rest = whole.energy - springs[1]
+        note = _left_out(f"all springs and dampers, {springs[0]},")
+        return replace(whole, energy=rest, channel=f"{channel} - {springs[0]}", notes=(*whole.notes, note))
 
     def _of_all_parts(self) -> History:
         if not self.parts:
@@ -267,6 +304,14 @@ class _Written:
         from d2rpick.histories.balance_terms import terms_of
 
         return terms_of(self._run)
+
+
+def _left_out(springs: str) -> str:
+    return f"the energy of {springs} was left out: that of springs holds what their dampers take and never give back"
+
+
+def _numbered(ids: Sequence[str], parts: Sequence[Part]) -> tuple[Part, ...]:
+    return tuple(part for part in parts if str(part.id) in ids)
 
 
 def _with_terms(history: History, names: Sequence[str], energies: Samples) -> History:

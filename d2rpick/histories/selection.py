@@ -23,7 +23,8 @@ class Selection(NamedTuple):
     Nothing asked: the time and the internal energy of the whole model.  Several energies, and the energies of
     several parts, are added.  ``flying`` are the parts that are known to fly together with these.  ``channels`` are
     pairs of a quantity (a key of `d2rpick.histories.names.QUANTITIES`) and the name of the channel that holds it, where
-    this is not one of the usual names.
+    this is not one of the usual names.  ``springs`` are the numbers of the parts that are springs or dampers, None
+    where the energies are to tell.
     """
 
     time: str | None = None
@@ -31,6 +32,7 @@ class Selection(NamedTuple):
     parts: tuple[str, ...] = ()
     flying: tuple[str, ...] = ()
     channels: tuple[tuple[str, str], ...] = ()
+    springs: tuple[str, ...] | None = None
 
 
 def select_parts(wanted: Sequence[str], known: Sequence[Part], where: str) -> tuple[Part, ...]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.content import stored
-from d2rpick.histories.names import listing
+from d2rpick.histories.names import in_seconds, listing, near_miss
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 STDIN = "-"
 _GZIP = b"\x1f\x8b"
+_NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
 
 # What solvers call their databases in the folder of a run.
 _DATABASE = r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?"  # compiled where it is needed
@@ -124,10 +125,24 @@ def _read_file(name: str) -> bytes | OnDisk:
     try:
         return stored(name)
     except FileNotFoundError:
-        raise FormatError(f"{name}: no such file; check the name and the folder") from None
+        raise FormatError(f"{name}: no such file{_meant(name)}; check the name and the folder") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
         reason = getattr(error, "strerror", None) or error
         raise FormatError(f"{name}: cannot be read ({reason}); check the name and the permissions") from None
+
+
+def _meant(name: str) -> str:
+    """Ask for the file beside it that has nearly this name, or whether it is a time."""
+    seconds = in_seconds(name)
+    if seconds is not None or _NUMBER.fullmatch(name):
+        value = "" if seconds is None else f", {seconds:g} where it is s"
+        return f", and a time is given as `td`, a number in the unit of the record{value}"
+    folder, wanted = os.path.split(name)
+    try:
+        beside = os.listdir(folder or ".")  # noqa: PTH208  not pathlib: start-up
+    except OSError:
+        return ""
+    return near_miss(wanted, beside)
 
 
 def _unpacked(name: str, packed: bytes | OnDisk) -> Source:

@@ -1,45 +1,55 @@
-"""What switching saves: a formula with its inputs, for the published figures and for runs that were measured.
+"""What switching saves: the one cost model, held against the published saving and against runs that were measured.
 
-The run takes 1 - f (1 - (1 - c)/n) of the time without switching (`measures.run_time_share`): f is the rigid fraction
-of the run, c the share of the switched elements in the cost of a step, n the step while rigid over that before.  c is
-the share of all elements in a step times that of the switched ones among them, weighted by their cost.
+The formulas stand in `d2rpick.choice.cost` (share c of a step) and `d2rpick.vibration.measures.run_time_share`.
 """
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.choice.cost import Weights, saved_share
 from d2rpick.models.exhibit import Curve, Exhibit, Panel
 from d2rpick.vibration.measures import run_time_share
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 # Hours of the pick-up truck without and with switching; neither its times nor its elements are published.
 PICK_UP: Final = (25.5, 6.5)
-# Of a step of the car: elements over all work, from legs with and without them.
-_ELEMENTS_OF_STEP: Final = 0.87
 # Step while everything is rigid (capped) over that while deformable, 20.00 of 21.54 us.
 _CAPPED: Final = 20.00 / 21.54
 
 
 class Run(NamedTuple):
-    """A run whose processor time was measured with and without switching."""
+    """A run whose processor time was measured with and without switching; ``rigid`` are elements by formulation."""
 
     name: str
     rigid_fraction: float
-    element_share: float
-    element_cost: float
+    rigid: Mapping[str, int]
+    nodes: int
     step_ratio: float
     measured: float
 
     def predicted(self, share: float) -> float:
-        """Saving when the switched elements take ``share`` of the cost of a step [-]."""
+        """Saving when ``share`` of the cost of a step is saved [-]."""
         return 1 - run_time_share(self.rigid_fraction, share, self.step_ratio)
 
     @property
+    def element_share(self) -> float:
+        """Share of the elements that are rigid [-]."""
+        return sum(self.rigid.values()) / sum(_CAR.values())
+
+    @property
+    def cost_share(self) -> float:
+        """Share of a step that is saved, by the cost model [-]."""
+        return saved_share(_WEIGHTS, _cost(_CAR), _cost(self.rigid), self.nodes)
+
+    @property
     def by_cost(self) -> float:
-        """Saving with elements weighted by their cost and by the share of elements in a step [-]."""
-        return self.predicted(_ELEMENTS_OF_STEP * self.element_cost)
+        """Saving by the cost model [-]."""
+        return self.predicted(self.cost_share)
 
     @property
     def by_count(self) -> float:
@@ -47,13 +57,21 @@ class Run(NamedTuple):
         return self.predicted(self.element_share)
 
 
-# A car of 16 parts, 1516 elements, rigid for 96.8 of 240 ms; processor time of OpenRadioss 2026-08, one thread.
+def _cost(elements: Mapping[str, int]) -> float:
+    return sum(_WEIGHTS.per_element[name] * count for name, count in elements.items())
+
+
+# A car of 17 parts on an obstacle of 309 shells, rigid for 96.8 of 240 ms; processor time of OpenRadioss 2026-08, one
+# thread.
+_WEIGHTS: Final = Weights()
 _RIGID: Final = 0.0968 / 0.24
+_BODY: Final = {"QEPH": 764, "QBAT": 154, "BT": 258, "beam": 60, "solid": 160, "spring": 120}
+_CAR: Final = {**_BODY, "BT": 258 + 309}
 RUNS: Final = (
-    Run("all parts", _RIGID, 1.000, 0.970, _CAPPED, 0.306),
-    Run("all but the part that lands first", _RIGID, 0.959, 0.893, 1.0, 0.270),
-    Run("parts that have stopped deforming", _RIGID, 0.544, 0.382, 1.0, 0.126),
-    Run("heavy parts", _RIGID, 0.149, 0.219, 1.0, 0.075),
+    Run("all parts", _RIGID, _BODY, 1450, _CAPPED, 0.306),
+    Run("all but the part that lands first", _RIGID, {**_BODY, "QBAT": 92}, 1408, 1.0, 0.270),
+    Run("parts that have stopped deforming", _RIGID, {"QEPH": 764, "beam": 60}, 839, 1.0, 0.126),
+    Run("heavy parts", _RIGID, {"solid": 160, "beam": 18, "QEPH": 48}, 361, 1.0, 0.075),
 )
 
 

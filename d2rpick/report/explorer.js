@@ -7,6 +7,10 @@
   const find = (selector) => section.querySelector(selector);
   const typed = find("#explorer-td"), said = find(".said"), chooser = find("#explorer-flight");
   const charts = {};
+  const named = (names, values) => Object.fromEntries(names.map((name, i) => [name, values[i]]));
+  for (const one of data.flights) {
+    one.rows = one.rows.map(([numbers, texts]) => ({ ...named(one.numbers, numbers), text: named(one.texts, texts) }));
+  }
   let flight = data.flights[data.flight], row = flight.rows[flight.start];
 
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
@@ -31,8 +35,8 @@
     context.lineTo(at(x), box.top + box.height);
     context.stroke();
   });
-  const band = (chart, name, from, to, share = 1) => mark(chart, name, 1, (context, at, _, box) => {
-    context.fillRect(at(from), box.top + (1 - share) * box.height, at(to) - at(from), share * box.height);
+  const band = (chart, name, from, to) => mark(chart, name, 1, (context, at, _, box) => {
+    context.fillRect(at(from), box.top, at(to) - at(from), box.height);
   });
   const dot = (chart, x, y) => mark(chart, "switched", 2.5, (context, at, height) => {
     context.arc(at(x), height(y), 6 * devicePixelRatio, 0, 2 * Math.PI);
@@ -43,7 +47,14 @@
     energy: {
       below: (chart) => band(chart, "flight", ...flight.flight),
       above: (chart) => {
-        row.windows.forEach(([from, to]) => band(chart, "good", from, to, 0.05));
+        mark(chart, "good", 1, (context, at, _, box) => {
+          const columns = 4 * row.windows.length, left = at(flight.view[0]), width = (at(flight.view[1]) - left) / columns;
+          const marked = (i) => i < columns && (parseInt(row.windows[i >> 2], 16) & (8 >> (i & 3))) !== 0;
+          for (let from = 0, to = 0; from < columns; from = to + 1) {
+            for (to = from; marked(to); to += 1);
+            context.fillRect(left + from * width, box.top + 0.95 * box.height, (to - from) * width, 0.05 * box.height);
+          }
+        });
         mark(chart, "switched", 1.5, (context, _, height, box) => {
           context.moveTo(box.left, height(row.level));
           context.lineTo(box.left + box.width, height(row.level));
@@ -125,7 +136,7 @@
   // Errors over rigid time, those of pairs that another one beats and of the others.
   function trade() {
     const known = flight.rows.filter((one) => one.error !== null).sort((one, other) => one.rigid - other.rigid);
-    const column = (unbeaten) => known.map((one) => one.unbeaten === unbeaten ? one.error : null);
+    const column = (unbeaten) => known.map((one) => Boolean(one.unbeaten) === unbeaten ? one.error : null);
     return [known.map((one) => one.rigid), column(false), column(true)];
   }
 
@@ -151,7 +162,7 @@
     said.textContent = message;
     typed.value = row.text.td;
     const first = flight.rows[0], last = flight.rows[flight.rows.length - 1];
-    Object.entries({ valuemin: first.td, valuemax: last.td, valuenow: row.td, valuetext: row.text.spoken })
+    Object.entries({ valuemin: first.td, valuemax: last.td, valuenow: row.td, valuetext: `td ${row.text.td}, tr ${row.text.tr}, ${row.text.said}` })
       .forEach(([name, value]) => handle.setAttribute(`aria-${name}`, value));
     section.querySelectorAll("[data-value]").forEach((place) => {
       const text = place.dataset.value === "command" ? data.command.join(row.text.exact_td) : row.text[place.dataset.value] ?? "";
@@ -206,18 +217,22 @@
     show(next, Number(next.text.td) === td || next.td === td ? "" : `${text}: ${what}; the nearest is ${next.text.td}.`);
   }
 
+  // Dragging goes on where the pointer leaves the chart.
+  let dragging = null;
+  const toPointer = (event) => show(nearest(charts.energy.posToVal(event.clientX - charts.energy.over.getBoundingClientRect().left, "x")));
+  document.addEventListener("pointermove", (event) => event.pointerId === dragging && toPointer(event));
+  for (const name of ["pointerup", "pointercancel"]) document.addEventListener(name, () => { dragging = null; });
+
   // Pointers: anywhere in the energy, and at a point of the trade-off.
   function listen() {
     const over = charts.energy.over;
     over.append(handle);
-    const toPointer = (event) => show(nearest(charts.energy.posToVal(event.clientX - over.getBoundingClientRect().left, "x")));
     over.addEventListener("pointerdown", (event) => {
-      over.setPointerCapture(event.pointerId);
+      dragging = event.pointerId;
       handle.focus({ preventScroll: true });
       toPointer(event);
       event.preventDefault();
     });
-    over.addEventListener("pointermove", (event) => over.hasPointerCapture(event.pointerId) && toPointer(event));
     charts.trade.over.addEventListener("click", (event) => {
       const box = charts.trade.over.getBoundingClientRect();
       const away = (one) => Math.hypot(
@@ -235,7 +250,7 @@
     event.preventDefault();
     step(by);
   });
-  typed.addEventListener("change", () => type(typed.value));
+  typed.addEventListener("change", () => typed.value !== row.text.td && type(typed.value));
   typed.addEventListener("keydown", (event) => {
     const by = { ArrowUp: 1, ArrowDown: -1 }[event.key];
     if (event.key === "Enter") type(typed.value);

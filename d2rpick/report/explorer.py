@@ -16,7 +16,7 @@ import numpy as np
 from d2rpick.choice.replayed import locked_in, response
 from d2rpick.choice.view import scale_of, view_of
 from d2rpick.histories.outline import outline
-from d2rpick.report.explorer_rows import VALUES, error_name, row_of
+from d2rpick.report.explorer_rows import VALUES, error_name, row_of, table_of
 from d2rpick.report.html import Markup, join, resource, tag
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def explorer(shown: Explorer) -> Markup:
         _controls(shown.trade_offs),
         tag(
             "div",
-            *_columns(flights, any(row["windows"] for flight in flights for row in flight["rows"])),
+            *_columns(flights, any("windows" in flight["texts"] for flight in flights)),
             class_="panels",
         ),
         tag("h3", "To repeat this"),
@@ -113,7 +113,7 @@ def _controls(trade_offs: Sequence[TradeOff]) -> Markup:
 
 def _values(flights: Sequence[Mapping[str, Any]]) -> Markup:
     """What is known of the pair in sight; what no pair has is left out."""
-    known = {name for flight in flights for row in flight["rows"] for name, text in row["text"].items() if text}
+    known = {name for flight in flights for name in flight["texts"]}
     times = (tag("span", tag("i", name), tag("b", data_value=name)) for name in ("tr", "td"))
     full = (tag("span", f"{name} = ", tag("b", data_value=f"exact_{name}")) for name in ("tr", "td"))
     listed = (tag("div", tag("dt", name), tag("dd", data_value=key)) for key, name in VALUES.items() if key in known)
@@ -176,7 +176,7 @@ def _flight(found: TradeOff) -> dict[str, Any]:
         "whole": [_brief(column) for column in whole],
         "motion": _motion(situation),
         "start": found.offers.index(first),
-        "rows": [row_of(one, first, unit, _locked(situation, one)) for one in found.offers],
+        **table_of([row_of(one, first, seen, unit, _locked(situation, one)) for one in found.offers]),
     }
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
 
 from d2rpick.report.suggestion import acceptable
 from d2rpick.report.tables import measure, short
@@ -12,6 +14,8 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.offer import Offer
+    from d2rpick.choice.suggest import AcceptableWindow
+    from d2rpick.choice.view import View
 
 # What is listed of a pair, by key, in this order.
 VALUES: Final[Mapping[str, str]] = {
@@ -28,24 +32,42 @@ VALUES: Final[Mapping[str, str]] = {
     "windows": "acceptable tr",
     "reason": "no tr",
 }
+# Columns in which windows of acceptable tr are drawn, a multiple of eight.
+COLUMNS: Final = 480
 # Digits of a difference that people read.
 _READ: Final = 3
 
 
-def row_of(offer: Offer, start: Offer, unit: str, deformation: float | None) -> dict[str, Any]:
-    """Give one td: numbers for the curves, and in ``text`` what stands beside them.
+class Row(NamedTuple):
+    """One td: ``numbers`` for the curves, and ``texts``, what stands beside them; both by name."""
+
+    numbers: dict[str, Any]
+    texts: dict[str, str]
+
+
+def table_of(rows: Sequence[Row]) -> dict[str, Any]:
+    """Give rows with their names written once: ``numbers`` and ``texts``, and in ``rows`` the values of both."""
+    texts = list(dict.fromkeys(name for row in rows for name, text in row.texts.items() if text))
+    values = [[list(row.numbers.values()), [row.texts.get(name, "") for name in texts]] for row in rows]
+    return {"numbers": list(rows[0].numbers), "texts": texts, "rows": values}
+
+
+def row_of(offer: Offer, start: Offer, view: View, unit: str, deformation: float | None) -> Row:
+    """Give one td.
 
     Parameters
     ----------
     offer, start : Offer
         The td, and the one that is shown first, with which it is compared.
+    view : View
+        What is in sight.
     unit : str
         Of the time, where it is known.
     deformation : float or None
         What the recommended tr locks in [square root of energy].
     """
     best = offer.best
-    return {
+    numbers = {
         "td": offer.td,
         "tr": None if best is None else _brief(best.tr),
         "level": _brief(offer.energy_td),
@@ -53,11 +75,24 @@ def row_of(offer: Offer, start: Offer, unit: str, deformation: float | None) -> 
         "deformation": None if deformation is None else _brief(deformation),
         "rigid": _brief(100 * best.rigid_fraction) if best else None,
         "error": None if offer.error is None else _brief(offer.error),
-        "windows": [[_brief(one.start), _brief(one.end)] for one in offer.windows or ()],
-        "peak": offer.peak,
-        "unbeaten": offer.unbeaten,
-        "text": {name: text for name, text in _texts(offer, start, f" {unit}" if unit else "").items() if text},
+        "windows": _columns(offer.windows or (), view),
+        "peak": int(offer.peak),
+        "unbeaten": int(offer.unbeaten),
     }
+    return Row(numbers, _texts(offer, start, f" {unit}" if unit else ""))
+
+
+def _columns(windows: Sequence[AcceptableWindow], view: View) -> str:
+    """Mark the columns of the view that windows touch, a bit each, in hexadecimal digits; empty without a window.
+
+    However many windows noise makes, this is short, and finer than a screen shows.
+    """
+    ends = np.array([(one.start, one.end) for one in windows]).reshape(-1, 2)
+    first, last = np.clip((ends - view.start) / (view.end - view.start) * COLUMNS, 0, COLUMNS - 1).astype(int).T
+    marked = np.zeros(COLUMNS, dtype=bool)
+    for low, high in zip(first.tolist(), last.tolist(), strict=True):
+        marked[low : high + 1] = True
+    return np.packbits(marked).tobytes().hex() if marked.any() else ""
 
 
 def _brief(value: float) -> float:
@@ -72,12 +107,10 @@ def error_name(offers: Sequence[Offer]) -> str:
 
 def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:
     """Everything that is said of a td, as ``suggest --td`` prints it; empty where it is not known."""
-    best, td = offer.best, short(offer.td)
-    tr = short(best.tr) if best else "none"
-    quality = offer.quality
+    best, quality = offer.best, offer.quality
     return {
-        "td": td,
-        "tr": tr,
+        "td": short(offer.td),
+        "tr": short(best.tr) if best else "none",
         "exact_td": repr(offer.td),
         "exact_tr": repr(best.tr) if best else "none",
         "level": short(offer.energy_td),
@@ -86,7 +119,7 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:
         "reason": offer.reason or "",
         **(_of_best(offer, best, unit) if best else {}),
         "compared": _compared(offer, start, unit),
-        "spoken": f"td {td}{unit}, tr {tr}{unit}{_said(offer)}",
+        "said": _said(offer),
     }
 
 
@@ -109,10 +142,10 @@ def _said(offer: Offer) -> str:
     """What is said of the quality to who listens."""
     best = offer.best
     if best is None:
-        return ", no acceptable tr"
+        return "nothing acceptable"
     if best.residual is not None:
-        return f", residual {measure(best.residual)}"
-    return f", {offer.quality.grade}" if offer.quality else ""
+        return f"residual {measure(best.residual)}"
+    return offer.quality.grade if offer.quality else ""
 
 
 def _compared(offer: Offer, start: Offer, unit: str) -> str:

@@ -30,6 +30,8 @@ REFERENCE, SWITCHED, GOOD, FLIGHT = "#000000", "#d55e00", "#009e73", "#56b4e9"
 SIZES: Final = {False: (10.0, 4.0, 6.5), True: (4.2, 3.9, 6.6)}
 # Share of the axes that the label of a switch time takes up, at most.
 LABEL: Final = {False: 0.14, True: 0.3}
+# Stretches of a curve, each with its lowest and highest value: as many as paper and screen tell apart.
+STRETCHES: Final = 400
 # Of a name from a file, what fits into a legend; in full it stands in the result.
 _LONGEST_NAME = 28
 

@@ -7,9 +7,20 @@ from typing import TYPE_CHECKING, Final
 from matplotlib.figure import Figure
 
 from d2rpick.choice.replayed import replayed_motion
-from d2rpick.choice.view import scale_of, view_of
+from d2rpick.choice.view import merged, scale_of, view_of
 from d2rpick.histories.outline import outline
-from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SIZES, SWITCHED, finish, mark_times, plain, show_span
+from d2rpick.report.figures import (
+    FLIGHT,
+    GOOD,
+    REFERENCE,
+    SIZES,
+    STRETCHES,
+    SWITCHED,
+    finish,
+    mark_times,
+    plain,
+    show_span,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,8 +36,6 @@ if TYPE_CHECKING:
 
 # Up to so many candidates are told apart as marks; beyond, what is acceptable is a band.
 _FEW: Final = 20
-# Stretches of the curve, each with its lowest and highest energy: more than a screen has columns for.
-_STRETCHES: Final = 600
 # Share of the axes at their foot in which the band lies, clear of the curve.
 _BAND: Final = 0.045
 
@@ -94,14 +103,14 @@ def _draw_energy(
     bands: Sequence[tuple[float, float]],
 ) -> None:
     history, level, flight, span = situation.history, situation.energy_td, situation.flight, situation.evidence.span
-    drawn = outline(*history.between(seen.start, seen.end), stretches=_STRETCHES)
+    drawn = outline(*history.between(seen.start, seen.end), stretches=STRETCHES)
     if flight.start is not None:
         known = span.end if span else situation.td  # without a contact, as far as it was seen
         end = known if flight.end is None else flight.end
         axes.axvspan(flight.start, end, color=FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
     axes.plot(*drawn, color=REFERENCE, linewidth=1, label=plain(history.channel))
     axes.axhline(level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
-    for number, band in enumerate(bands):
+    for number, band in enumerate(merged(bands, (seen.end - seen.start) / STRETCHES)):
         label = "_" if number else "acceptable tr"
         axes.axvspan(*band, ymax=_BAND, facecolor=GOOD, linewidth=0, label=label)
     for acceptable, fill, name in ((True, GOOD, "acceptable"), (False, "none", "not acceptable")):

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, finish
+from d2rpick.histories.outline import outline
+from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, STRETCHES, SWITCHED, finish
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +24,8 @@ def draw_trade_off(found: TradeOff, *, narrow: bool = False) -> Figure:
     figure = Figure(figsize=_SIZES[narrow], layout="constrained")
     energy, error, rigid = figure.subplots(3, sharex=True)
     history = found.situation.history
-    energy.plot(*history.between(*found.td_window), color=REFERENCE, linewidth=1)
+    inner = history.between(*found.td_window)
+    energy.plot(*outline(*inner, stretches=STRETCHES), color=REFERENCE, linewidth=1)
     energy.set(ylabel="internal energy")
     by_energy = bool(found.offers) and all(one.basis == "energy" for one in found.offers)
     _curve(error, found, [one.error for one in found.offers])
@@ -46,5 +48,5 @@ def _curve(axes: Axes, found: TradeOff, values: list[float | None]) -> None:
     td = np.array([one.td for one in found.offers])
     shown = np.array([np.nan if value is None else value for value in values])
     best = np.array([one.unbeaten for one in found.offers], dtype=bool)
-    axes.plot(td, shown, ".-", color=REFERENCE, linewidth=0.6, markersize=2, label="best pair for each td")
+    axes.plot(td, shown, color=REFERENCE, linewidth=0.8, label="best pair for each td")
     axes.plot(td[best], shown[best], "o", color=GOOD, markersize=4, label="nothing beats it")

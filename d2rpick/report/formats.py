@@ -39,6 +39,7 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         **_PLAIN,
         "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
+        "ndjson": lambda report, answer, shown: report.as_ndjson(answer, shown.command),
         "value": lambda report, answer, _: report.as_value(answer),
     },
     "plan": {**_PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
@@ -47,6 +48,8 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
     },
+    "parts": {**_PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
+    "calibration": {**_PLAIN, "toml": lambda report, answer, _: report.as_toml(answer)},
     "verdict": _PLAIN,
     "overview": _PLAIN,
     "study": {
@@ -76,6 +79,6 @@ def write(result: str, form: str, answer: Any, shown: Shown) -> str:
     Examples
     --------
     >>> list(FORMATS["suggestion"])
-    ['table', 'json', 'csv', 'markdown', 'value']
+    ['table', 'json', 'csv', 'markdown', 'ndjson', 'value']
     """
     return FORMATS[result][form](import_module(f"d2rpick.report.{result}"), answer, shown)

@@ -11,7 +11,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.health import Health
 
 
-HEAD = ("health", "this run", "practice", "verdict")
+def head(health: Health) -> tuple[str, ...]:
+    """Names of the columns of a table of health; the first says up to when the run was judged."""
+    return "health" if health.until is None else f"health up to {health.until:.6g}", "this run", "practice", "verdict"
 
 
 class Measure(NamedTuple):

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.health import Health
+    from d2rpick.choice.quality import Quality
     from d2rpick.choice.suggest import Pair
     from d2rpick.choice.verify import Verdict
     from d2rpick.choice.warnings import Caution
@@ -74,6 +75,8 @@ CANDIDATE: Final[Mapping[str, Callable[[Candidate], Any]]] = {
     "run_time_share": lambda c: c.run_time_share,
     "same_swing": lambda c: c.same_swing,
     "residual_high": lambda c: c.residual_high,
+    "position_error": lambda c: c.position_error,
+    "position_error_part": lambda c: c.position_error_part,
 }
 
 
@@ -86,6 +89,7 @@ def of_candidate(candidate: Candidate) -> dict[str, Any]:
 MEASURES: Final = (
     *("energy", "energy_ratio", "level_error", "sign_match", "lock_in_error", "residual", "residual_high"),
     *("part_mismatch", "timing_tolerance", "rigid_time", "rigid_fraction", "run_time_share"),
+    *("position_error", "position_error_part"),
 )
 
 
@@ -99,6 +103,14 @@ def of_verdict(verdict: Verdict) -> dict[str, Any]:
         "tr_ok": verdict.tr_ok,
         "td_ok": verdict.td_ok,
         "verified": verdict.verified,
+    }
+
+
+def of_quality(quality: Quality | None) -> dict[str, Any]:
+    """The grade of a pair and why it is none better; null without a pair."""
+    return {
+        "quality": quality.grade if quality else None,
+        "quality_reasons": list(quality.reasons) if quality else None,
     }
 
 
@@ -141,6 +153,7 @@ def of_health(health: Health | None) -> dict[str, Any] | None:
         "window_eroded": health.window_eroded,
         "reason": health.reason,
         "window_reason": health.window_reason,
+        "until": health.until,
     }
 
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.health import HEAD as HEALTH_HEAD
-from d2rpick.report.health import measures_of
+from d2rpick.report.health import head, measures_of
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
@@ -29,8 +28,8 @@ def as_table(overview: Overview) -> str:
     lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in rows]
     if overview.parts:
         lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview))]
-    if health := _health(overview):
-        lines += ["", tables.as_text(HEALTH_HEAD, health)]
+    if overview.health and (health := _health(overview)):
+        lines += ["", tables.as_text(head(overview.health), health)]
     return "\n".join([*lines, *(f"note: {printable(note)}" for note in overview.notes)])
 
 
@@ -38,7 +37,8 @@ def as_markdown(overview: Overview) -> str:
     """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
     facts = tables.as_markdown(("what", "value"), _rows(overview))
     parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
-    health = [tables.as_markdown(HEALTH_HEAD, _health(overview))] if _health(overview) else []
+    listed = _health(overview)
+    health = [tables.as_markdown(head(overview.health), listed)] if overview.health and listed else []
     return "\n\n".join([facts, *parts, *health, *(f"* {printable(note)}" for note in overview.notes)])
 
 

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.explorer import scripts, styles
 from d2rpick.report.health import measures_of
-from d2rpick.report.html import Markup, document, pairs, resource, section, table, tag
+from d2rpick.report.html import Markup, document, join, pairs, resource, section, table, tag
 from d2rpick.report.situation import heading
-from d2rpick.report.tables import measure, short
+from d2rpick.report.tables import short
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.health import Health
     from d2rpick.choice.judged_card import SolverInput
     from d2rpick.choice.situation import Situation
@@ -53,24 +52,22 @@ def run_page(run: Run, sections: Iterable[Markup], explored: Explorer | None = N
     return document(f"Switch times: {name}", *sections, signed=("chosen by", "date", "signature"), **needed)
 
 
-def pair(title: str, times: tuple[float, float], told: Sequence[str], history: History, class_: str) -> Markup:
-    """Show (tr, td) large, what is ``told`` of them in lines, how long that is rigid, and the times in full."""
+def pair(title: str, times: tuple[float, float], told: Markup, history: History, class_: str) -> Markup:
+    """Show (tr, td) large, what is ``told`` of them, and the times in full."""
+    unit = f" {history.time_unit}" if history.time_unit else ""
+    shown = (
+        tag("span", tag("i", name), f"{short(time)}{unit}") for name, time in zip(("tr", "td"), times, strict=True)
+    )
+    full = (tag("span", f"{name} = {time!r}") for name, time in zip(("tr", "td"), times, strict=True))
+    exact = tag("p", "in full: ", join(full, ", "), class_="soft exact")
+    return tag("div", tag("h2", title), tag("div", *shown, class_="times"), told, exact, class_=class_)
+
+
+def rigid_for(times: tuple[float, float], history: History) -> str:
+    """Say how long a pair is rigid."""
     unit = f" {history.time_unit}" if history.time_unit else ""
     (tr, td), span = times, float(history.time[-1] - history.time[0])
-    shown = (tag("span", tag("i", name), f"{short(time)}{unit}") for name, time in (("tr", tr), ("td", td)))
-    rigid = f"rigid for {short(td - tr)}{unit}, {(td - tr) / span:.0%} of the record"
-    exact = ("in full: ", tag("span", f"tr = {tr!r}"), ", ", tag("span", f"td = {td!r}"))
-    lines = (*(tag("p", line) for line in (*told, rigid)), tag("p", *exact, class_="soft exact"))
-    return tag("div", tag("h2", title), tag("div", *shown, class_="times"), *lines, class_=class_)
-
-
-def left_over(residual: float | None, expected: Expectation | None = None) -> str:
-    """Say what of the vibration is wrong after td, or what is left of it, as far as it is known."""
-    if residual is not None:
-        return f"residual {measure(residual)}"
-    if expected and expected.ratio is not None:
-        return f"about {expected.ratio:.0%} of the vibration energy that the reference has after td"
-    return "judged by its energy level alone"
+    return f"rigid for {short(td - tr)}{unit}, {(td - tr) / span:.0%} of the record"
 
 
 def digests(files: Iterable[Source]) -> list[tuple[str, str]]:

@@ -20,7 +20,8 @@ HEAD = ("", "flight", "from", "to", "margin", "tr", "td", "rigid", "of record", 
 WINDOW = (
     "flight", "flight_start", "flight_end", "flight_source", "certain", "status", "reason", "tr", "td", "rigid_time",
     "rigid_fraction", "run_time_share", "locks_in", "basis", "kind", "level_error", "lock_in_error", "residual",
-    "kinetic_share", "margin", "margin_source", "landing_spread", "landing", "landing_planned",
+    "kinetic_share", "margin", "margin_source", "landing_spread", "landing", "landing_planned", "position_error",
+    "position_error_part",
 )  # fmt: skip
 
 
@@ -97,6 +98,8 @@ def window(plan: Plan, row: Planned) -> dict[str, Any]:
         "landing_spread": None if done else row.margin.spread,
         "landing": done.landing if done else None,
         "landing_planned": done.planned if done else None,
+        "position_error": best.position_error if best else None,
+        "position_error_part": best.position_error_part if best else None,
     }
 
 
@@ -164,6 +167,6 @@ def quality(row: Planned) -> str | None:
         return None
     if best.kind == "start":
         return "nothing vibrates"
-    if best.residual is not None:
-        return f"residual {tables.measure(best.residual)}"
-    return f"level error {tables.measure(best.level_error)}"
+    name, error = ("level error", best.level_error) if best.residual is None else ("residual", best.residual)
+    off = "" if best.position_error is None else f", off by {best.position_error:.2g}"
+    return f"{name} {tables.measure(error)}{off}"

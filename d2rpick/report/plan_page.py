@@ -55,7 +55,7 @@ def _sections(
     reasons = pairs([(f"flight {row.number}", row.reason) for row in plan.rows if row.reason])
     yield section("Flights", table("Flights", HEAD[1:], [row[1:] for row in rows(plan)]), reasons)
     if card:
-        yield section("For the solver's input", tag("pre", card))
+        yield section("For the solver's input", tag("pre", card, tabindex="0"))
     what, _, text = heading(plan).partition(" ")
     notes = [("note", note) for note in plan.history.notes]
     yield section("What was read", pairs([(what, text.strip()), *page.digests(run.files), *notes]))
@@ -65,5 +65,5 @@ def _sections(
 
 def _window(row: Planned, plan: Plan) -> Markup:
     assert row.window is not None
-    told = [quality(row) or ""]
+    told = tag("p", f"{quality(row)}; {page.rigid_for(row.window, plan.history)}")
     return page.pair(f"Flight {row.number}", row.window, told, plan.history, "card chosen")

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from d2rpick.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.situation import frame, heading, mechanics
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.quality import Quality
     from d2rpick.choice.suggest import AcceptableWindow, Pair, Suggestion
 
 SCHEMA = "d2rpick/suggest/1"
@@ -19,22 +22,27 @@ HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolera
 
 
 def as_table(answer: Suggestion, limit: int) -> str:
-    """Heading, the first ``limit`` candidates, the recommended and the better pair; the recommended row has a star."""
+    """The verdict, what it rests on, and the first ``limit`` candidates; the recommended row has a star."""
     table = tables.as_text(HEAD, rows(answer, limit)) if answer.candidates else "no candidates"
-    lines = [*heading(answer.situation), "", table]
+    said = [*verdict(answer), *outlook(answer)]
+    width = max(len(name) for name, _ in said)
+    lines = [
+        *(f"{name.ljust(width)}  {printable(text)}" for name, text in said),
+        "",
+        *heading(answer.situation),
+        "",
+        table,
+    ]
     left = len(answer.candidates) - limit
     if left > 0:
         lines.append(f"... and {left} more (--limit)")
-    lines += ["", f"recommended  {_pair(answer.recommended)}", f"better pair  {_pair(answer.better_pair)}"]
-    lines += [f"{name.ljust(11)}  {text}" for name, text in outlook(answer)]
     return "\n".join(lines)
 
 
 def as_markdown(answer: Suggestion, limit: int) -> str:
-    """The candidates as a Markdown table, and the two pairs below it."""
-    table = tables.as_markdown(HEAD, rows(answer, limit))
-    lines = [("recommended", _pair(answer.recommended)), ("better pair", _pair(answer.better_pair)), *outlook(answer)]
-    return "\n\n".join([table, *(f"{name}: {text}" for name, text in lines)])
+    """The candidates as a Markdown table, and the verdict below it."""
+    lines = [f"{name}: {text}" for name, text in (*verdict(answer), *outlook(answer))]
+    return "\n\n".join([tables.as_markdown(HEAD, rows(answer, limit)), *lines])
 
 
 def as_csv(answer: Suggestion) -> str:
@@ -49,53 +57,114 @@ def as_csv(answer: Suggestion) -> str:
 
 def as_json(answer: Suggestion, command: Sequence[str]) -> str:
     """The whole answer by schema d2rpick/suggest/1."""
+    return tables.as_json(_document(answer, command))
+
+
+def as_ndjson(answer: Suggestion, command: Sequence[str]) -> str:
+    """The same in one line, to be appended to those of other runs."""
+    return tables.as_line(_document(answer, command))
+
+
+def _document(answer: Suggestion, command: Sequence[str]) -> dict[str, Any]:
     recommended = answer.recommended
-    return tables.as_json(
-        {
-            **frame(answer.situation, SCHEMA, command, answer.cautions),
-            "td": answer.situation.td,
-            "td_window": list(answer.td_window) if answer.td_window else None,
-            "longer_pair": keys.of_pair(answer.longer),
-            **mechanics(answer.situation),
-            "candidates": [{**keys.of_candidate(c), "parts": keys.of_matches(c.parts)} for c in answer.candidates],
-            "acceptable_windows": None
-            if answer.windows is None
-            else [
-                {
-                    "start": w.start,
-                    "end": w.end,
-                    "share": w.share,
-                    "recommended": holds(w, recommended.tr if recommended else None),
-                }
-                for w in answer.windows
-            ],
-            "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
-            "health": keys.of_health(answer.health),
-            "expected": keys.of_expected(answer.expected),
-            "better_td": keys.of_pair(answer.better_pair),
-        }
-    )
+    return {
+        **frame(answer.situation, SCHEMA, command, answer.cautions),
+        "td": answer.situation.td,
+        "td_window": list(answer.td_window) if answer.td_window else None,
+        "longer_pair": keys.of_pair(answer.longer),
+        **mechanics(answer.situation),
+        "candidates": [{**keys.of_candidate(c), "parts": keys.of_matches(c.parts)} for c in answer.candidates],
+        "acceptable_windows": None
+        if answer.windows is None
+        else [
+            {
+                "start": w.start,
+                "end": w.end,
+                "share": w.share,
+                "recommended": holds(w, recommended.tr if recommended else None),
+            }
+            for w in answer.windows
+        ],
+        "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
+        **keys.of_quality(answer.quality),
+        "health": keys.of_health(answer.health),
+        "expected": keys.of_expected(answer.expected),
+        "better_td": keys.of_pair(answer.better_pair),
+    }
+
+
+def headline(answer: Suggestion) -> str:
+    """What the pair is called: a poor one is not recommended, it is the best that its td has."""
+    return "best of a bad td" if answer.quality and answer.quality.grade == "poor" else "recommended"
+
+
+def verdict(answer: Suggestion) -> list[tuple[str, str]]:
+    """What to paste, what it saves, what it costs, and how sure that is; a name and a sentence each."""
+    best, quality, better = answer.chosen, answer.quality, answer.clearly_better
+    if best is None or quality is None:
+        found = [("recommended", "none")]
+    else:
+        found = [
+            (headline(answer), _pair(answer.recommended)),
+            ("saves", _saved(best)),
+            ("keeps", _kept(answer, best)),
+            ("quality", _sure(best, quality)),
+        ]
+    return [*found, ("better pair", f"{_times(better)}: {better_about(answer, better)}")] if better else found
+
+
+def _saved(best: Candidate) -> str:
+    return f"rigid for {best.rigid_fraction:.0%} of the record, {best.rigid_time:.6g}"
+
+
+def _sure(best: Candidate, quality: Quality) -> str:
+    """How good the pair is, why it is none better, and how exactly tr is known."""
+    reasons = f": {'; '.join(quality.reasons)}" if quality.reasons else ""
+    known = "" if best.tr_high is None else f"; tr is known to ±{best.tr_high - best.tr:.1g}"
+    room = "" if best.timing_tolerance is None else f" and may be off by {best.timing_tolerance:.1g}"
+    return f"{quality.grade}{reasons}{known}{room}"
+
+
+def _kept(answer: Suggestion, best: Candidate) -> str:
+    """What is left of the vibration after td."""
+    share, expected = answer.situation.kinetic_share, answer.expected
+    if answer.situation.at_rest:
+        return "everything: nothing vibrates in the flight up to td"
+    if share is not None and best.residual is not None:
+        return f"{1 - share:.0%} of the vibration energy; the vibration after td is off by {best.residual:.1%}"
+    if expected and expected.ratio is not None:
+        least = f", {expected.ratio_low:.0%} at worst" if expected.ratio_low is not None else ""
+        return f"about {expected.ratio:.0%} of the energy that the reference has after td{least}"
+    return "unknown"
+
+
+def better_about(answer: Suggestion, better: Pair) -> str:
+    """What is better about the better pair."""
+    own = answer.recommended
+    if own is None:
+        return "there an acceptable tr exists"
+    if better.residual is not None and own.residual is not None:
+        return f"residual {tables.measure(better.residual)} instead of {tables.measure(own.residual)}"
+    level, here = answer.situation.vibration.energy(better.td), answer.situation.energy_td
+    return f"at that td {level / here - 1:.0%} more of the energy is there to be locked in"
 
 
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:
-    """What can be expected of the recommended pair, a name and a sentence each."""
+    """What else there is to choose from; a name and a sentence each."""
     chosen = answer.recommended.tr if answer.recommended else None
     lines = [("acceptable", acceptable(answer.windows, chosen))] if answer.windows else []
     best = answer.chosen
     if best and best.run_time_share is not None:
-        rigid = f"rigid for {best.rigid_fraction:.0%} of the record"
-        lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's, {rigid}"))
+        lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's"))
+    if best and best.position_error is not None:
+        lines.append(
+            ("position", f"off by {best.position_error:.2g} at td: {best.position_error_part} is frozen elsewhere")
+        )
     if answer.longer and answer.recommended:
         lines.append(("longer", given_up(answer.longer, answer.recommended)))
     expected = answer.expected
-    if expected:
-        at_level = f"{expected.ratio_at_level:.0%} with the energy of td"
-        own = (
-            ""
-            if expected.ratio is None
-            else f"{expected.ratio:.0%} of the reference's ({expected.ratio_low:.0%} if all of it vibrates), "
-        )
-        lines.append(("mean after", f"about {own}{at_level}; mean in flight {expected.mean_energy:.6g}"))
+    if expected and expected.ratio is None:
+        lines.append(("mean after", f"about {expected.ratio_at_level:.0%} of the reference's with the energy of td"))
     return lines
 
 
@@ -144,7 +213,7 @@ def rows(answer: Suggestion, limit: int) -> list[list[tables.Cell]]:
             tables.measure(c.residual),
             None if c.timing_tolerance is None else f"{c.timing_tolerance:.1e}",
             c.rigid_time,
-            "recommended" if c.recommended else "acceptable" if c.acceptable else c.notes[0],
+            headline(answer) if c.recommended else "acceptable" if c.acceptable else c.notes[0],
         ]
         for c in answer.candidates[:limit]
     ]
@@ -154,4 +223,8 @@ def _pair(pair: Pair | None) -> str:
     if pair is None:
         return "none"
     residual = "" if pair.residual is None else f", residual {tables.measure(pair.residual)}"
-    return f"tr = {pair.tr:.6g}, td = {pair.td:.6g}{residual}"
+    return f"{_times(pair)}{residual}"
+
+
+def _times(pair: Pair) -> str:
+    return f"tr = {pair.tr:.6g}, td = {pair.td:.6g}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from d2rpick.report import page
 from d2rpick.report.explorer import explorer
 from d2rpick.report.html import Markup, drawings, pairs, remarks, section, table, tag
-from d2rpick.report.suggestion import HEAD, outlook, rows
+from d2rpick.report.suggestion import HEAD, better_about, headline, outlook, rows, verdict
 from d2rpick.report.tables import known
 
 if TYPE_CHECKING:
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # More rows than one compares by eye; csv and json hold all.
 _MOST_ROWS = 20
+# What is said of the pair beside its times.
+_TOLD = ("quality", "keeps", "saves")
 
 
 def drawn(answer: Suggestion) -> dict[str, tuple[str, str]]:
@@ -57,11 +59,10 @@ def rest(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
 
 def choice(answer: Suggestion) -> Markup:
     """Give the section above the figures: the pairs, large, and what to know of them."""
-    better = answer.clearly_better
-    cards = [_recommended(answer)]
+    cards, better = [_recommended(answer)], answer.clearly_better
     if better:
-        title, told = "Better pair: td at the nearest peak", [page.left_over(better.residual)]
-        cards.append(page.pair(title, (better.tr, better.td), told, answer.situation.history, "card"))
+        told, times = tag("p", better_about(answer, better)), (better.tr, better.td)
+        cards.append(page.pair("Better pair: another td", times, told, answer.situation.history, "card"))
     return tag("section", tag("div", *cards, class_="choice"), remarks(answer.cautions), pairs(outlook(answer)))
 
 
@@ -70,12 +71,9 @@ def _recommended(answer: Suggestion) -> Markup:
     if pair is None or quality is None:
         nothing = tag("p", "No tr can be recommended for this td.")
         return tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")
-    poor = quality.grade == "poor"
-    title = "Best of a bad td" if poor else "Recommended"
-    told = ["; ".join(quality.reasons)] * bool(quality.reasons) + [page.left_over(pair.residual, answer.expected)]
-    told[0] = f"{quality.grade}: {told[0]}"
-    class_ = "card refused" if poor else "card chosen"
-    return page.pair(title, (pair.tr, pair.td), told, answer.situation.history, class_)
+    told = pairs((name, text) for name, text in verdict(answer) if name in _TOLD)
+    class_ = "card refused" if quality.grade == "poor" else "card chosen"
+    return page.pair(headline(answer).capitalize(), (pair.tr, pair.td), told, answer.situation.history, class_)
 
 
 def _candidates(answer: Suggestion) -> Iterator[Markup]:

@@ -113,6 +113,13 @@ def _exact(value: Cell) -> Cell:
     return printable(value) if isinstance(value, str) else value
 
 
+def as_line(result: dict[str, Any]) -> str:
+    """Write a result as JSON in one line."""
+    import json
+
+    return json.dumps(result, allow_nan=False, ensure_ascii=False)
+
+
 def as_json(result: dict[str, Any]) -> str:
     """Write a result as JSON: full precision, null for what is not known; a NaN would be a fault and raises."""
     import json

@@ -23,7 +23,7 @@ _HALF: Final = (0.45, 0.5)
 
 def as_table(found: TradeOff, limit: int) -> str:
     """What was read, some ``limit`` of the offers that nothing beats, and the answer in a sentence."""
-    shown = _shown(found, limit)
+    shown = some_of(found, limit)
     table = tables.as_text(HEAD, rows(shown)) if shown else "nothing to offer"
     lines = [read_line(found.situation.history), *_heading(found), "", table]
     left = len(found.offers) - len(shown)
@@ -34,7 +34,7 @@ def as_table(found: TradeOff, limit: int) -> str:
 
 def as_markdown(found: TradeOff, limit: int) -> str:
     """The same offers as a Markdown table, and the answer below it."""
-    return "\n\n".join([tables.as_markdown(HEAD, rows(_shown(found, limit))), answer(found)])
+    return "\n\n".join([tables.as_markdown(HEAD, rows(some_of(found, limit))), answer(found)])
 
 
 def as_csv(found: TradeOff) -> str:
@@ -77,8 +77,7 @@ def offer(one: Offer) -> dict[str, Any]:
         "error": one.error,
         "unbeaten": one.unbeaten,
         "recommended": one.recommended,
-        "quality": one.quality.grade if one.quality else None,
-        "quality_reasons": list(one.quality.reasons) if one.quality else None,
+        **keys.of_quality(one.quality),
         "basis": one.basis,
         "energy_td": one.energy_td,
         "kinetic_share": one.kinetic_share,
@@ -161,7 +160,7 @@ def _heading(found: TradeOff) -> list[str]:
     return [f"td       {len(found.offers)} times from {low:.6g} to {high:.6g}"]
 
 
-def _shown(found: TradeOff, limit: int) -> list[Offer]:
+def some_of(found: TradeOff, limit: int) -> list[Offer]:
     """Offers that the answer names, and evenly over those that nothing beats as many as make ``limit``."""
     named = {one.td for one in (found.asked, found.recommended, found.start, found.step) if one}
     best = [one.td for one in found.offers if one.unbeaten and one.td not in named]

@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING
 from d2rpick.report import page, suggestion_page
 from d2rpick.report.explorer import explorer
 from d2rpick.report.html import drawings, remarks, section, table, tag
-from d2rpick.report.trade_off import HEAD, answer, rows
+from d2rpick.report.tables import known
+from d2rpick.report.trade_off import HEAD, answer, rows, some_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.report.html import Markup
+
+# More rows than one compares by eye.
+_MOST_ROWS = 20
 
 
 def drawn(found: TradeOff) -> dict[str, tuple[str, str]]:
@@ -39,7 +43,11 @@ def _sections(found: TradeOff, record: page.Record) -> Iterator[Markup]:
     if record.explorer:
         yield explorer(record.explorer)
     yield drawings(record.figures)
-    best = [one for one in found.offers if one.unbeaten]
+    best = some_of(found, _MOST_ROWS)
     marked = next((i for i, one in enumerate(best) if one.recommended), None)
-    yield section("Pairs that nothing beats", table("Pairs", HEAD[1:], [row[1:] for row in rows(best)], marked))
+    shown = table("Pairs", *known(HEAD[1:], [row[1:] for row in rows(best)]), marked)
+    left = len(found.offers) - len(best)
+    yield section(
+        "Pairs that nothing beats", shown, tag("p", f"{left} more td in the csv and json results.", class_="soft")
+    )
     yield from suggestion_page.rest(found.suggestion, record)

@@ -19,13 +19,13 @@ COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: Verdict) -> str:
-    """Heading, the measures of the pair, the verdict and its reasons."""
+    """The verdict and its reasons, what it rests on, and the measures of the pair."""
     width = max(len(name) for name in keys.of_verdict(answer))
     lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in keys.of_verdict(answer).items()]
     reasons = [f"  {reason}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
-    return "\n".join([*heading(answer.situation), "", *lines, "", f"verdict  {word(answer)}", *reasons])
+    return "\n".join([f"verdict  {_told(answer)}", *reasons, "", *heading(answer.situation), "", *lines])
 
 
 def as_markdown(answer: Verdict) -> str:
@@ -51,12 +51,19 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
             **frame(situation, SCHEMA, command, answer.cautions),
             **mechanics(situation),
             **keys.of_verdict(answer),
+            **keys.of_quality(answer.quality),
             "parts": keys.of_matches(answer.candidate.parts),
             "health": keys.of_health(answer.health),
             "reasons": list(answer.reasons),
             "switched": keys.of_comparison(answer.switched) if answer.switched else None,
         }
     )
+
+
+def _told(answer: Verdict) -> str:
+    """The verdict, with the quality of a pair that verifies."""
+    quality = answer.quality
+    return word(answer) if quality is None else f"{word(answer)}, {'; '.join((quality.grade, *quality.reasons))}"
 
 
 def word(answer: Verdict) -> str:

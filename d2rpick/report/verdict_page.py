@@ -8,7 +8,7 @@ from d2rpick.report import page
 from d2rpick.report.explorer import explorer
 from d2rpick.report.html import drawings, pairs, remarks, section, table, tag
 from d2rpick.report.keys import of_verdict
-from d2rpick.report.tables import short
+from d2rpick.report.tables import measure, short
 from d2rpick.report.verdict import COMPARED, comparison, deviations, word
 
 if TYPE_CHECKING:
@@ -37,18 +37,34 @@ def _sections(answer: Verdict, record: page.Record) -> Iterator[Markup]:
     situation, candidate = answer.situation, answer.candidate
     times = candidate.tr, situation.td
     class_ = "card chosen" if answer.verified else "card refused"
-    shown = page.pair(word(answer).capitalize(), times, [page.left_over(candidate.residual)], situation.history, class_)
+    shown = page.pair(
+        word(answer).capitalize(),
+        times,
+        tag("p", _left_over(candidate.residual), "; ", page.rigid_for(times, situation.history)),
+        situation.history,
+        class_,
+    )
     yield tag("section", tag("div", shown, class_="choice"), remarks(answer.cautions, answer.reasons))
     if record.explorer:
         yield explorer(record.explorer)
     yield drawings(record.figures)
-    yield section("Measures", pairs((name.replace("_", " "), short(one)) for name, one in of_verdict(answer).items()))
+    yield section("Measures", pairs(_measures(answer)))
     yield page.parts(candidate)
     if answer.switched:
         yield _switched(answer.switched, record.switched.files if record.switched else ())
     yield from page.evidence(situation, answer.health, record)
     if answer.verified:
         yield page.solver_input(times, record)
+
+
+def _left_over(residual: float | None) -> str:
+    """Say what of the vibration is wrong after td, as far as it is known."""
+    return "judged by its energy level alone" if residual is None else f"residual {measure(residual)}"
+
+
+def _measures(answer: Verdict) -> Iterator[tuple[str, str]]:
+    """What is known of the pair."""
+    yield from ((name.replace("_", " "), short(one)) for name, one in of_verdict(answer).items() if one is not None)
 
 
 def _switched(found: Comparison, files: Iterable[Source]) -> Markup:

@@ -1,8 +1,8 @@
-"""What was fitted to a record, remembered: the same windows of it come up again from one td to the next."""
+"""What was found in a record, remembered: the same windows of it come up again from one td to the next."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
@@ -12,11 +12,14 @@ if TYPE_CHECKING:
     from d2rpick.vibration.span import Fitter
 
 
+_Found = TypeVar("_Found")
+
+
 class Fits:
-    """Fits to windows of one record by one set of rules, each made once."""
+    """Fits to windows of one record by one set of rules, and what else is looked for in them, each made once."""
 
     def __init__(self) -> None:
-        self._found: dict[tuple[Hashable, ...], Identification] = {}
+        self._found: dict[tuple[Hashable, ...], Any] = {}
 
     def remembered(self, name: str, fitter: Fitter) -> Fitter:
         """Give a fitter that does as ``fitter``, which has this name, and fits no window twice."""
@@ -27,8 +30,9 @@ class Fits:
 
         return fit
 
-    def once(self, key: tuple[Hashable, ...], make: Callable[[], Identification]) -> Identification:
+    def once(self, key: tuple[Hashable, ...], make: Callable[[], _Found]) -> _Found:
         """Make what is not known yet by this key."""
         if key not in self._found:
             self._found[key] = make()
-        return self._found[key]
+        found: _Found = self._found[key]
+        return found

@@ -204,4 +204,5 @@ def test_of_files_with_nothing_to_judge_nothing_is_said() -> None:
 
 def test_terms_that_leave_everything_open_leave_it_unknown() -> None:
     found = answer("suggest", "--td", "0.064", GLSTAT)
-    assert {value for key, value in found["health"].items() if key != "window"} == {None}
+    assert {value for key, value in found["health"].items() if key not in ("window", "until")} == {None}
+    assert found["health"]["until"] == 0.064

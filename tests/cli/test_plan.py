@@ -210,6 +210,6 @@ def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(history: list[s
     assert again.exit_code == 2
     assert "exists" in again.stderr
     assert run(*args, "--overwrite").exit_code == 0
-    alone = run("plan", "--part", "box", "--deck", str(main), *history)
+    alone = run("plan", "--part", "box", "--write-deck", str(folder), *history)
     assert alone.exit_code == 2
-    assert "--deck needs --write-deck" in alone.stderr
+    assert "--write-deck needs --deck" in alone.stderr

@@ -15,22 +15,42 @@ if TYPE_CHECKING:
 
 _INCLUDE = b"#include"
 _DIGITS = 10  # of an id
+_PIECE = 4 << 20  # bytes that are looked at together
 
 
 def blocks(source: SourceFile) -> Iterator[Block]:
     """Keyword blocks and ``#include`` lines in the order of the file, up to ``/END``."""
-    position = 0
     start: tuple[int, str] | None = None
-    for raw in source.lines_from(0):
-        if raw.startswith(b"/") or raw[: len(_INCLUDE)].lower() == _INCLUDE:
-            if start:
-                yield Block(source, start[0], position, start[1])
-            start = position, raw.rstrip(b"\r\n").decode("latin-1")
-            if start[1].upper().split() == ["/END"]:
-                return
-        position += len(raw)
+    for position, raw in _marks(source):
+        if start:
+            yield Block(source, start[0], position, start[1])
+        start = position, raw.rstrip(b"\r\n").decode("latin-1")
+        if start[1].upper().split() == ["/END"]:
+            return
     if start:
         yield Block(source, start[0], None, start[1])
+
+
+def _marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
+    """Lines that begin with ``/`` or ``#include``, and where; found without a look at each line of a mesh."""
+    position, rest = 0, b""
+    while data := source.read(position + len(rest), position + len(rest) + _PIECE):
+        whole, ended, tail = (rest + data).rpartition(b"\n")
+        lines = whole + ended
+        yield from ((position + at, raw) for at, raw in _marked(lines))
+        position, rest = position + len(lines), tail
+    yield from ((position + at, raw) for at, raw in _marked(rest))
+
+
+def _marked(lines: bytes) -> list[tuple[int, bytes]]:
+    found = [0] if lines[:1] in (b"/", b"#") else []
+    for mark in (b"\n/", b"\n#"):
+        at = lines.find(mark)
+        while at >= 0:
+            found.append(at + 1)
+            at = lines.find(mark, at + 1)
+    marked = [(at, lines[at : lines.find(b"\n", at) + 1 or None]) for at in sorted(found)]
+    return [(at, raw) for at, raw in marked if raw.startswith(b"/") or raw[: len(_INCLUDE)].lower() == _INCLUDE]
 
 
 def keyword(block: Block) -> tuple[str, ...]:

@@ -1,0 +1,175 @@
+"""What a time step costs, and what of it is saved while some parts are rigid: one model for all of d2rpick.
+
+A step costs C = E / s, with E the sum of weight x number over the elements that are computed, by formulation, and s
+the share of the elements in a step.  While parts are one rigid body its elements cost nothing, and each of its n nodes
+costs r, so the share that is saved is
+
+    c = (E_rigid - r n) / C.
+
+A run that is rigid for a fraction f of its time takes 1 - f (1 - (1 - c)/m) of the time without switching, with m the
+step while rigid over that before (`d2rpick.vibration.measures.run_time_share`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from d2rpick.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping
+
+    from d2rpick.deck.inventory.model import Inventory
+
+# us per element and cycle: a fit over legs of a car of 1516 elements and of 5432, with and without rigid sets
+# (OpenRadioss 2026-08, one thread; docs/parts.md).  Springs, beams and solids are not separated well.
+MEASURED: Final[Mapping[str, float]] = {
+    "QBAT": 1.18, "QEPH": 0.45, "BT": 0.30, "beam": 0.29, "solid": 1.13, "spring": 1.0,
+}  # fmt: skip
+# Elements over all work of a deformable step: 0.87 of 1516 elements and 0.91 of 5432.
+ELEMENT_SHARE: Final = 0.87
+# us per node of a rigid body and cycle, of the same legs.
+RIGID_NODE: Final = 0.05
+_SOURCE: Final = "OpenRadioss 2026-08, one thread"
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Cost of an element per cycle by its formulation or class, of a node of a rigid body, and the elements' share.
+
+    Only ratios count: the unit is that of ``per_element``.
+    """
+
+    per_element: Mapping[str, float] = field(default_factory=lambda: MEASURED)
+    element_share: float = ELEMENT_SHARE
+    rigid_node: float = RIGID_NODE
+    source: str = _SOURCE
+
+    def __post_init__(self) -> None:
+        """Raise ConfigurationError with the name of a number that makes no sense."""
+        for name, value in self.per_element.items():
+            if not 0 <= value < float("inf"):
+                raise ConfigurationError(f"the weight of {name!r} is {value:g}, a number of at least 0 was expected")
+        if not any(self.per_element.values()):
+            raise ConfigurationError("no weight is above 0; give the cost of at least one formulation")
+        if not 0 < self.element_share <= 1:
+            raise ConfigurationError(
+                f"element_share is {self.element_share:g}, a number above 0 and up to 1 was expected"
+            )
+        if not 0 <= self.rigid_node < float("inf"):
+            raise ConfigurationError(f"rigid_node is {self.rigid_node:g}, a number of at least 0 was expected")
+
+
+def saved_share(weights: Weights, total: float, rigid: float, nodes: int) -> float:
+    """Share of a step that is saved while elements of the cost ``rigid`` are off, c above [-]; at least 0.
+
+    Parameters
+    ----------
+    weights : Weights
+    total, rigid : float
+        Cost of all elements, and of those that are rigid, in the unit of the weights.
+    nodes : int
+        Of the rigid bodies.
+
+    Examples
+    --------
+    >>> saved_share(Weights({"BT": 1.0}, element_share=0.9, rigid_node=0.0), 100.0, 50.0, 60)
+    0.45
+    """
+    return max(0.0, (rigid - weights.rigid_node * nodes) * weights.element_share / total) if total else 0.0
+
+
+class Amount(NamedTuple):
+    """Cost of some elements in the unit of the weights, and the formulations whose weight is not known."""
+
+    cost: float
+    unknown: tuple[str, ...] = ()
+
+
+class Share(NamedTuple):
+    """Share of a step that is saved while some parts are rigid [-], or None and the reason."""
+
+    value: float | None
+    reason: str | None = None
+
+
+class CostModel:
+    """Cost of the elements of a deck with some weights; elements that are rigid from the start cost nothing."""
+
+    def __init__(self, inventory: Inventory, weights: Weights | None = None) -> None:
+        self.inventory = inventory
+        self.weights = weights or Weights()
+        self._rigid = {
+            part for part, data in inventory.parts.items() if data.material and data.material.kind == "rigid"
+        }
+
+    def of_part(self, part: int) -> Amount:
+        """Cost of the elements of a part."""
+        return self._of(part, self.inventory.counts.get(part, Counter()))
+
+    @property
+    def total(self) -> Amount:
+        """Cost of all elements."""
+        return _sum(self.of_part(part) for part in self.inventory.counts)
+
+    def share_of(self, part: int) -> Share:
+        """Share of a part's elements in the cost of all elements [-]."""
+        own, total = self.of_part(part), self.total
+        return self._share(own, own.cost / total.cost if total.cost else 0.0)
+
+    def saved(self, parts: Collection[int]) -> Share:
+        """Share of a step that is saved while these parts are rigid, c above [-]."""
+        within = self.inventory.elements_within(parts)
+        rigid = _sum(self._of(part, counts) for part, counts in within.items())
+        total = self.total
+        nodes = self.inventory.rigid_nodes(set(parts) - self._rigid)
+        return self._share(rigid, saved_share(self.weights, total.cost, rigid.cost, nodes))
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """Formulations of the deck whose weight is that of one alike, not their own."""
+        found = dict.fromkeys(
+            one.name
+            for part, counts in self.inventory.counts.items()
+            if part not in self._rigid
+            for one in (self.inventory.formulation(part, kind) for kind in counts)
+            if one.cost is not None and not one.measured and one.name not in self.weights.per_element
+        )
+        return tuple(found)
+
+    def _of(self, part: int, counts: Mapping[str, int]) -> Amount:
+        if part in self._rigid:
+            return Amount(0.0)
+        cost, unknown = 0.0, list[str]()
+        for kind, count in counts.items():
+            formulation = self.inventory.formulation(part, kind)
+            weight = self.weights.per_element.get(formulation.name)
+            if weight is None and formulation.cost is not None:
+                weight = self.weights.per_element.get(formulation.cost)
+            if weight is None:
+                unknown.append(formulation.name)
+            else:
+                cost += weight * count
+        return Amount(cost, tuple(unknown))
+
+    def _share(self, own: Amount, value: float) -> Share:
+        """Give a share that is known; of all elements, also of those outside, the weights must be known."""
+        if not self.inventory.counts:
+            return Share(None, "the deck has no elements")
+        if not self.inventory.complete:
+            return Share(
+                None, f"not all elements are known: {self.inventory.notes[0]}" if self.inventory.notes else None
+            )
+        if unknown := sorted({*own.unknown, *self.total.unknown}):
+            return Share(None, f"no weight is known for {', '.join(unknown)}; give one with `weights`")
+        return Share(value)
+
+
+def _sum(amounts: Iterable[Amount]) -> Amount:
+    cost, unknown = 0.0, list[str]()
+    for one in amounts:
+        cost += one.cost
+        unknown += one.unknown
+    return Amount(cost, tuple(dict.fromkeys(unknown)))

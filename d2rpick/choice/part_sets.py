@@ -1,0 +1,315 @@
+"""Sets of parts worth comparing: what each saves, how far it puts the body out of place, and which one to take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.choice.cost import CostModel, Share
+from d2rpick.choice.of_run import Reference, suggest_of, verify_of
+from d2rpick.choice.part_facts import facts_of
+from d2rpick.choice.part_steps import steps_of
+from d2rpick.choice.part_verdicts import rows_of
+from d2rpick.choice.warnings import Caution
+from d2rpick.errors import FormatError, RangeError
+from d2rpick.flight.position_error import drift_of
+from d2rpick.histories.opening import Selection
+from d2rpick.vibration.measures import run_time_share
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from d2rpick.choice.cost import Weights
+    from d2rpick.choice.part_facts import RunFacts
+    from d2rpick.choice.part_steps import Steps
+    from d2rpick.choice.part_verdicts import PartRow
+    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.switched_run import Times
+    from d2rpick.deck.inventory.model import Inventory
+    from d2rpick.histories.history import History, Part
+    from d2rpick.histories.run import Run
+
+# Savings that differ by less cannot be told apart: the cost model is right within some points.
+_LIKE: Final = 0.01
+# The heaviest parts that together have this share of the mass of all that may be switched.
+_HEAVY: Final = 0.5
+_SEVERAL: Final = "several rigid bodies: how far each is out of place is not predicted"
+_NO_ANGLE: Final = "no file of a run tells how its parts turn; the angle error is not known"
+
+
+@dataclass(frozen=True)
+class PartSet:
+    """A set of parts, what it saves and what it does; None with a word in ``reasons`` where unknown.
+
+    ``bodies`` are the rigid bodies that its parts make, ``cost_share`` is what they save of a step [-].
+    ``step_growth`` is how much the step may grow then [-], infinite where nothing deformable keeps it; predictions
+    take that of the settings.  ``window`` is (tr, td) in the longest flight [time], ``rigid_fraction`` its share of
+    the record [-].
+    """
+
+    name: str
+    parts: tuple[int, ...]
+    bodies: tuple[tuple[int, ...], ...]
+    elements: int | None = None
+    element_fraction: float | None = None
+    mass_fraction: float | None = None
+    cost_share: float | None = None
+    step_growth: float | None = None
+    window: Times | None = None
+    rigid_fraction: float | None = None
+    run_time_share: float | None = None
+    position_error: float | None = None
+    position_limit: float | None = None
+    position_part: Part | None = None
+    angle_error: float | None = None
+    reasons: tuple[str, ...] = ()
+    recommended: bool = False
+
+    @property
+    def saving(self) -> float | None:
+        """Share of the run time that is saved [-]."""
+        return None if self.run_time_share is None else 1 - self.run_time_share
+
+    @property
+    def out_of_place(self) -> bool:
+        """Whether the position error is beyond its limit."""
+        return self.position_error is not None and self.position_limit is not None and (
+            self.position_error > self.position_limit
+        )  # fmt: skip
+
+
+class Parts(NamedTuple):
+    """Answer of ``parts``: every part, sets of them, and what to be aware of.
+
+    ``inventory`` is None without a deck.
+    """
+
+    run: Run
+    inventory: Inventory | None
+    weights: Weights | None
+    settings: Settings
+    facts: RunFacts
+    rows: tuple[PartRow, ...]
+    sets: tuple[PartSet, ...]
+    cautions: tuple[Caution, ...]
+
+    @property
+    def recommended(self) -> PartSet | None:
+        """The set to take."""
+        return next((one for one in self.sets if one.recommended), None)
+
+
+def parts_of(
+    run: Run,
+    settings: Settings,
+    model: CostModel | None,
+    *,
+    given: Sequence[int] = (),
+    times: Times | float | None = None,
+    printed: Mapping[int, tuple[float, str]] | None = None,
+) -> Parts:
+    """Judge every part of a run, and compare sets of them.
+
+    Parameters
+    ----------
+    run : Run
+        Without switching.
+    settings : Settings
+        As for ``suggest``; its cost share is not used.
+    model : CostModel or None
+        The deck with its cost; without it the cost and most verdicts stay open.
+    given : sequence of int
+        A set to be compared too.
+    times : (float, float) or float, optional
+        tr and td of the comparison, or td alone [time].  Default: td at the end of the longest flight, for each set
+        with the tr of ``suggest``.
+    printed : mapping, optional
+        Smallest steps by part that the solver printed, with their source.
+
+    Returns
+    -------
+    Parts
+    """
+    facts = facts_of(run, settings)
+    inventory = model.inventory if model else None
+    steps = steps_of(inventory, printed or {})
+    rows = rows_of(facts, model, steps)
+    flight = None if facts.longest is None else facts.flights[facts.longest]
+    comparison = _Comparison(run, settings, model, rows, steps, flight)
+    sets: list[PartSet] = []
+    for one in _sets(rows, inventory, given):
+        td = next((other.window[1] for other in sets if other.window), None)  # the same for all, to be compared
+        sets.append(comparison.of(one, times or td))
+    found = tuple(_with_recommendation(sets))
+    cautions = tuple(_cautions(facts, model, rows, found))
+    return Parts(run, inventory, model.weights if model else None, settings, facts, rows, found, cautions)
+
+
+def recommended_parts(run: Run, settings: Settings, model: CostModel) -> tuple[int, ...]:
+    """Give the parts of the recommended set; FormatError where none can be recommended."""
+    found = parts_of(run, settings, model)
+    if found.recommended is None:
+        why = "; ".join(dict.fromkeys(reason for one in found.sets for reason in one.reasons))
+        raise FormatError(
+            f"{run.name}: no set of parts can be recommended ({why or 'no part may be switched'}); name the parts"
+        )
+    return found.recommended.parts
+
+
+def with_cost_of(settings: Settings, model: CostModel, parts: Sequence[int]) -> tuple[Settings, Share]:
+    """Let the cost share of the settings be that of these parts, unless one is given."""
+    if settings.cost_share is not None:
+        return settings, Share(settings.cost_share)
+    share = model.saved(parts)
+    return replace(settings, cost_share=share.value), share
+
+
+def _sets(rows: Sequence[PartRow], inventory: Inventory | None, given: Sequence[int]) -> Iterator[PartSet]:
+    """Name the sets worth comparing; none twice."""
+    movable = [row for row in rows if row.movable]
+    stopped = [row for row in movable if row.flight and row.flight.deforms is False]
+    named = {
+        "all that may": movable,
+        "stopped deforming": stopped,
+        "heavy": _heavy(movable),
+        "given": [row for row in rows if row.id in given],
+    }
+    seen: set[tuple[int, ...]] = set()
+    for name, members in named.items():
+        ids = tuple(row.id for row in members)
+        if ids and ids not in seen:
+            seen.add(ids)
+            yield PartSet(name, ids, inventory.bodies(ids) if inventory else ())
+
+
+def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
+    """The heaviest parts that have half of the mass together; none where a mass is not known."""
+    masses = {row.id: row.mass for row in movable if row.mass is not None}
+    if len(masses) < len(movable):
+        return []
+    total, taken, found = sum(masses.values()), 0.0, set[int]()
+    for part in sorted(masses, key=lambda part: -masses[part]):
+        if taken >= _HEAVY * total:
+            break
+        found.add(part)
+        taken += masses[part]
+    return [row for row in movable if row.id in found]
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """What all sets are compared by."""
+
+    run: Run
+    settings: Settings
+    model: CostModel | None
+    rows: Sequence[PartRow]
+    steps: Steps
+    flight: tuple[float, float] | None
+
+    def of(self, one: PartSet, times: Times | float | None) -> PartSet:
+        """Complete a set, in a window, or in that for a td."""
+        reasons = [self.model and self.model.saved(one.parts).reason]
+        one = self._with_cost(one, self.model) if self.model else one
+        try:
+            one = self._with_window(one, times)
+        except (FormatError, RangeError) as error:
+            reasons.append(str(error))
+        if one.rigid_fraction is not None and one.cost_share is not None:
+            share = run_time_share(one.rigid_fraction, one.cost_share, self.settings.step_ratio)
+            one = replace(one, run_time_share=share)
+        return replace(one, reasons=tuple(reason for reason in (*reasons, *one.reasons) if reason))
+
+    def _with_cost(self, one: PartSet, model: CostModel) -> PartSet:
+        inventory = model.inventory
+        within = {part: counts.total() for part, counts in inventory.elements_within(one.parts).items()}
+        whole = {part: counts.total() for part, counts in inventory.counts.items()}
+        rigid = {part for part, count in within.items() if count == whole[part]}
+        computed = [row.id for row in self.rows if row.elements and row.kind not in ("rigid", "void")]
+        return replace(
+            one,
+            elements=sum(within.values()),
+            element_fraction=sum(within.values()) / sum(whole.values()) if whole else None,
+            mass_fraction=self._mass_fraction(one.parts),
+            cost_share=model.saved(one.parts).value,
+            step_growth=self.steps.growth({*one.parts, *rigid}, computed),
+        )
+
+    def _mass_fraction(self, parts: Sequence[int]) -> float | None:
+        """Share of the mass of all parts that fly; None where one is not known."""
+        masses = {row.id: row.mass for row in self.rows if row.flight and row.flight.flies}
+        known = {part: mass for part, mass in masses.items() if mass is not None}
+        if len(known) < len(masses) or not set(parts) <= known.keys() or not sum(known.values()):
+            return None
+        return sum(known[part] for part in parts) / sum(known.values())
+
+    def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
+        """Find when the set may be rigid; RangeError with the reason where it may not."""
+        reference = Reference.of(self.run, Selection(parts=tuple(map(str, one.parts))))
+        if isinstance(times, tuple):
+            verify_of(reference, *times, self.settings)  # objects to times outside the record
+            tr, td = times
+        else:
+            answer = suggest_of(reference, times, self.settings, with_better=False)
+            if answer.recommended is None:
+                why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
+                raise RangeError("; ".join(why) or "no tr can be recommended")
+            tr, td = answer.recommended.tr, answer.recommended.td
+        time = reference.history.time
+        one = replace(one, window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0]))
+        return self._with_position(one, reference.history, tr, td)
+
+    def _with_position(self, one: PartSet, history: History, tr: float, td: float) -> PartSet:
+        """Find how far the body is out of place at td since its parts moved against each other before."""
+        momenta = next((momenta for momenta in history.momenta if momenta.parts is not None), None)
+        if momenta is None or momenta.parts is None or history.masses is None or self.flight is None:
+            return one
+        if len(one.bodies) > 1:
+            return replace(one, reasons=(_SEVERAL,))
+        members = [at for at, part in enumerate(momenta.parts) if part.id in one.parts]
+        drift = drift_of(momenta, history.masses, members, self.flight)
+        error = float(drift.errors(np.array([tr]), td)[0]) if drift else np.nan
+        if drift is None or np.isnan(error):
+            return one
+        return replace(one, position_error=error, position_limit=drift.limit, position_part=drift.part)
+
+
+def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
+    """Recommend the set that saves most, and of those that save alike the one of fewest parts.
+
+    A set that puts the body out of place counts only where all do.
+    """
+    useful = [one for one in sets if one.saving is not None and one.saving > 0]
+    in_place = [one for one in useful if not one.out_of_place] or useful
+    most = max((one.saving or 0.0 for one in in_place), default=0.0)
+    alike = [one for one in in_place if (one.saving or 0.0) >= most - _LIKE]
+    best = min(alike, key=lambda one: len(one.parts), default=None)
+    for one in sets:
+        yield replace(one, recommended=one is best)
+
+
+def _cautions(
+    facts: RunFacts, model: CostModel | None, rows: Sequence[PartRow], sets: Sequence[PartSet]
+) -> Iterator[Caution]:
+    if facts.reason:
+        yield Caution("no-part-history", facts.reason)
+    if model is None:
+        yield Caution("no-deck", "without a deck the cost and most verdicts stay open; name the main deck of the run")
+        return
+    for note in model.inventory.notes:
+        yield Caution("deck-not-followed", note)
+    if model.assumed:
+        yield Caution(
+            "weights-by-analogy",
+            f"the cost of {', '.join(model.assumed)} was not measured; that of a formulation alike was taken",
+        )
+    if missing := [row.id for row in rows if row.elements is None and row.id in facts.parts]:
+        yield Caution("parts-not-in-deck", f"part {', '.join(map(str, missing))} of the history is not in the deck")
+    if not any(row.movable for row in rows):
+        yield Caution("nothing-to-switch", "no part may be switched; the reasons are listed in the rows")
+    elif not any(one.recommended for one in sets):
+        yield Caution("no-set", "no set of parts can be recommended; the reasons are listed with the sets")
+    if sets:
+        yield Caution("no-angle", _NO_ANGLE)

@@ -1,0 +1,202 @@
+"""Which parts may be switched: what deck and history say about each, and a verdict with its reasons."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.deck.inventory.model import DISCRETE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from d2rpick.choice.cost import CostModel
+    from d2rpick.choice.part_facts import InFlight, PartFacts, RunFacts
+    from d2rpick.choice.part_steps import Steps
+    from d2rpick.deck.inventory.model import Inventory, PartData
+
+SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
+# A part drives the landing alone where it takes nearly all of its energy at first, and is so small a part of the cost
+# that to leave it deformable costs next to nothing: a bumper, a skid, not the shell of the body.
+LANDING_ALONE: Final = 0.9
+_CHEAP: Final = 0.1
+
+
+@dataclass(frozen=True)
+class PartRow:
+    """One part with all that is known of it; None stands for what is not.
+
+    ``cost_share`` is that of its elements in the cost of all elements [-], ``smallest_step`` its smallest stable time
+    step [time]; ``mass_source`` and ``step_source`` name where they are from.  ``flights`` has what the part does in
+    each flight, ``flight`` that in the longest.  ``merge_with`` is the part whose rigid body it joins.
+    """
+
+    id: int
+    title: str
+    elements: Mapping[str, int] | None
+    formulations: tuple[str, ...]
+    material: str | None
+    kind: str | None
+    mass: float | None
+    mass_source: str | None
+    flights: tuple[InFlight, ...]
+    flight: InFlight | None
+    cost_share: float | None
+    smallest_step: float | None
+    step_source: str | None
+    shares_nodes: tuple[int, ...] | None
+    verdict: str = UNKNOWN
+    merge_with: int | None = None
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def movable(self) -> bool:
+        """Whether the part may be switched."""
+        return self.verdict in (SWITCH, MERGE)
+
+
+def rows_of(facts: RunFacts, model: CostModel | None, steps: Steps) -> tuple[PartRow, ...]:
+    """Judge every part of a deck or history, ascending by number.
+
+    Parameters
+    ----------
+    facts : RunFacts
+        What the history says.
+    model : CostModel or None
+        The deck with its cost; without it no verdict that depends on materials or shared nodes is given.
+    steps : Steps
+        Masses by the deck, and smallest stable steps.
+    """
+    inventory = model.inventory if model else None
+    ids = sorted({*facts.parts, *(inventory.parts if inventory else ())})
+    rows = [_described(part, facts, model, steps) for part in ids]
+    alone = _landing_alone(rows)
+    judged = [_judged(row, facts, inventory, alone) for row in rows]
+    return tuple(_merged(judged, inventory)) if inventory else tuple(judged)
+
+
+def _described(part: int, facts: RunFacts, model: CostModel | None, steps: Steps) -> PartRow:
+    fact, inventory = facts.parts.get(part), model.inventory if model else None
+    data = inventory.parts.get(part) if inventory else None
+    counts = inventory.counts.get(part, Counter()) if inventory and data else None
+    by_deck, (step, source) = steps.masses.get(part), steps.of(part)
+    mass = fact.mass if fact and fact.mass is not None else by_deck
+    title = data.title if data and data.title else fact.part.title if fact else ""
+    return PartRow(
+        id=part,
+        title=title,
+        elements=counts,
+        formulations=tuple(inventory.formulation(part, kind).name for kind in counts) if inventory and counts else (),
+        material=data.material.name if data and data.material else None,
+        kind=_kind(data, counts),
+        mass=mass,
+        mass_source=None if mass is None else "history" if fact and fact.mass is not None else "deck",
+        flights=fact.flights if fact else (),
+        flight=fact.flights[facts.longest] if fact and facts.longest is not None and fact.flights else None,
+        cost_share=model.share_of(part).value if model and counts is not None else None,
+        smallest_step=step,
+        step_source=source,
+        shares_nodes=tuple(sorted(inventory.neighbours.get(part, ()))) if inventory and data else None,
+    )
+
+
+def _kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None:
+    """Kind of a part: that of its material, and of its elements where these are springs or particles."""
+    if data is None:
+        return None
+    if counts and set(counts) <= DISCRETE:
+        return "spring"
+    if counts and "particle" in counts:
+        return "particles"
+    return data.material.kind if data.material else None
+
+
+def _judged(row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None) -> PartRow:
+    fact = facts.parts.get(row.id)
+    data = inventory.parts.get(row.id) if inventory else None
+    kept = tuple(_to_keep(row, fact, data, alone))
+    if kept:
+        return replace(row, verdict=KEEP, reasons=kept)
+    open_ = tuple(_not_known(row, facts, inventory, data))
+    if open_:
+        return replace(row, verdict=UNKNOWN, reasons=open_)
+    return replace(row, verdict=SWITCH, reasons=tuple(_to_switch(row, fact, data)))
+
+
+def _to_keep(row: PartRow, fact: PartFacts | None, data: PartData | None, alone: int | None) -> Iterator[str]:
+    """Reasons not to switch a part."""
+    if row.kind == "rigid" and not (fact and fact.has_energy):
+        yield "already rigid"
+        return
+    if row.kind == "spring":
+        yield "discrete"
+        if data and data.section.damped:
+            yield "with dampers, whose work only grows in its energy"
+        return
+    if row.kind in ("airbag", "void", "particles"):
+        yield {"airbag": "airbag fabric", "void": "void material, without stiffness", "particles": "particles"}[
+            row.kind
+        ]
+        return
+    if row.elements is not None and not row.elements:
+        yield "no elements"
+        return
+    if fact and fact.has_energy is False:
+        yield "never any internal energy: rigid, or fixed"
+    elif row.flight and row.flight.flies is False:
+        yield "does not fly with the rest"
+    if data and not data.section.turns:
+        yield "stresses of its solids do not turn with a rigid body"
+    if row.id == alone:
+        yield "drives the landing alone, at little cost"
+
+
+def _not_known(row: PartRow, facts: RunFacts, inventory: Inventory | None, data: PartData | None) -> Iterator[str]:
+    """Say what would have to be known to judge a part that nothing speaks against."""
+    if inventory is None:
+        yield "without a deck it is not known whether it is discrete, already rigid, or shares nodes"
+    elif data is None:
+        yield "not in the deck"
+    elif data.material is None:
+        yield "its material is not in the deck"
+    if row.id not in facts.parts:
+        yield facts.reason or "not in the history"
+    elif row.flight is None:
+        yield facts.reason or "no flight is seen"
+    elif row.flight.flies is None:
+        yield "no momenta of parts show whether it flies with the rest"
+
+
+def _to_switch(row: PartRow, fact: PartFacts | None, data: PartData | None) -> Iterator[str]:
+    if row.kind == "rigid":
+        yield "rigid in the deck, but it has internal energy in the history"
+    if row.flight and row.flight.deforms is not None:
+        yield "still deforms" if row.flight.deforms else "has stopped deforming"
+    if data and data.section.formulations.keys() & {"solid", "tetrahedron", "pentahedron", "thick shell"}:
+        yield "solids: solvers may misreport their energy while they are rigid"
+    if fact and fact.has_energy is None:
+        yield "its energy is not written"
+
+
+def _landing_alone(rows: Sequence[PartRow]) -> int | None:
+    """Find the part that takes nearly all of the first energy of the landing after the longest flight."""
+    taken = {row.id: row.flight.landing for row in rows if row.flight and row.flight.landing is not None}
+    total = sum(value for value in taken.values() if value > 0)
+    for row in rows:
+        if row.cost_share is None or row.cost_share > _CHEAP or row.kind == "spring":
+            continue
+        if total > 0 and taken.get(row.id, 0.0) >= LANDING_ALONE * total:
+            return row.id
+    return None
+
+
+def _merged(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
+    """Let parts that share nodes be one rigid body: the first by number leads, the others merge with it."""
+    bodies = inventory.groups([row.id for row in rows if row.verdict == SWITCH])
+    lead = {part: body[0] for body in bodies for part in body[1:]}
+    for row in rows:
+        if row.id in lead:
+            yield replace(row, verdict=MERGE, merge_with=lead[row.id], reasons=row.reasons)
+        else:
+            yield row

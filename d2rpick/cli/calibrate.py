@@ -1,0 +1,44 @@
+"""The command ``calibrate``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from d2rpick.cli import options as shared
+from d2rpick.cli.output import Output
+from d2rpick.report.formats import FORMATS, Shown, write
+
+EXAMPLES = """\b
+Examples:
+  d2rpick calibrate reference/ switched/
+  d2rpick calibrate -f toml -o site.toml reference/ switched/
+  d2rpick parts --deck main.k --weights site.toml run/
+"""
+
+
+@click.command("calibrate", epilog=EXAMPLES)
+@click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=shared.FILE)
+@shared.output_options(*FORMATS["calibration"])
+@click.pass_context
+def command(
+    ctx: click.Context,
+    /,
+    folders: tuple[str, ...],
+    output_format: str,
+    exit_zero: bool,  # noqa: ARG001
+    **options: Any,
+) -> None:
+    """Fit the cost of elements to what runs of a site took, for --weights.
+
+    Each RUN is the folder of one run, with its deck and what its solver printed: listings of Radioss (NAME_0001.out,
+    with /MON/ON), d3hsp or glstat of LS-DYNA.  Give runs with and without switching of the same model: what they do
+    not tell apart keeps the ratio that was measured.
+    """
+    from d2rpick.choice.calibrate import calibrate
+    from d2rpick.choice.observed_cost import observations_of
+
+    output = Output.of(options)
+    found = calibrate([one for folder in folders for one in observations_of(folder)])
+    output.result(write("calibration", output_format, found, Shown(ctx.meta["d2rpick.command"])))

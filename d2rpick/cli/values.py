@@ -1,0 +1,104 @@
+"""Kinds of values that options take: how they are read, and how the shell completes them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
+if TYPE_CHECKING:
+    FloatType = click.ParamType[float]
+else:
+    FloatType = click.ParamType  # generic from click 8.4 on
+
+
+class Number(FloatType):
+    """A finite number with a point, not below ``low`` (or above it, when ``above``) and not above ``high``."""
+
+    name = "number"
+
+    def __init__(self, low: float = -math.inf, high: float = math.inf, *, above: bool = False) -> None:
+        self.low, self.high, self.above = low, high, above
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Read a number or fail with what was found and what was expected."""
+        try:
+            number = float(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a number{_without_unit(str(value))}", param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number", param, ctx)
+        if number < self.low or (self.above and number == self.low):
+            self.fail(
+                f"{value} was found, a number {'above' if self.above else 'of at least'} {self.low:g} was expected",
+                param,
+                ctx,
+            )
+        if number > self.high:
+            self.fail(f"{value} was found, a number of at most {self.high:g} was expected", param, ctx)
+        return number
+
+
+def _without_unit(text: str) -> str:
+    """Say how a time with a unit is given, or nothing."""
+    from d2rpick.histories.names import in_seconds
+
+    value = in_seconds(text)
+    return "" if value is None else f": give it in the unit of the history, without naming that; in s it is {value:g}"
+
+
+# of d2rpick.histories.opening, which is too heavy to be imported for --help; a test holds them together
+FORMATS = ("binout", "radioss-th", "glstat", "matsum", "hdf5", "csv")
+
+
+class File(click.types.StringParamType):
+    """Name of a file or folder, for the shell to complete."""
+
+    envvar_list_splitter = ";"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        """Leave it to the shell."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="file")]
+
+
+class Names(click.types.StringParamType):
+    """Names that are separated by semicolons in an environment variable, since labels hold blanks."""
+
+    envvar_list_splitter = ";"
+
+
+class PartNames(Names):
+    """Numbers and titles of parts, for the shell to complete from the history that was typed before."""
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        """Offer the parts of the files that were typed before, and the words for several."""
+        from pathlib import Path
+
+        from click.shell_completion import CompletionItem
+
+        from d2rpick.errors import D2RPickError
+        from d2rpick.histories.opening import open_run
+
+        words = ctx.meta.get("d2rpick.command", ())[1:]  # click has read no argument yet when an option is completed
+        offered = [("flying", "parts that fly together"), ("all", "every part that has energy")]
+        try:
+            parts = open_run([word for word in words if Path(word).exists()]).parts
+        except (D2RPickError, OSError, IndexError):
+            parts = ()
+        offered = [*((str(part.id), part.title) for part in parts), *((p.title, str(p.id)) for p in parts), *offered]
+        return [CompletionItem(name, help=text) for name, text in offered if name and name.startswith(incomplete)]
+
+
+NAMES = Names()
+PARTS = PartNames()
+FILE = File()
+TIME = Number()
+POSITIVE = Number(0.0, above=True)
+NOT_NEGATIVE = Number(0.0)
+FRACTION = Number(0.0, high=1.0)

@@ -1,0 +1,272 @@
+"""What a deck says about its parts: elements by kind and formulation, material, nodes that parts share.
+
+Arrays of elements hold places of nodes in the table of nodes, not their ids; -1 where an element has no further node.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    Places = NDArray[np.int64]
+    Reals = NDArray[np.float64]
+
+NO_NODE: Final = -1
+_ONE_BODY: Final = 0.75  # share of the nodes of some parts from which on one group of them is the body
+_DENSE: Final = 50_000_000  # up to this id a table of all ids is small enough
+DISCRETE: Final = frozenset({"spring", "seatbelt"})  # kinds of elements that are not switched by part
+
+
+class Formulation(NamedTuple):
+    """How the elements of a part are computed: what to call it, and the class by which their cost is known.
+
+    ``cost`` is a key of the weights, or None where nothing is known; ``measured`` tells whether the weight of its
+    class was measured for this formulation, or is taken over from one alike.
+    """
+
+    name: str
+    cost: str | None
+    measured: bool = True
+
+
+@dataclass(frozen=True)
+class Material:
+    """Name of a material, ``kind`` ("deformable", "rigid", "spring", "airbag", "void"), and what makes its wave speed.
+
+    Numbers are None where the deck does not give them in a way that is followed.
+    """
+
+    name: str
+    kind: str = "deformable"
+    density: float | None = None
+    modulus: float | None = None
+    poisson: float | None = None
+
+
+@dataclass(frozen=True)
+class Section:
+    """Section of a part: formulations by kind of element, thickness of shells, area of beams, damping of springs.
+
+    ``turns`` False: stresses of its solids do not turn with a rigid body.  ``damped`` is None where it is not known;
+    ``mass`` is that of one spring.
+    """
+
+    formulations: Mapping[str, Formulation] = field(default_factory=dict)
+    thickness: float | None = None
+    area: float | None = None
+    damped: bool | None = None
+    mass: float | None = None
+    turns: bool = True
+
+
+@dataclass(frozen=True)
+class PartData:
+    """What the deck says about one part besides its elements."""
+
+    id: int
+    title: str
+    material: Material | None = None
+    section: Section = Section()
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Elements of one kind: the id of the part, shape (n,), and the places of the nodes, shape (n, nodes)."""
+
+    kind: str
+    part: Places
+    nodes: Places
+
+    def of(self, part: int) -> Places:
+        """Nodes of the elements of a part."""
+        return np.asarray(self.nodes[self.part == part])
+
+
+@dataclass(frozen=True, eq=False)
+class Inventory:
+    """All parts and elements of a deck; ``solver`` is "ls-dyna" or "radioss".
+
+    ``coordinates`` is (nodes, 3), NaN for a node that the deck does not place.  ``notes`` say what was not followed;
+    ``complete`` is False where elements or parts may be missing because of it.
+    """
+
+    solver: str
+    parts: Mapping[int, PartData]
+    elements: tuple[Elements, ...]
+    coordinates: Reals
+    notes: tuple[str, ...] = ()
+    complete: bool = True
+
+    @cached_property
+    def counts(self) -> Mapping[int, Counter[str]]:
+        """Numbers of elements by part and kind."""
+        found: dict[int, Counter[str]] = {}
+        for elements in self.elements:
+            for part, count in zip(*np.unique(elements.part, return_counts=True), strict=True):
+                found.setdefault(int(part), Counter())[elements.kind] += int(count)
+        return found
+
+    def formulation(self, part: int, kind: str) -> Formulation:
+        """How elements of a kind are computed in a part; without a cost where the deck does not tell."""
+        data = self.parts.get(part)
+        found = data.section.formulations.get(kind) if data else None
+        return found or Formulation(kind, None, measured=False)
+
+    @cached_property
+    def nodes_by_part(self) -> Mapping[int, Places]:
+        """Places of the nodes of every part, ascending."""
+        found: dict[int, list[Places]] = {}
+        for elements in self.elements:
+            order = np.argsort(elements.part, kind="stable")
+            parts, starts = np.unique(elements.part[order], return_index=True)
+            for part, rows in zip(parts.tolist(), np.split(order, starts[1:]), strict=True):
+                found.setdefault(part, []).append(_distinct(elements.nodes[rows]))
+        joined = {part: _distinct(np.concatenate(pieces)) for part, pieces in found.items()}
+        return {part: nodes[nodes != NO_NODE] for part, nodes in joined.items()}
+
+    @cached_property
+    def neighbours(self) -> Mapping[int, frozenset[int]]:
+        """Parts that share nodes with each part."""
+        times = np.zeros(len(self.coordinates), np.int32)
+        for nodes in self.nodes_by_part.values():
+            times[nodes] += 1
+        owners: dict[int, list[int]] = {}
+        for part, nodes in self.nodes_by_part.items():
+            for node in nodes[times[nodes] > 1].tolist():
+                owners.setdefault(node, []).append(part)
+        found: dict[int, set[int]] = {part: set() for part in self.nodes_by_part}
+        for together in {tuple(parts) for parts in owners.values()}:
+            for part in together:
+                found[part].update(other for other in together if other != part)
+        return {part: frozenset(others) for part, others in found.items()}
+
+    def bodies(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
+        """Rigid bodies that these parts make: one where most of their nodes hang together, else a body per group.
+
+        The parts of a car with an engine on its mounts are one body; an engine, a battery and wheels alone are several.
+        """
+        groups = self.groups(parts)
+        largest = max((self.rigid_nodes(group) for group in groups), default=0)
+        if len(groups) > 1 and largest >= _ONE_BODY * self.rigid_nodes(parts):
+            return (tuple(sorted(parts)),)
+        return groups
+
+    def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
+        """Groups of these parts that share nodes, directly or not."""
+        left, found = set(parts), []
+        while left:
+            waiting, body = [min(left)], set[int]()
+            while waiting:
+                part = waiting.pop()
+                if part in left:
+                    left.discard(part)
+                    body.add(part)
+                    waiting += self.neighbours.get(part, frozenset()) & left
+            found.append(tuple(sorted(body)))
+        return tuple(sorted(found))
+
+    def rigid_nodes(self, parts: Iterable[int]) -> int:
+        """Number of nodes of some parts."""
+        return int(np.count_nonzero(self._mask(parts)))
+
+    def elements_within(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
+        """Numbers of elements by part and kind that are rigid once these parts are rigid bodies.
+
+        Radioss puts off every element whose nodes all lie in a body; LS-DYNA puts off those of the parts.
+        """
+        if self.solver != "radioss":
+            return {part: self.counts[part] for part in parts if part in self.counts}
+        found: dict[int, Counter[str]] = {}
+        for body in self.bodies(parts):
+            for part, counts in self._inside(body).items():
+                found[part] = found.get(part, Counter()) + counts
+        return found
+
+    def _inside(self, parts: Collection[int]) -> Mapping[int, Counter[str]]:
+        """Numbers of elements whose nodes all lie in these parts."""
+        inside = np.append(self._mask(parts), True)  # the last stands for NO_NODE
+        found: dict[int, Counter[str]] = {}
+        for elements in self.elements:
+            rigid = inside[elements.nodes].all(axis=1)
+            for part, count in zip(*np.unique(elements.part[rigid], return_counts=True), strict=True):
+                found.setdefault(int(part), Counter())[elements.kind] += int(count)
+        return found
+
+    def _mask(self, parts: Iterable[int]) -> NDArray[np.bool_]:
+        mask = np.zeros(len(self.coordinates), bool)
+        for part in parts:
+            mask[self.nodes_by_part.get(part, np.empty(0, np.int64))] = True
+        return mask
+
+
+def some_of(ids: Sequence[int], most: int = 10) -> str:
+    """Ids for a message, cut where there are many."""
+    more = f" and {len(ids) - most} more" if len(ids) > most else ""
+    return ", ".join(map(str, ids[:most])) + more
+
+
+def _distinct(values: Places) -> Places:
+    """Give the distinct values, ascending; by sorting, which is quicker here than by a table of hashes."""
+    ordered = np.sort(values, axis=None)
+    return ordered[np.append(True, ordered[1:] != ordered[:-1])] if ordered.size else ordered
+
+
+def _used(wanted: Sequence[Places]) -> Places:
+    """Node ids that elements have, ascending."""
+    highest = max((int(one.max(initial=0)) for one in wanted), default=0)
+    if highest > _DENSE:
+        used = _distinct(np.concatenate([_distinct(one) for one in wanted]))
+        return used[used > 0]
+    mask = np.zeros(highest + 1, bool)
+    for one in wanted:
+        mask[one] = True
+    mask[0] = False
+    return np.flatnonzero(mask)
+
+
+def placed(ids: Places, wanted: Sequence[Places]) -> tuple[Places, list[Places]]:
+    """Give every node id its place in one table.
+
+    Parameters
+    ----------
+    ids : array of int, shape (n,)
+        Nodes that have coordinates, in the order of these.
+    wanted : sequence of arrays
+        Node ids of elements, 0 for none.
+
+    Returns
+    -------
+    table : array of int
+        Ids by place: ``ids`` first, then those that elements have beyond them.
+    places : list of arrays
+        Of the shapes of ``wanted``.
+    """
+    order = np.argsort(ids, kind="stable")
+    known = ids[order]
+    used = _used(wanted)
+    at = np.minimum(np.searchsorted(known, used), max(known.size - 1, 0))
+    absent = used[known[at] != used] if known.size else used
+    table = np.concatenate([ids, absent])
+    order = np.argsort(table, kind="stable")
+    known = table[order]
+    dense = known.size and int(known[-1]) <= _DENSE
+    if dense:
+        lookup = np.full(int(known[-1]) + 1, NO_NODE, np.int64)
+        lookup[table[::-1]] = np.arange(table.size)[::-1]
+        return table, [lookup[one] for one in wanted]
+    places = [
+        np.where(one > 0, order[np.minimum(np.searchsorted(known, one), known.size - 1)], NO_NODE)
+        if known.size
+        else one
+        for one in wanted
+    ]
+    return table, places

@@ -1,0 +1,260 @@
+"""Parts and elements of a Radioss starter deck.
+
+Columns: Altair's public help for the elements, properties and materials, and the solver's published source.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.deck.expression import ExpressionError, number
+from d2rpick.deck.inventory import formulations
+from d2rpick.deck.inventory.columns import is_cut, layout, lines_of
+from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, some_of
+from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
+from d2rpick.deck.radioss.legs import find_run_windows
+from d2rpick.deck.radioss.starter import WITHOUT_FRAME
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from d2rpick.deck.card import Card
+    from d2rpick.deck.inventory.columns import Integers, Layout, Reals
+    from d2rpick.deck.inventory.model import Formulation
+    from d2rpick.deck.radioss.files import Run
+    from d2rpick.deck.radioss.starter import Starter
+
+_COMMENTS: Final = b"$#"
+_WIDTH, _REAL = 10, 20
+
+
+class _Kind(NamedTuple):
+    """Kind of elements: what to call it, nodes that hold the part, ids on each of its lines."""
+
+    name: str
+    nodes: int
+    lines: tuple[int, ...]
+
+
+_KINDS: Final = {
+    "SHELL": _Kind("shell", 4, (5,)), "SH3N": _Kind("triangle", 3, (4,)), "BRICK": _Kind("solid", 8, (9,)),
+    "TETRA4": _Kind("tetrahedron", 4, (5,)), "PENTA6": _Kind("pentahedron", 6, (7,)), "QUAD": _Kind("quad", 4, (5,)),
+    "TRIA": _Kind("tria", 3, (4,)), "BEAM": _Kind("beam", 2, (3,)), "TRUSS": _Kind("truss", 2, (3,)),
+    "SPRING": _Kind("spring", 2, (3,)), "TETRA10": _Kind("tetrahedron", 10, (1, 10)),
+    "BRIC20": _Kind("solid", 20, (9, 8, 4)), "SHEL16": _Kind("thick shell", 16, (9, 8)),
+}  # fmt: skip
+_NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
+_ELASTIC: Final = {
+    *("ELAST", "LAW1", "LAW01", "PLAS_JOHNS", "LAW2", "LAW02", "PLAS_ZERIL", "PLAS_BRIT", "LAW27", "PLAS_TAB", "LAW36"),
+    *("COWPER", "LAW44", "DAMA", "LAW22", "LAW22_DAMA"),
+}  # density, then Young's modulus and Poisson's ratio
+_VOID: Final = {"VOID", "LAW0", "LAW00"}
+_AIRBAG: Final = {"FABRI", "FABR_A", "LAW19", "LAW58"}
+_SHELLS: Final = {"SHELL", "TYPE1"}
+_SOLIDS: Final = {"SOLID", "TYPE14"}
+_BEAMS: Final = {"BEAM", "TYPE3"}
+_TRUSSES: Final = {"TRUSS", "TYPE2"}
+_SPRING: Final = {"SPRING", "TYPE4"}
+_OTHER_SPRINGS: Final = {"SPR_GENE", "TYPE8", "SPR_BEAM", "TYPE13", "SPR_PUL", "TYPE12", "SPR_AXI", "TYPE25", "KJOINT",
+                         "TYPE33", "KJOINT2", "TYPE45"}  # fmt: skip
+_OF_SPRINGS: Final = _SPRING | _OTHER_SPRINGS
+_DEFAULT_SHELL, _DEFAULT_TRIANGLE, _DEFAULT_SOLID = 1, 2, 1
+
+
+class _Property(NamedTuple):
+    """A property as written: its type and the flags and numbers that matter."""
+
+    type: str
+    shell: int = 0
+    triangle: int = 0
+    solid: int = 0
+    section: Section = Section()
+
+
+def read(run: Run) -> Inventory:
+    """Collect the parts and elements of a run whose starter deck was read."""
+    starter = run.starter
+    if starter is None:
+        return Inventory("radioss", {}, (), np.empty((0, 3)), ("no starter deck (NAME_0000.rad) was found",), False)
+    cards = [card_of(block) for source in starter.sources for block in blocks(source)]
+    worded = [(card, keyword(card.block)) for card in cards]
+    raw = [one for card, words in worded if words and words[0] in _KINDS for one in _elements(card, words)]
+    ids, coordinates = _nodes([card for card, words in worded if words[:1] == ("NODE",)])
+    kinds = sorted({(kind, nodes.shape[1]) for kind, _, nodes in raw})
+    table, places = placed(
+        ids, [np.concatenate([n for name, _, n in raw if (name, n.shape[1]) == kind]) for kind in kinds]
+    )
+    elements = tuple(
+        Elements(kind[0], np.concatenate([part for name, part, n in raw if (name, n.shape[1]) == kind]), nodes)
+        for kind, nodes in zip(kinds, places, strict=True)
+    )
+    beyond = np.full((table.size - ids.size, 3), np.nan)
+    notes = tuple(_notes(run, worded, elements, starter, len(beyond)))
+    parts = _parts(run, worded, elements)
+    return Inventory("radioss", parts, elements, np.concatenate([coordinates, beyond]), notes, complete=not notes)
+
+
+def _notes(
+    run: Run, cards: Sequence[tuple[Card, tuple[str, ...]]], elements: Sequence[Elements], starter: Starter, lost: int
+) -> Iterator[str]:
+    """Say what may be missing."""
+    for card, words in cards:
+        if words and words[0] in _NOT_COUNTED:
+            yield f"{card.file}:{card.line}: elements of /{'/'.join(words)} are not followed"
+        if words and words[0] in {*_KINDS, "NODE"} and card.block.end is None and is_cut(card.block):
+            yield f"{card.file}: the file ends within a line of its mesh; is it cut?"
+    for unread in run.deck.unread:
+        yield f"{unread.name.file}:{unread.name.line}: {unread.name.text} was not read: {unread.reason}"
+    if starter.moved:
+        yield "ids of a //SUBMODEL may be moved, which is not followed"
+    unknown = sorted({int(part) for one in elements for part in np.unique(one.part)} - starter.parts.keys())
+    if unknown:
+        yield f"elements of part {some_of(unknown)}, which no /PART of the deck defines"
+    if lost:
+        yield f"{lost} nodes of elements are not in any /NODE of the deck"
+
+
+def _elements(card: Card, words: tuple[str, ...]) -> Iterator[tuple[str, Integers, Integers]]:
+    """Kind, parts and node ids of the elements of a card."""
+    kind, part = _KINDS[words[0]], whole(words[1]) if words[1:] else 0
+    fields: Layout = layout(*[_WIDTH] * max(kind.lines))
+    found = [lines.integers(fields) for lines in lines_of(card, _COMMENTS) if len(lines)]
+    if not found:
+        return
+    values = np.concatenate(found)
+    per = len(kind.lines)
+    values = values[: len(values) // per * per].reshape(-1, per, values.shape[1])
+    flat = np.concatenate([values[:, line, :count] for line, count in enumerate(kind.lines)], axis=1)
+    good = (flat[:, 0] > 0) & (flat[:, 1 : 1 + min(kind.nodes, 3)] > 0).all(axis=1)
+    nodes = np.maximum(flat[good, 1 : 1 + kind.nodes], 0)
+    yield kind.name, np.full(len(nodes), part, np.int64), nodes
+
+
+def _nodes(cards: Sequence[Card]) -> tuple[Integers, Reals]:
+    ids, places = [np.empty(0, np.int64)], [np.empty((0, 3))]
+    fields: Layout = layout(_WIDTH, _REAL, _REAL, _REAL)
+    for card in cards:
+        for lines in lines_of(card, _COMMENTS):
+            if len(lines):
+                numbers = lines.integers(fields[:1])[:, 0]
+                ids.append(numbers[numbers > 0])
+                places.append(lines.reals(fields, slice(1, 4))[numbers > 0])
+    return np.concatenate(ids), np.concatenate(places)
+
+
+def _parts(
+    run: Run, cards: Sequence[tuple[Card, tuple[str, ...]]], elements: Sequence[Elements]
+) -> Mapping[int, PartData]:
+    materials = dict(_materials(cards))
+    properties = dict(_properties(cards))
+    kinds: dict[int, set[str]] = {}
+    for one in elements:
+        for part in np.unique(one.part).tolist():
+            kinds.setdefault(part, set()).add(one.kind)
+    rigid, unturned = (
+        _always_rigid(run),
+        {whole(words[1]) for _, words in cards if words[1:] and words[0] in WITHOUT_FRAME},
+    )
+    found: dict[int, PartData] = {}
+    for card, words in cards:
+        rows = [row for row in card.rows if not row.blank] if words[:1] == ("PART",) else []
+        if len(rows) < 2:
+            continue
+        part, prop, material = whole(words[1]), card.integer(rows[1], 0).value, card.integer(rows[1], 1).value
+        section = _section(properties.get(prop), kinds.get(part, set()), turns=part not in unturned)
+        found[part] = PartData(
+            part, rows[0].text.strip(), _material(materials.get(material), properties.get(prop), part in rigid), section
+        )
+    return found
+
+
+def _material(found: Material | None, prop: _Property | None, rigid: bool) -> Material | None:
+    """Material of a part: a spring has its stiffness in its property, and a rigid body takes whole parts."""
+    if prop and prop.type in _OF_SPRINGS:
+        return Material(f"PROP/{prop.type}", "spring")
+    if found and rigid:
+        return Material(found.name, "rigid", found.density, found.modulus, found.poisson)
+    return found
+
+
+def _always_rigid(run: Run) -> set[int]:
+    """Parts in a rigid body that is on from the start to the end; none where no engine file tells."""
+    if not run.legs:
+        return set()
+    windows = find_run_windows(run).windows.windows
+    return {one.unit.id for one in windows if not one.unit.is_body and one.tr == 0 and one.td is None}
+
+
+def _materials(cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Iterator[tuple[int, Material]]:
+    for card, words in cards:
+        if words[:1] != ("MAT",) or len(words) < 3:
+            continue
+        rows = [row for row in card.rows if not row.blank]
+        law = words[1]
+        density = _positive(rows[1].text[:_REAL]) if len(rows) > 1 else None
+        known = law in _ELASTIC and len(rows) > 2
+        modulus, poisson = (_positive(rows[2].text[at : at + _REAL]) if known else None for at in (0, _REAL))
+        kind = "void" if law in _VOID else "airbag" if law in _AIRBAG else "deformable"
+        yield whole(words[2]), Material(f"MAT/{law}", kind, density, modulus, poisson)
+
+
+def _properties(cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Iterator[tuple[int, _Property]]:
+    defaults = {words[0]: _flags(card, 0) for card, words in cards if words[:1] in (("DEF_SHELL",), ("DEF_SOLID",))}
+    shell, _, triangle = (defaults.get("DEF_SHELL") or [0, 0, 0])[:3]
+    solid = (defaults.get("DEF_SOLID") or [0])[0]
+    for card, words in cards:
+        if words[:1] != ("PROP",) or len(words) < 3:
+            continue
+        flags, rows = _flags(card, 1), [row.text for row in card.rows if not row.blank]
+        found = _Property(words[1])
+        if words[1] in _SHELLS:
+            found = _Property(
+                words[1], flags[0] or shell or _DEFAULT_SHELL, flags[2] or triangle or _DEFAULT_TRIANGLE,
+                section=Section(thickness=_at(rows, 3, 20)),
+            )  # fmt: skip
+        elif words[1] in _SOLIDS:
+            isolid, iframe = flags[0] or solid or _DEFAULT_SOLID, flags[7]
+            found = _Property(words[1], solid=isolid, section=Section(turns=isolid not in (1, 2) or iframe == 2))
+        elif words[1] in _BEAMS:
+            found = _Property(words[1], section=Section(area=_at(rows, 3, 0)))
+        elif words[1] in _TRUSSES:
+            found = _Property(words[1], section=Section(area=_at(rows, 1, 0)))
+        elif words[1] in _SPRING:
+            damped = len(rows) > 2 and _positive(rows[2][_REAL : 2 * _REAL]) is not None
+            found = _Property(words[1], section=Section(damped=damped, mass=_at(rows, 1, 0)))
+        yield whole(words[2]), found
+
+
+def _section(prop: _Property | None, kinds: set[str], *, turns: bool) -> Section:
+    if prop is None:
+        return Section(turns=turns)
+    found: dict[str, Formulation] = {}
+    for kind in sorted(kinds):
+        flags = (prop.shell, prop.triangle, prop.solid)
+        needed = {"shell": flags[0], "triangle": flags[1], "solid": flags[2]}.get(kind, 1)
+        one = formulations.radioss(kind, *flags) if needed else None
+        if one:
+            found[kind] = one
+    own = prop.section
+    return Section(found, own.thickness, own.area, own.damped, own.mass, own.turns and turns)
+
+
+def _flags(card: Card, row: int) -> list[int]:
+    """Eight integers of a line of 10 columns each; 0 for what is none."""
+    rows = [one for one in card.rows if not one.blank]
+    return [card.integer(rows[row], at).value if row < len(rows) else 0 for at in range(8)]
+
+
+def _at(rows: Sequence[str], row: int, start: int) -> float | None:
+    return _positive(rows[row][start : start + _REAL]) if row < len(rows) else None
+
+
+def _positive(text: str) -> float | None:
+    """Read a number above 0, or None."""
+    try:
+        value = float(number(text))
+    except ExpressionError:
+        return None
+    return value if value > 0 else None

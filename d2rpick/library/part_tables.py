@@ -1,0 +1,162 @@
+"""The parts of a run, and sets of them worth switching."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Unpack
+
+from d2rpick.library import arguments
+from d2rpick.library.answers import written
+from d2rpick.library.frames import frame_of
+from d2rpick.library.repeat import options_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+
+    from d2rpick.choice.cost import CostModel, Weights
+    from d2rpick.choice.part_sets import Parts as Core
+    from d2rpick.choice.part_sets import PartSet
+    from d2rpick.choice.part_verdicts import PartRow
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.library.arguments import Choosing, Parts
+    from d2rpick.library.runs import Run
+
+
+@dataclass(frozen=True, eq=False)
+class PartTable:
+    """Answer of `parts`; nothing of it changes.
+
+    ``rows`` has every part with its ``verdict`` and ``reasons``, ``sets`` what is worth comparing, ``recommended`` the
+    set to take, None where there is none; its ``parts`` and ``cost_share`` are what `suggest` and `plan` take.
+    """
+
+    run: Run = field(repr=False)
+    rows: tuple[PartRow, ...] = field(repr=False)
+    sets: tuple[PartSet, ...]
+    recommended: PartSet | None
+    warnings: tuple[Caution, ...]
+    command: tuple[str, ...] = field(repr=False)
+    _core: Core = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give what ``-f json`` prints, by schema d2rpick/parts/1."""
+        from d2rpick.report.parts import as_json
+
+        found: dict[str, Any] = json.loads(as_json(self._core, self.command))
+        return found
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give a row per part.
+
+        The columns are the keys of ``parts`` in the JSON; what is not known is NaN.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> d2.parts(d2.read("sample_data/rollover_box.matsum")).to_frame()["verdict"].tolist()
+        ['unknown', 'unknown']
+        """
+        from d2rpick.report.parts import PART, part
+
+        return frame_of([part(row) for row in self.rows], PART, source=list(self.run.sources))
+
+    def sets_frame(self) -> pd.DataFrame:
+        """Give a row per set; the columns are the keys of ``sets`` in the JSON."""
+        from d2rpick.report.parts import SET, set_
+
+        return frame_of([set_(one) for one in self.sets], SET, source=list(self.run.sources))
+
+    def report(self, path: arguments.Path) -> Path:
+        """Write everything to one HTML page that needs no network; an existing file is replaced."""
+        from d2rpick.report.parts_page import as_page
+
+        return written(path, as_page(self._core, ("d2rpick", *self.command)))
+
+
+def parts(
+    run: Run,
+    *,
+    deck: arguments.Path | None = None,
+    weights: Weights | arguments.Path | None = None,
+    given: Parts | None = None,
+    tr: float | None = None,
+    td: float | None = None,
+    **choosing: Unpack[Choosing],
+) -> PartTable:
+    """Say which parts of a run may be switched and what sets of them save, as ``d2rpick parts`` does.
+
+    Parameters
+    ----------
+    run : Run
+        As `read` gives it, without switching.
+    deck : path, optional
+        Main deck of the run: of LS-DYNA, or a starter or engine file of Radioss.
+    weights : Weights or path, optional
+        Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
+    given : number, title or several, optional
+        A set to be compared too.
+    tr, td : float, optional
+        The window to compare in, or its end alone [time].  Default: at the end of the longest flight.
+    **choosing
+        As for `suggest`.
+
+    Returns
+    -------
+    PartTable
+
+    Raises
+    ------
+    D2RPickError
+        If the deck or the weights cannot be read, or the run has no such parts.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> [row.title for row in d2.parts(d2.read("sample_data/rollover_box.matsum")).rows]
+    ['box', 'step']
+    """
+    from d2rpick.choice.part_sets import parts_of
+    from d2rpick.histories.printed_steps import printed_steps
+    from d2rpick.histories.selection import select_parts
+
+    if weights is not None and deck is None:
+        raise ValueError("weights needs a deck, whose elements are weighted")
+    settings = arguments.settings({"cost_share": 0.0, **choosing})  # that of each set is from the deck
+    times = _times(tr, td)
+    names = arguments.part_names("given", given)
+    decks = arguments.paths("deck", deck) if deck is not None else ()
+    model = _model(decks[0], weights) if decks else None
+    wanted = select_parts(names, run.parts, run.files.name) if names else ()
+    core = parts_of(
+        run.files, settings, model, given=[part.id for part in wanted], times=times,
+        printed=printed_steps(run.files, *decks),
+    )  # fmt: skip
+    asked = [("--deck", *decks)] if decks else []
+    asked += [("--weights", str(weights))] if isinstance(weights, str) else []
+    asked += [(f"--{name}", repr(value)) for name, value in (("tr", tr), ("td", td)) if value is not None]
+    options = [text for pair in asked for text in pair]
+    command = ("parts", *options, *options_of(run.chosen._replace(parts=names), choosing), *run.sources)
+    return PartTable(run, core.rows, core.sets, core.recommended, core.cautions, command, core)
+
+
+def _model(deck: str, weights: Weights | arguments.Path | None) -> CostModel:
+    from d2rpick.choice.cost import CostModel, Weights
+    from d2rpick.choice.weights_file import read_weights
+    from d2rpick.deck.inventory import read_inventory
+
+    if weights is not None and not isinstance(weights, Weights):
+        weights = read_weights(arguments.paths("weights", weights)[0])
+    return CostModel(read_inventory(deck), weights)
+
+
+def _times(tr: float | None, td: float | None) -> tuple[float, float] | float | None:
+    if td is None:
+        if tr is not None:
+            raise ValueError("tr needs td, the end of the window")
+        return None
+    return arguments.number("td", td) if tr is None else arguments.window("tr, td", (tr, td))

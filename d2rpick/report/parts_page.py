@@ -1,0 +1,43 @@
+"""The answer of ``parts`` as one HTML page to be read, printed and signed."""
+
+from __future__ import annotations
+
+import shlex
+from typing import TYPE_CHECKING
+
+from d2rpick.report import page
+from d2rpick.report.html import Markup, document, pairs, remarks, section, table, tag
+from d2rpick.report.parts import HEAD, SET_HEAD, heading, outlook, rows, set_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.choice.part_sets import Parts, PartSet
+
+
+def as_page(found: Parts, command: Sequence[str]) -> str:
+    """Write the page; ``command`` are the arguments that repeat the answer."""
+    return document(f"Parts to switch: {found.run.name}", *_sections(found, command), signed=("chosen by", "date"))
+
+
+def _sections(found: Parts, command: Sequence[str]) -> Iterator[Markup]:
+    yield tag("section", tag("div", _card(found.recommended), class_="choice"), remarks(found.cautions))
+    if found.sets:
+        marked = next((at for at, one in enumerate(found.sets) if one.recommended), None)
+        yield section("Sets", table("Sets", SET_HEAD[1:], [row[1:] for row in set_rows(found)], marked))
+    yield section("Parts", table("Parts", HEAD[1:], [row[1:] for row in rows(found)]))
+    yield section("What it means", pairs(outlook(found)))
+    read = [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in heading(found)]
+    if found.weights:
+        read.append(("weights", found.weights.source))
+    yield section("What was read", pairs([*read, *page.digests(found.run.files)]))
+    yield section("To repeat this", tag("pre", shlex.join(command), class_="wrap"))
+
+
+def _card(best: PartSet | None) -> Markup:
+    if best is None:
+        nothing = tag("p", "No set of parts can be recommended.")
+        return tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")
+    saved = tag("span", tag("i", "saved"), f"{best.saving:.0%}")
+    listed = tag("p", f"parts {', '.join(map(str, best.parts))}")
+    return tag("div", tag("h2", best.name), tag("div", saved, class_="times"), listed, class_="card chosen")

@@ -1,0 +1,109 @@
+"""How good a pair is called, by what is known of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.choice.quality import GRADES, quality_of, states_per_period
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.choice.verify import verify
+from d2rpick.histories.history import History
+from tests.records import ENERGY, TIME, vibration
+
+RECORD = History(TIME, ENERGY, ("paper",), "made", "E")
+
+
+def grade(history: History, td: float, **asked: float | bool) -> str | None:
+    """Grade of what is recommended at a td."""
+    found = suggest(history, td, Settings(**asked)).quality  # type: ignore[arg-type]
+    return found.grade if found else None
+
+
+@given(st.floats(0.04, 0.14))
+def test_the_residual_of_a_known_vibration_decides(td: float) -> None:
+    answer = suggest(RECORD, td, Settings())
+    if answer.chosen is None or answer.quality is None:
+        return
+    residual = answer.chosen.residual
+    assert residual is not None
+    assert answer.quality.grade == ("good" if residual <= 0.2 else "fair" if residual <= 0.5 else "poor")
+    assert bool(answer.quality.reasons) == (answer.quality.grade != "good")
+
+
+def test_the_energy_alone_is_fair_at_best() -> None:
+    mode = vibration(np.array([200.0, 2.0, 1.0, 0.0]))
+    record = History(TIME, mode.energy(TIME), ("one",), "made", "E")
+    at_a_peak = float(mode.peaks(0.06, 0.08)[0])
+    assert grade(record, at_a_peak) == "good"
+    assert grade(record, at_a_peak, replay=False, after=0.005) == "fair"
+    answer = suggest(record, at_a_peak, Settings(replay=False, after=0.005))
+    assert answer.quality is not None
+    assert answer.quality.reasons == ("the sign of the deformation is unknown",)
+
+
+def test_a_td_near_the_zero_of_the_energy_is_poor_by_the_energy_alone() -> None:
+    assert grade(RECORD, 0.064, replay=False, after=0.005) == "poor"
+
+
+@pytest.mark.parametrize(
+    ("energy", "reason"),
+    [
+        (np.sin(40 * np.linspace(0, 1, 400)), "falls below zero"),
+        (1 + 0.3 * np.sin(np.linspace(0, 1, 400) * 400), "states per period"),
+    ],
+    ids=["a velocity", "a coarse output"],
+)
+def test_a_record_that_no_level_can_be_read_from_is_poor(energy: np.ndarray, reason: str) -> None:
+    history = History(np.linspace(0, 1, 400), energy, ("x",), "made", "E")
+    answers = [suggest(history, td, Settings(after=0.1, replay=False)) for td in np.linspace(0.7, 0.9, 20)]
+    found = [answer.quality for answer in answers if answer.quality]
+    assert found
+    assert all(one.grade == "poor" and any(reason in text for text in one.reasons) for one in found)
+
+
+def test_a_flight_that_is_not_certain_is_no_better_than_fair() -> None:
+    time = np.linspace(0, 1, 500)
+    waves = sum((np.sin(rate * time + rate) ** 2 for rate in (30, 47, 71, 103, 151, 199)), np.zeros(500))
+    energy = np.where(time < 0.2, 50 * (0.2 - time), 0) + waves
+    answer = suggest(History(time, energy, ("x",), "made", "E"), 0.8, Settings())
+    assert answer.situation.flight.source == "energy"
+    assert answer.quality is not None
+    assert answer.quality.grade in ("poor", "fair")
+
+
+def test_rest_is_good() -> None:
+    history = History(TIME, np.full(TIME.size, 3.0), ("x",), "made", "E")
+    assert grade(history, 0.1, after=0.01) == "good"
+
+
+def test_a_pair_is_graded_the_same_whether_it_is_suggested_or_verified() -> None:
+    for td in (0.064, 0.0687534, 0.07):
+        answer = suggest(RECORD, td, Settings())
+        assert answer.recommended is not None
+        verdict = verify(RECORD, answer.recommended.tr, td, Settings())
+        assert verdict.quality is not None
+        assert answer.quality is not None
+        assert verdict.quality.grade == answer.quality.grade
+        assert quality_of(verdict.situation, verdict.candidate, None).grade in GRADES
+    assert verify(RECORD, 0.02, 0.064, Settings()).quality is None
+
+
+@given(st.integers(4, 40), st.integers(3, 30))
+def test_states_per_period_are_counted_over_whole_periods(states: int, periods: int) -> None:
+    wave = 1 + np.sin(2 * np.pi * np.arange(states * periods) / states + 0.4)
+    found = states_per_period(wave)
+    assert found is not None
+    assert found == pytest.approx(states, rel=2 / periods)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(wave.size)
+    noisy = states_per_period(wave + noise)
+    assert noisy == pytest.approx(states, rel=2 / periods)  # noise about the mean is not taken for periods
+
+
+def test_without_a_period_there_are_no_states_of_one() -> None:
+    assert states_per_period(np.ones(10)) is None
+    assert states_per_period(np.linspace(0, 1, 50)) is None
+    assert states_per_period(np.zeros(0)) is None

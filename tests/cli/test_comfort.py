@@ -1,0 +1,166 @@
+"""What makes the command line easy to live with: settings, versions, completion, near misses, a manual page."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.cli import COMMANDS, d2rpick
+from d2rpick.cli.manual import manual
+from d2rpick.version import __version__
+from tests.command import ENERGY, ROOT, TIME_LIMIT, answer, run
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
+
+
+def test_settings_are_shown_with_their_sources_and_nothing_is_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("D2RPICK_SUGGEST_MARGIN", "0.001")
+    target = tmp_path / "out.json"
+    shown = run("suggest", "--td", "0.064", "-o", str(target), "--show-settings", ENERGY)
+    assert shown.exit_code == 0
+    lines = shown.stdout.splitlines()
+    assert "td = 0.064  # command line" in lines
+    assert "margin = 0.001  # environment, D2RPICK_SUGGEST_MARGIN" in lines
+    assert "tolerance = 0.2  # default" in lines
+    assert "after = none  # default" in lines
+    assert not target.exists()
+
+
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "rule"])
+def test_every_command_shows_its_settings(command: str) -> None:
+    required = {
+        "verify": ("--tr", "1", "--td", "2", "x"), "replay": ("--stiffness", "1", "--mass", "1", "--v0", "1", "--t-end",
+        "1", "--dt", "1"), "card": ("--tr", "1", "--td", "2"), "reproduce": ("--output-dir", "x"), "rollover": (),
+        "extract": ("x", "-o", "y.csv"), "study": ("--td", "1", "x"),
+    }  # fmt: skip
+    shown = run(command, *required.get(command, ("x",)), "--show-settings")
+    assert shown.exit_code == 0, shown.stderr
+    assert re.search(r"^[\w-]+ = .+  # default$", shown.stdout, re.MULTILINE)
+
+
+def test_the_version_names_the_libraries() -> None:
+    shown = run("--version").stdout.splitlines()
+    assert shown[0] == f"d2rpick, version {__version__}"
+    assert shown[1].startswith(f"Python {sys.version_info.major}.{sys.version_info.minor}")
+    assert [line.split()[0] for line in shown[2:]] == ["click", "numpy", "scipy", "pandas", "h5py", "matplotlib"]
+
+
+def test_verbose_says_what_was_read() -> None:
+    told = run("suggest", "--td", "0.0687534", "-v", "-f", "value", ENERGY)
+    assert re.fullmatch(r"read \S+energy\.csv in \d+\.\d\d s\n", told.stderr)
+    assert told.stdout == run("suggest", "--td", "0.0687534", "-q", "-f", "value", ENERGY).stdout
+
+
+def complete(*args: str) -> list[str]:
+    """Values that the shell offers for the last word."""
+    from click.shell_completion import ShellComplete
+
+    found = ShellComplete(d2rpick, {}, "d2rpick", "_D2RPICK_COMPLETE").get_completions(list(args[:-1]), args[-1])
+    return [one.value for one in found]
+
+
+def test_parts_are_completed_from_the_history_that_was_typed() -> None:
+    assert complete("suggest", MATSUM, "--part", "") == ["1", "2", "box", "step", "flying", "all"]
+    assert complete("suggest", MATSUM, "--part", "b") == ["box"]
+    assert complete("suggest", "--part", "f") == ["flying"]
+    assert complete("suggest", "absent", "--part", "a") == ["all"]
+
+
+@pytest.mark.parametrize(
+    ("args", "told"),
+    [
+        (("--td", "64", ENERGY), "was it meant in ms? Then give --td 0.064, in the unit of the record"),
+        (("--td-window", "60", "70", ENERGY), "was it meant in ms? Then give --td-window 0.06"),
+        (("--td", "64ms", ENERGY), "give it in the unit of the history, without naming that; in s it is 0.064"),
+        (("64", ENERGY), "a time is given as --td, a number in the unit of the record"),
+        (("64ms", ENERGY), "a time is given as --td, a number in the unit of the record, 0.064 where it is s"),
+        (("--td", "0.064", ENERGY.replace("energy", "enrgy")), "(did you mean 'energy.csv'?)"),
+    ],
+)
+def test_a_near_miss_is_named(args: tuple[str, ...], told: str) -> None:
+    result = run("suggest", *args)
+    assert result.exit_code == 2
+    assert told in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_td_far_outside_is_not_explained_by_a_unit() -> None:
+    assert "meant" not in run("suggest", "--td", "1e9", ENERGY).stderr
+    assert "meant" not in run("suggest", "--td", "-64", ENERGY).stderr
+
+
+def test_ndjson_is_the_json_in_one_line() -> None:
+    line = run("suggest", "--td", "0.064", "-q", "-f", "ndjson", ENERGY).stdout
+    assert line.count("\n") == 1
+    whole = answer("suggest", "--td", "0.064", ENERGY)
+    found = json.loads(line)
+    assert found.pop("command") != whole.pop("command")
+    assert found == whole
+
+
+@pytest.mark.parametrize(
+    ("args", "wanted", "code"),
+    [
+        (("suggest", "--td", "0.064"), "fair", 1),
+        (("suggest", "--td", "0.0687534"), "good", 0),
+        (("verify", "--tr", "0.0128853", "--td", "0.064"), "fair", 1),
+        (("verify", "--tr", "0.0135867", "--td", "0.0687534"), "good", 0),
+        (("explore", "--td-window", "0.06", "0.066", "--steps", "5"), "good", 1),
+        (("explore", "--td-window", "0.06", "0.07", "--steps", "5"), "good", 0),
+    ],
+)
+def test_a_pair_may_be_asked_to_be_good(args: tuple[str, ...], wanted: str, code: int) -> None:
+    plain = run(*args, "-q", "-f", "csv", ENERGY)
+    asked = run(*args, "-q", "-f", "csv", "--min-quality", wanted, ENERGY)
+    assert (plain.exit_code, asked.exit_code) == (0, code)
+    assert asked.stdout == plain.stdout
+    assert run(*args, "-q", "--exit-zero", "--min-quality", wanted, ENERGY).exit_code == 0
+
+
+def test_the_number_is_the_first_line_whatever_its_quality() -> None:
+    found = run("suggest", "--td", "0.064", "-q", "-f", "value", "--min-quality", "fair", ENERGY)
+    assert found.exit_code == 1
+    assert float(found.stdout.splitlines()[0]) == pytest.approx(0.0128853, abs=1e-7)
+
+
+def test_the_command_on_a_page_can_be_pasted(tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    assert run("suggest", "--td", "0.064", "-q", "--report", str(page), ENERGY).exit_code == 0
+    first = page.read_text("utf-8")
+    line = re.search(r"d2rpick suggest --td 0\.064 [^<]+ --overwrite", first)
+    assert line is not None
+    again = subprocess.run(
+        [sys.executable, "-m", *line[0].split()], capture_output=True, check=False, cwd=ROOT, timeout=TIME_LIMIT
+    )
+    assert again.returncode == 0, again.stderr
+    assert page.read_text("utf-8") == first
+
+
+def test_the_manual_holds_every_command_and_option() -> None:
+    page = manual()
+    for name in COMMANDS:
+        assert f".SH d2rpick {name}\n" in page
+    plain = page.replace(r"\-", "-")
+    for option in ("--td-window", "--min-quality", "--show-settings", "--write-deck"):
+        assert option in plain
+    assert not re.search(r"^'|^\.(?!TH|SH|TP|PP|nf|fi|B\b)", page, re.MULTILINE)
+
+
+@pytest.mark.skipif(not shutil.which("groff"), reason="groff is not installed")
+def test_the_manual_is_roff_without_warnings() -> None:
+    shown = subprocess.run(
+        ["groff", "-man", "-ww", "-Tutf8"], input=manual(), capture_output=True, text=True, check=True
+    )
+    assert not shown.stderr
+    assert "d2rpick" in shown.stdout

@@ -1,0 +1,185 @@
+"""Elements of LS-DYNA decks, against an independent count."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.deck.inventory import ls_dyna, read_inventory
+from d2rpick.deck.inventory.model import Inventory
+from d2rpick.deck.reader import read_deck
+from d2rpick.errors import DeckError
+from tests.decks import read, write
+from tests.sample_deck import DECK, deck
+from tests.shared import shared
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+HEAD = "*KEYWORD\n*PART\na\n         7         1         1\n*PART\nb\n         9         1         1\n"
+
+
+def nodes(width: int = 8, real: int = 16, count: int = 24) -> str:
+    """Node cards of a row of unit cubes."""
+    places = [(i // 4, i % 2, i // 2 % 2) for i in range(count)]
+    return "".join(
+        f"{n:{width}d}" + "".join(f"{float(x):{real}.4f}" for x in place) + "\n" for n, place in enumerate(places, 1)
+    )
+
+
+def row(*ids: int, width: int = 8) -> str:
+    return "".join(f"{one:{width}d}" for one in ids) + "\n"
+
+
+def inventory(folder: Path, text: str, **files: str) -> Inventory:
+    return ls_dyna.read(read(folder, text, {f"{name}.k": content for name, content in files.items()}))
+
+
+def counted(found: Inventory) -> dict[int, dict[str, int]]:
+    return {part: dict(counts) for part, counts in found.counts.items()}
+
+
+SHELLS = row(1, 7, 1, 2, 4, 3) + row(2, 7, 5, 6, 8, 7)
+FORMS = {
+    "plain": (nodes(), "*ELEMENT_SHELL\n" + SHELLS),
+    "i10": (nodes(10).replace("", "", 1), "*ELEMENT_SHELL %\n" + row(1, 7, 1, 2, 4, 3, width=10) + row(2, 7, 5, 6, 8, 7, width=10)),
+    "i10 in the name": (nodes(), "*ELEMENT_SHELL%\n" + row(1, 7, 1, 2, 4, 3, width=10) + row(2, 7, 5, 6, 8, 7, width=10)),
+    "commas": (nodes(), "*ELEMENT_SHELL\n1,7,1,2,4,3\n2,7,5,6,8,7\n"),
+    "commas and columns": (nodes(), "*ELEMENT_SHELL\n1,7,1,2,4,3\n" + row(2, 7, 5, 6, 8, 7)),
+    "parameter": ("*PARAMETER\nI      pid         7\n*NODE\n" + nodes(), "*ELEMENT_SHELL\n       1    &pid       1       2       4       3\n" + row(2, 7, 5, 6, 8, 7)),
+    "thickness": (nodes(), "*ELEMENT_SHELL_THICKNESS\n" + "".join(line + "             1.0" * 4 + "\n" for line in SHELLS.splitlines(True))),
+    "whole thickness": (nodes(), "*ELEMENT_SHELL_THICKNESS\n" + "".join(line + "               1" * 4 + "\n" for line in SHELLS.splitlines(True))),
+    "beta": (nodes(), "*ELEMENT_SHELL_BETA\n" + "".join(line + "             0.0\n" for line in SHELLS.splitlines(True))),
+    "comments and blank lines": (nodes(), "*ELEMENT_SHELL\n$#   eid     pid\n" + SHELLS.replace("\n", "\n$ 1 7 1 2 3\n\n", 1)),
+    "lower case": (nodes(), "*Element_Shell\n" + SHELLS),
+    "CR LF": (nodes(), ("*ELEMENT_SHELL\n" + SHELLS).replace("\n", "\r\n")),
+    "triangles": (nodes(), "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 4) + row(2, 7, 5, 6, 8)),
+    "trailing nodes": (nodes(), "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 3, 0, 0, 0, 0) + row(2, 7, 5, 6, 8, 7, 0, 0, 0, 0)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_two_shells_are_counted_in_every_form(tmp_path: Path, form: str) -> None:
+    mesh, elements = FORMS[form]
+    mesh = mesh if mesh.startswith("*") else f"*NODE{' %' if form == 'i10' else ''}\n{mesh}"
+    found = inventory(tmp_path, f"{HEAD}{mesh}{elements}*END\n")
+    assert counted(found) == {7: {"shell": 2}}
+    assert found.notes == ()
+    assert found.rigid_nodes([7]) == (6 if form == "triangles" else 8)
+
+
+def test_long_format(tmp_path: Path) -> None:
+    head = "*KEYWORD LONG=Y\n*PART\na\n" + row(7, 1, 1, width=20)
+    shells = row(1, 7, 1, 2, 4, 3, width=20) + row(2, 7, 5, 6, 8, 7, width=20)
+    found = inventory(tmp_path, f"{head}*NODE\n{nodes(20, 20)}*ELEMENT_SHELL\n{shells}*END\n")
+    assert counted(found) == {7: {"shell": 2}}
+    assert found.rigid_nodes([7]) == 8
+
+
+@pytest.mark.parametrize(
+    ("elements", "expected"),
+    [
+        ("*ELEMENT_SOLID\n" + row(1, 7, *range(1, 9)), {7: {"solid": 1}}),
+        ("*ELEMENT_SOLID (ten nodes format)\n" + row(1, 7) + row(*range(1, 9)) + row(2, 9) + row(*range(5, 15)),
+         {7: {"solid": 1}, 9: {"solid": 1}}),
+        ("*ELEMENT_SOLID_ORTHO\n" + row(1, 7, *range(1, 9)) + ("             1.0" * 3 + "\n") * 2, {7: {"solid": 1}}),
+        ("*ELEMENT_BEAM\n" + row(1, 7, 1, 2, 3) + row(2, 9, 2, 3, 0), {7: {"beam": 1}, 9: {"beam": 1}}),
+        ("*ELEMENT_BEAM_THICKNESS\n" + row(1, 7, 1, 2, 3) + "             2.0" * 4 + "\n", {7: {"beam": 1}}),
+        ("*ELEMENT_BEAM_PID\n" + row(1, 7, 1, 2, 3) + row(7, 9), {7: {"beam": 1}}),
+        ("*ELEMENT_DISCRETE\n" + row(1, 7, 1, 2, 0) + "       2       9       3       4       0   1.00E+00\n",
+         {7: {"spring": 1}, 9: {"spring": 1}}),
+        ("*ELEMENT_TSHELL\n" + row(1, 7, *range(1, 9)), {7: {"thick shell": 1}}),
+        ("*ELEMENT_MASS\n       1       1             0.5       7\n", {}),
+    ],
+)  # fmt: skip
+def test_other_kinds(tmp_path: Path, elements: str, expected: dict[int, dict[str, int]]) -> None:
+    found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}{elements}*END\n")
+    assert counted(found) == expected
+    assert found.notes == ()
+
+
+def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("d2rpick.deck.inventory.columns._PIECE", 40)
+    text = "".join(row(n, 7) + row(*range(n, n + 8)) for n in range(1, 10))
+    found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}*ELEMENT_SOLID\n{text}*END\n")
+    assert counted(found) == {7: {"solid": 9}}
+
+
+def test_ids_move_with_a_transform_and_parts_of_other_files_share_nodes(tmp_path: Path) -> None:
+    other = f"*KEYWORD\n*PART\nc\n         1         1         1\n*ELEMENT_SHELL\n{row(1, 1, 1, 2, 4, 3)}*END\n"
+    transform = "*INCLUDE_TRANSFORM\nother.k\n" + row(4, 0, 20, 0, 0, width=10) + "\n\n"
+    main = f"{HEAD}*NODE\n{nodes()}*ELEMENT_SHELL\n{row(1, 7, 1, 2, 4, 3)}{row(2, 9, 5, 6, 8, 7)}{transform}*END\n"
+    found = inventory(tmp_path, main, other=other)
+    assert counted(found) == {7: {"shell": 1}, 9: {"shell": 1}, 21: {"shell": 1}}
+    assert found.neighbours == {7: frozenset(), 9: {21}, 21: {9}}
+    assert found.groups([7, 9, 21]) == ((7,), (9, 21))
+
+
+def test_what_is_not_followed_is_said(tmp_path: Path) -> None:
+    strange = "*ELEMENT_SOLID_H64\n" + row(1, 7) + "*INCLUDE\nabsent.k\n*ELEMENT_SHELL\n" + row(1, 5, 1, 2, 4, 99)
+    found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}{strange}       2")
+    assert not found.complete
+    told = " ".join(found.notes)
+    for words in ("ELEMENT_SOLID_H64", "absent.k was not read", "is it cut", "part 5, which no *PART", "1 nodes of"):
+        assert words in told
+
+
+def test_a_deck_without_parts_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DeckError, match="no parts were found"):
+        read_inventory(write(tmp_path, "*KEYWORD\n*END\n"))
+
+
+def test_materials_and_sections_are_told(tmp_path: Path) -> None:
+    cards = (
+        "*MAT_RIGID\n" + row(1, width=10) + "*MAT_SPRING_ELASTIC\n" + row(2, width=10) + "*MAT_DAMPER_VISCOUS_TITLE\nd\n"
+        + row(3, width=10) + "*MAT_FABRIC\n" + row(4, width=10) + "*MAT_SIMPLIFIED_RUBBER/FOAM\n" + row(5, width=10)
+        + "*SECTION_SOLID\n" + row(1, 1, width=10)
+    )  # fmt: skip
+    parts = "".join(f"*PART\np{n}\n{n:10d}{1:10d}{n:10d}\n" for n in range(1, 6))
+    solids = "*ELEMENT_SOLID\n" + "".join(row(n, n, *range(1, 9)) for n in range(1, 6))
+    found = inventory(tmp_path, f"*KEYWORD\n{parts}{cards}*NODE\n{nodes()}{solids}*END\n")
+    kinds = {part: data.material.kind for part, data in found.parts.items() if data.material}
+    assert kinds == {1: "rigid", 2: "spring", 3: "spring", 4: "airbag", 5: "deformable"}
+    assert [found.parts[n].section.damped for n in (1, 2, 3)] == [None, False, True]
+    assert not found.parts[5].section.turns  # ELFORM 1 keeps its stresses in global axes
+
+
+@given(shells=st.lists(st.tuples(st.integers(1, 3), st.integers(1, 40)), min_size=1, max_size=30))
+def test_counts_and_nodes_agree_with_a_plain_count(
+    tmp_path_factory: pytest.TempPathFactory, shells: Sequence[tuple[int, int]]
+) -> None:
+    folder = tmp_path_factory.mktemp("deck")
+    lines = [(n, part, node, node + 1, node + 2, node + 3) for n, (part, node) in enumerate(shells, start=1)]
+    parts = "".join(f"*PART\np\n{part:10d}\n" for part in (1, 2, 3))
+    text = f"*KEYWORD\n{parts}*NODE\n{nodes(count=44)}*ELEMENT_SHELL\n{''.join(row(*line) for line in lines)}*END\n"
+    found = ls_dyna.read(read_deck(write(folder, text)))
+    assert {part: counts["shell"] for part, counts in found.counts.items()} == Counter(part for part, _ in shells)
+    own = {part: {n for p, node in shells if p == part for n in range(node, node + 4)} for part, _ in shells}
+    assert all(found.rigid_nodes([part]) == len(used) for part, used in own.items())
+    touching = {part: {other for other in own if other != part and own[other] & own[part]} for part in own}
+    assert dict(found.neighbours) == touching
+
+
+def test_real_decks_hold_what_a_plain_count_finds() -> None:
+    text = shared("real/decks/nodes.k").read_text("latin-1").splitlines()
+    plain: Counter[int] = Counter()
+    reading = False
+    for line in text:
+        reading = line.upper().startswith(("*ELEMENT_SHELL", "*ELEMENT_BEAM")) if line.startswith("*") else reading
+        if reading and line[:1] not in "*$" and line.strip():
+            plain[int(line[8:16])] += 1
+    found = ls_dyna.read(read_deck(str(shared("real/decks/nodes.k"))))
+    assert {part: counts.total() for part, counts in found.counts.items()} == plain
+
+
+def test_the_sample_deck_is_what_its_module_writes() -> None:
+    assert DECK.read_text("utf-8") == deck()
+    found = read_inventory(str(DECK))
+    assert counted(found) == {1: {"shell": 94}, 2: {"shell": 15}, 3: {"shell": 4}}

@@ -1,0 +1,93 @@
+"""Energy of springs and dampers: found where energies add up, left out of the level, kept where there is no other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.of_run import read
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.histories.history import Part, Samples
+from d2rpick.histories.opening import Selection, open_run
+from d2rpick.histories.springs import spring_energy, springs_among
+from tests.shared import shared
+
+TIME = np.linspace(0.0, 1.0, 50)
+PARTS = tuple(Part(i + 1, f"part {i + 1}") for i in range(4))
+ENERGIES = np.stack([np.sin(TIME) ** 2, 2 * np.cos(3 * TIME) ** 2, TIME, 1 - np.exp(-TIME)], axis=1)
+
+
+@dataclass
+class Made:
+    """A database with two energies of the whole model."""
+
+    springs: Samples
+    whole: Samples = field(default_factory=lambda: ENERGIES.sum(axis=1))
+    format: str = "glstat"
+    time: Samples = field(default_factory=lambda: TIME)
+    energy_channel = "internal energy"
+    channels = ("kinetic energy", "internal energy", "spring and damper energy")
+
+    def channel(self, name: str) -> Samples:
+        return self.springs if name.startswith("spring") else self.whole
+
+
+def found(database: Made, energies: Samples = ENERGIES) -> tuple[int, ...]:
+    return tuple(part.id for part in springs_among([database], PARTS, energies, TIME))  # type: ignore[list-item]
+
+
+def test_the_parts_that_add_up_to_the_energy_of_the_springs_are_springs() -> None:
+    assert found(Made(ENERGIES[:, [1, 3]].sum(axis=1))) == (2, 4)
+    printed = np.array([[float(f"{value:.4e}") for value in row] for row in ENERGIES])
+    assert found(Made(ENERGIES[:, 2]), printed) == (3,)
+
+
+def test_where_nothing_adds_up_no_part_is_taken_for_a_spring() -> None:
+    assert found(Made(0.5 * ENERGIES[:, 0])) == ()
+    assert found(Made(ENERGIES[:, 0] + 0.1)) == ()  # a spring that has no history of its own
+    assert found(Made(np.full(TIME.size, 1e-20))) == ()  # where LS-DYNA begins to count
+    assert found(Made(ENERGIES[:, 3], whole=0.5 * ENERGIES[:, 3])) == ()  # more than all there is
+    assert found(Made(ENERGIES[:, 0], format="csv")) == ()  # a table may mean something else by the name
+    twins = ENERGIES[:, [0, 0, 2, 3]]
+    assert found(Made(twins[:, 0], whole=twins.sum(axis=1)), twins) in ((), (1,), (2,))
+
+
+def test_springs_that_have_all_of_the_energy_are_what_there_is() -> None:
+    assert spring_energy(Made(ENERGIES.sum(axis=1))) is None  # type: ignore[arg-type]
+
+
+CAR = "openradioss/car_drop/carT01.gz"
+
+
+def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
+    run = open_run([str(shared(CAR))], Selection())
+    assert [part.title for part in run.springs] == ["mounts", "suspension", "latches"]
+    whole, parts, body = (read([str(shared(CAR))], Selection(parts=p)).history for p in ((), ("1-17",), ("1-14",)))
+    assert whole.channel == "internal_energy - spring_energy"
+    np.testing.assert_allclose(parts.energy, body.energy)
+    np.testing.assert_allclose(whole.energy, body.energy, rtol=1e-5, atol=1e-3)
+    assert parts.parts is not None
+    assert len(parts.parts) == 17  # they are switched all the same
+    assert [note for note in parts.notes if "mounts, suspension, latches was left out" in note]
+    answer = suggest(parts, 0.1464, Settings())
+    assert answer.recommended is not None
+    assert answer.recommended.tr == pytest.approx(0.0386, abs=5e-4)  # with them, 0.0496 or, at another td, 0.0824
+
+
+def test_what_is_asked_for_by_name_is_taken_as_it_is() -> None:
+    named = read([str(shared(CAR))], Selection(energy=("internal_energy",))).history
+    assert named.channel == "internal_energy"
+    only = read([str(shared(CAR))], Selection(parts=("15-17",))).history
+    assert only.energy[-1] == pytest.approx(2281.7, rel=1e-4)
+    assert not only.springs
+
+
+def test_parts_that_are_said_to_be_springs_are() -> None:
+    run = open_run([str(shared(CAR))], Selection())
+    told = run.history(Selection(parts=("12-15",), springs=("15",)))
+    assert [part.id for part in told.springs] == [15]
+    none = run.history(Selection(parts=("12-15",), springs=()))
+    assert none.energy[-1] > told.energy[-1] + 100

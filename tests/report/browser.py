@@ -1,0 +1,107 @@
+"""A page in a real browser: Chromium without a window, driven by selenium; skipped where there is none."""
+
+from __future__ import annotations
+
+import base64
+import shutil
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.wait import WebDriverWait
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from selenium.webdriver.remote.webelement import WebElement
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+DRIVER = shutil.which("chromedriver")
+NEEDS_BROWSER = pytest.mark.skipif(
+    not (CHROMIUM and DRIVER), reason="Chromium and chromedriver are not installed (Debian: chromium, chromium-driver)"
+)
+_OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
+# Everything that shows on the page, reaches over its right edge, and lies in nothing that scrolls.
+_CUT = """
+const scrolls = (one) => one.closest(".scroll, pre") !== null;
+return [...document.body.querySelectorAll("*")]
+  .filter((one) => !scrolls(one) && one.getClientRects().length && one.getBoundingClientRect().right > innerWidth + 0.5)
+  .map((one) => one.outerHTML.slice(0, 120));
+"""
+
+
+class Browser:
+    """A browser, and what a reader of a page does in it."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def open(self, page: Path, *, width: int = 1280, scripts: bool = True, **media: str) -> None:
+        """Show a page at a width [px], with what the reader prefers: ``prefers_color_scheme="dark"``."""
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+        features = [{"name": name.replace("_", "-"), "value": value} for name, value in media.items()]
+        self.ask("Emulation.setDeviceMetricsOverride", **size)
+        self.ask("Emulation.setEmulatedMedia", media="", features=features)
+        self.ask("Emulation.setScriptExecutionDisabled", value=not scripts)
+        self.driver.get(page.as_uri())
+
+    def ask(self, command: str, **arguments: Any) -> Any:
+        """Ask the browser itself, by its developer tools."""
+        return self.driver.execute_cdp_cmd(command, arguments)
+
+    def find(self, selector: str) -> WebElement:
+        """Find an element."""
+        return self.driver.find_element(By.CSS_SELECTOR, selector)
+
+    def shown(self, selector: str) -> bool:
+        """Whether the first such element takes up room."""
+        return self.find(selector).is_displayed()
+
+    def value(self, name: str) -> str:
+        """What the interactive part says under a name."""
+        return str(self.find(f'[data-value="{name}"]').get_property("textContent"))
+
+    def spoken(self, roles: set[str]) -> list[dict[str, Any]]:
+        """Elements with these roles as a screen reader finds them; it is told of them a little later."""
+
+        def found(_: webdriver.Chrome) -> list[dict[str, Any]]:
+            nodes = self.ask("Accessibility.getFullAXTree")["nodes"]
+            used = [node for node in nodes if node["role"]["value"] in roles and not node["ignored"]]
+            return used if {node["role"]["value"] for node in used} == roles else []
+
+        return WebDriverWait(self.driver, timeout=20).until(found)
+
+    def cut(self) -> list[str]:
+        """What is cut at the right edge, and whether the page is wider than the screen."""
+        found: list[str] = self.driver.execute_script(_CUT)
+        wide = self.driver.execute_script(
+            "return document.documentElement.scrollWidth > document.documentElement.clientWidth"
+        )
+        return [*found, *["the page itself"] * bool(wide)]
+
+    def pdf(self) -> bytes:
+        """Print the page."""
+        return base64.b64decode(self.ask("Page.printToPDF", preferCSSPageSize=True)["data"])
+
+    def complaints(self) -> list[dict[str, Any]]:
+        """What stands in the console since the last call."""
+        return list(self.driver.get_log("browser"))  # type: ignore[no-untyped-call]
+
+
+@contextmanager
+def browsing(folder: Path) -> Iterator[Browser]:
+    """Start a browser that keeps what it writes in ``folder``."""
+    options = webdriver.ChromeOptions()
+    options.binary_location = str(CHROMIUM)
+    for option in (*_OPTIONS, f"--user-data-dir={folder / 'profile'}"):
+        options.add_argument(option)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(str(DRIVER)))
+    try:
+        yield Browser(driver)
+    finally:
+        driver.quit()

@@ -1,0 +1,308 @@
+"""The interactive part of a page in a real browser: what it shows of a td is what ``suggest --td`` prints."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.trade_off import STEPS
+from d2rpick.report.html import resource
+from d2rpick.report.tables import measure, short
+from tests.command import ENERGY, ROLLOVER, run
+
+pytest.importorskip("selenium", reason="selenium is not installed")
+
+from selenium.webdriver import ActionChains
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.select import Select
+
+from tests.report.browser import NEEDS_BROWSER, Browser, browsing
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+# Where the first and the last td lie in the chart of the energy, in pixels.
+ENDS = """
+const { rows, view: [from, to] } = JSON.parse(document.getElementById("explorer-data").textContent).flights[0];
+const width = document.querySelector(".energy .u-over").clientWidth;
+return [rows[0], rows[rows.length - 1]].map(([[td]]) => (td - from) / (to - from) * width);
+"""
+WIDTHS = (390, 768, 1280)
+
+
+def written(folder: Path, *args: str) -> Path:
+    """Write the page of a command."""
+    page = folder / "page.html"
+    result = run(*args, "-q", "--report", str(page))
+    assert result.exit_code in (0, 1), result.stderr
+    return page
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    window = ("--td-window", "0.05", "0.09")
+    return written(tmp_path_factory.mktemp("paper"), "explore", "--td", "0.064", *window, "--steps", "60", ENERGY)
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    window = ("--td-window", "0.33", "0.37", "--after", "0.0910048")
+    energy = ("--energy", "boxIE_J", ROLLOVER)
+    return written(tmp_path_factory.mktemp("box"), "explore", *window, "--steps", "4", *energy)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with browsing(tmp_path_factory.mktemp("browser")) as found:
+        yield found
+
+
+def content(page: Path) -> dict[str, Any]:
+    """What the script reads."""
+    text = re.findall(r'<script type="application/json" id="explorer-data">(.*?)</script>', page.read_text("utf-8"))[0]
+    found: dict[str, Any] = json.loads(text)
+    return found
+
+
+def numbers(page: Path, flight: int = 0) -> list[dict[str, Any]]:
+    """Numbers of each td of a flight."""
+    found = content(page)["flights"][flight]
+    return [dict(zip(found["numbers"], values, strict=True)) for values, _ in found["rows"]]
+
+
+@cache
+def suggested(command: str) -> dict[str, Any]:
+    """What the command prints that the page names."""
+    program, *args = shlex.split(command)
+    assert program == "d2rpick"
+    found: dict[str, Any] = json.loads(run(*args, "-q", "-f", "json").stdout)
+    return found
+
+
+def check(browser: Browser) -> float:
+    """Hold what is shown against the command that is shown beside it; give the td in sight."""
+    found = suggested(browser.value("command"))
+    best = next((one for one in found["candidates"] if one["recommended"]), None)
+    expected = {"td": short(found["td"]), "tr": short(best["tr"]) if best else "none", "exact_td": repr(found["td"])}
+    if best:
+        expected["residual"] = measure(best["residual"])
+        expected["kinetic"] = measure(found["kinetic_share"])
+        expected["tolerance"] = f"{best['timing_tolerance']:.1e}"
+    expected["level"] = short(found["energy_td"])
+    assert {name: browser.value(name) for name in expected} == expected
+    assert browser.find("#explorer-td").get_property("value") == expected["td"]
+    assert str(browser.find(".handle").get_attribute("aria-valuetext")).startswith(
+        f"td {expected['td']}, tr {expected['tr']}"
+    )
+    td: float = found["td"]
+    return td
+
+
+@NEEDS_BROWSER
+def test_td_typed_at_twenty_places_shows_the_digits_of_suggest(paper: Path, browser: Browser) -> None:
+    browser.open(paper)
+    known = np.array([row["td"] for row in numbers(paper)])
+    field = browser.find("#explorer-td")
+    for td in np.random.default_rng(1).uniform(0.05, 0.09, 20).round(5).tolist():
+        field.clear()
+        field.send_keys(repr(td).replace(".", ",") if td > 0.07 else repr(td), Keys.ENTER)
+        assert check(browser) == known[np.abs(known - td).argmin()]
+        assert f"{td}: this td was not computed" in browser.find(".said").text.replace(",", ".", 1)
+    assert browser.complaints() == []
+
+
+@NEEDS_BROWSER
+def test_td_dragged_to_twenty_places_shows_the_digits_of_suggest(paper: Path, browser: Browser) -> None:
+    browser.open(paper)
+    browser.driver.execute_script("document.querySelector('.energy').scrollIntoView({block: 'center'})")
+    mouse = ActionChains(browser.driver, duration=0)
+    mouse.click_and_hold(browser.find(".handle")).perform()
+    over = browser.find(".energy .u-over")
+    first, last = browser.driver.execute_script(ENDS)
+    seen = set()
+    for place in np.linspace(first, last, 20).astype(int).tolist():
+        mouse.move_to_element_with_offset(over, place - over.size["width"] // 2, -9).perform()
+        seen.add(check(browser))
+    mouse.release().perform()
+    assert len(seen) > 15
+    last = browser.value("td")
+    mouse.move_to_element(over).perform()
+    assert browser.value("td") == last
+    assert browser.complaints() == []
+
+
+@NEEDS_BROWSER
+def test_a_finger_moves_td_too(paper: Path, browser: Browser) -> None:
+    browser.open(paper, width=390)
+    browser.driver.execute_script("document.querySelector('.energy').scrollIntoView({block: 'center'})")
+    x, y = browser.driver.execute_script(
+        "const box = document.querySelector('.handle').getBoundingClientRect(); return [box.x + 22, box.y + 99]"
+    )
+    before = check(browser)
+    for kind, points in (("Start", [{"x": x, "y": y}]), ("Move", [{"x": x + 25, "y": y + 9}]), ("End", [])):
+        browser.ask("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=points)
+    assert check(browser) > before
+    assert browser.complaints() == []
+
+
+@NEEDS_BROWSER
+def test_keys_and_buttons_move_td(paper: Path, browser: Browser) -> None:
+    browser.open(paper)
+    rows = numbers(paper)
+    known = [row["td"] for row in rows]
+    handle, field = browser.find(".handle"), browser.find("#explorer-td")
+    handle.send_keys(Keys.HOME)
+    assert check(browser) == known[0]
+    for keys, place in (
+        ((Keys.ARROW_RIGHT,) * 3, 3),
+        ((Keys.ARROW_LEFT,), 2),
+        ((Keys.PAGE_DOWN,), 0),
+        ((Keys.END,), -1),
+    ):
+        handle.send_keys(*keys)
+        assert check(browser) == known[place]
+    field.send_keys(Keys.ARROW_DOWN)
+    assert check(browser) == known[-2]
+    browser.find(".earlier").click()
+    assert check(browser) == [row["td"] for row in rows if row["peak"]][-1]
+    browser.find(".back").click()
+    assert check(browser) == 0.064
+    field.send_keys("x", Keys.ENTER)
+    assert "is not a time" in browser.find(".said").text
+    assert field.get_attribute("aria-invalid") == "true"
+    field.clear()
+    field.send_keys("7", Keys.ENTER)
+    assert check(browser) == known[-1]
+    assert "td was computed from" in browser.find(".said").text
+    assert browser.complaints() == []
+
+
+@NEEDS_BROWSER
+def test_a_click_on_a_point_of_the_trade_off_selects_it(paper: Path, browser: Browser) -> None:
+    browser.open(paper)
+    over = browser.find(".trade .u-over")
+    browser.driver.execute_script("document.querySelector('.trade').scrollIntoView({block: 'center'})")
+    ActionChains(browser.driver).move_to_element_with_offset(
+        over, over.size["width"] // 2 - 9, over.size["height"] // 2 - 9
+    ).click().perform()
+    chosen = next(row for row in numbers(paper) if row["td"] == check(browser))
+    assert chosen["error"] < 0.3
+    assert chosen["unbeaten"]
+
+
+@NEEDS_BROWSER
+def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
+    browser.open(paper)
+    nodes = browser.spoken({"slider", "textbox", "button", "image", "region"})
+    assert all(node["name"]["value"] for node in nodes)
+    (slider,) = (node for node in nodes if node["role"]["value"] == "slider")
+    told = {one["name"]: one["value"].get("value") for one in slider["properties"]}
+    assert told["valuetext"] == "td 0.064, tr 0.0128853, residual 0.957"
+    assert told["focusable"]
+
+
+@NEEDS_BROWSER
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_is_cut_with_and_without_scripts(paper: Path, box: Path, browser: Browser, width: int) -> None:
+    for page in (paper, box):
+        for scripts in (True, False):
+            browser.open(page, width=width, scripts=scripts)
+            browser.ask("Emulation.setScriptExecutionDisabled", value=False)  # that of the page does not run any more
+            assert browser.cut() == []
+            assert browser.shown("#explorer") == scripts
+            assert browser.shown("figure.drawn") == (not scripts)
+            assert browser.shown(".sign")
+            assert browser.shown(".hint") == (width < 640)
+    assert browser.complaints() == []
+
+
+@NEEDS_BROWSER
+def test_it_prints_as_the_static_page_also_where_it_is_dark(paper: Path, browser: Browser) -> None:
+    browser.open(paper, prefers_color_scheme="dark")
+    assert browser.driver.execute_script("return getComputedStyle(document.body).backgroundColor") == "rgb(20, 24, 28)"
+    assert 2 <= len(re.findall(rb"/Type\s*/Page\b", browser.pdf())) <= 6
+    browser.ask("Emulation.setEmulatedMedia", media="print")
+    assert not browser.shown("#explorer")
+    assert browser.shown("figure.drawn")
+    assert browser.shown(".sign")
+
+
+@NEEDS_BROWSER
+def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None:
+    browser.open(box)
+    for _ in range(3):
+        browser.find(".handle").send_keys(Keys.ARROW_LEFT)
+        found = suggested(browser.value("command"))
+        (kept,) = (one for one in found["acceptable_windows"] if one["recommended"])
+        assert f"{short(kept['start'])} to {short(kept['end'])}" in browser.value("windows")
+        assert browser.value("after").startswith(f"about {found['expected']['ratio']:.0%}")
+    assert not browser.driver.find_elements("css selector", ".motion")
+    assert browser.complaints() == []
+
+
+@NEEDS_BROWSER
+def test_each_flight_of_a_plan_can_be_explored(
+    tmp_path: Path, browser: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("STEPS", "_LEAST"):
+        monkeypatch.setattr(f"d2rpick.choice.explored.{name}", 3)
+    motion = str(tmp_path / "tumbling.matsum")
+    assert run("rollover", "--mesh", "4", "--dt", "5e-4", "--drop", "0.4", "--tilt", "40", "-o", motion).exit_code == 0
+    page = written(tmp_path, "plan", "--part", "box", motion)
+    browser.open(page)
+    flights = content(page)["flights"]
+    assert len(flights) > 1
+    Select(browser.find("#explorer-flight")).select_by_index(1)
+    assert browser.value("exact_td") == repr(numbers(page, 1)[flights[1]["start"]]["td"])
+    assert browser.complaints() == []
+
+
+def test_a_page_of_many_states_stays_small(tmp_path: Path) -> None:
+    time = np.linspace(0, 0.15, 100_000)
+    noise = np.random.default_rng(1).normal(1, 0.01, time.size)
+    energy = noise * 150 * np.exp(-10 * time) * np.sin(250 * time) ** 2
+    table = tmp_path / "many.csv"
+    np.savetxt(table, np.stack([time, energy], axis=1), delimiter=",", header="time,internal_energy", comments="")
+    page = written(
+        tmp_path, "explore", "--no-verify", "--after", "0.001", "--td-window", "0.1", "0.11", "--steps", "2", str(table)
+    )
+    (flight,) = content(page)["flights"]
+    least = energy[(time > 0.001) & (time < 0.149)]
+    assert max(flight["energy"][1]) == pytest.approx(least.max(), rel=0.05)
+    assert max(flight["whole"][1]) == pytest.approx(energy.max(), rel=1e-5)
+    row = len(json.dumps(flight["rows"])) / len(flight["rows"])
+    assert page.stat().st_size + 2 * STEPS * row < 600_000  # the most td that a page explores
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast of two colours by WCAG 2, from 1 to 21."""
+
+    def luminance(colour: str) -> float:
+        parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+        linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+        return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+
+    dark, light = sorted((luminance(one), luminance(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+def test_letters_and_marks_stand_out_in_light_and_dark() -> None:
+    themes = [
+        dict(re.findall(r"--(\w+): (#\w{6})", block))
+        for block in re.findall(r":root {(.*?)}", resource("style.css"), re.DOTALL)
+    ]
+    assert len(themes) == 2
+    for colours in themes:
+        for ground in ("ground", "panel"):
+            for name in ("ink", "soft", "good", "bad"):
+                assert contrast(colours[name], colours[ground]) >= 4.5, (name, ground)
+        for name in ("switched", "good", "ink", "focus"):
+            assert contrast(colours[name], colours["ground"]) >= 3
+            assert contrast(colours[name], colours["flight"]) >= 3
