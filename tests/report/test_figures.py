@@ -10,7 +10,9 @@ from matplotlib.patches import Rectangle
 
 import d2rpick as d2
 from d2rpick.report.figures_study import draw_study
-from d2rpick.studies.study import Common, Row, Study
+from d2rpick.studies.common import Common
+from d2rpick.studies.row import Row
+from d2rpick.studies.study import Study
 from tests.command import BOX, ENERGY
 
 if TYPE_CHECKING:
@@ -55,7 +57,7 @@ def row(name: str, tr: float, level: float = 1.0) -> Row:
 
 
 def study(*rows: Row) -> Study:
-    return Study(0.8, rows, None, None, Common(None, None, "made"), ())
+    return Study(0.8, None, rows, None, None, Common(None, None, "made"), ())
 
 
 def test_up_to_ten_runs_have_a_name_and_a_look_of_their_own() -> None:
