@@ -135,6 +135,14 @@ def check_ratio() -> float | None:
         return ratio(lambda: deck.check(path), lambda: parse(path), _ROUNDS)
 
 
+def inventory_ratio() -> float:
+    """Reading the parts and elements of a 50 MB deck over a plain loop over all lines."""
+    from tests.benchmarks import deck
+
+    with deck.large_deck() as path:
+        return ratio(lambda: deck.inventory(path), lambda: deck.line_loop(path), _ROUNDS)
+
+
 def deck_memory() -> float:
     """Memory that it takes [MB]."""
     from tests.benchmarks import deck
@@ -205,6 +213,7 @@ ROWS = (
     Row("  alternating call by call, in memory just freed", lambda: integration_ratio(repeats=1)),
     Row("cards of a 50 MB deck / loop over its lines", lambda: deck_ratio(numbered=False), most=1 / 3),
     Row("  with the number of each card's line", lambda: deck_ratio(numbered=True)),
+    Row("parts and elements of a 50 MB deck / loop over its lines", inventory_ratio, most=15.0),
     Row("check of a 50 MB deck / dynars.parse_deck", check_ratio),
     Row("  memory for the cards [MB]", deck_memory, most=32.0),
     Row("check / import click: processes", lambda: process_ratio("click", *CHECK)),
