@@ -40,8 +40,10 @@ def tolerance_levels(tolerance: float) -> tuple[float, ...]:
     return tuple(levels)
 
 
-def acceptable_windows(situation: Situation, candidates: Candidates, recommended: float | None) -> tuple[Samples, ...]:
-    """Find the windows in which a tr is acceptable, at the tolerance and at each finer level.
+def acceptable_windows(
+    situation: Situation, candidates: Candidates, recommended: float | None, *, finer: bool = True
+) -> tuple[Samples, ...]:
+    """Find the windows in which a tr is acceptable, at the tolerance and, unless told otherwise, at each finer level.
 
     Every end and middle at the full tolerance was judged by the rule of ``verify``; ends lie inside.  In between the
     rule cannot change: between neighbouring points of the grid the energy is linear, or the deformation monotone.
@@ -58,18 +60,18 @@ def acceptable_windows(situation: Situation, candidates: Candidates, recommended
     Returns
     -------
     tuple of array, each of shape (n, 2)
-        For each of ``tolerance_levels``: first and last time of each window, ascending [time].
+        For each of ``tolerance_levels``, or the first of them: first and last time of each window, ascending [time].
     """
-    levels = tolerance_levels(situation.settings.tolerance)
+    levels = tolerance_levels(situation.settings.tolerance)[: None if finer else 1]
     if situation.at_rest:  # any tr before td is right
         return (np.array([[situation.earliest_tr, np.nextafter(situation.td, -np.inf)]]),) * len(levels)
     grid = _grid(situation, candidates)
-    widest, *finer = _windows_below(situation, grid, np.minimum(levels, _residual_left(situation)))
+    widest, *inner = _windows_below(situation, grid, np.minimum(levels, _residual_left(situation)))
     judged = approve(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
     kept = widest[np.reshape(judged, (-1, 3)).all(axis=1)]
     if kept.size and kept[-1, 1] >= grid[-1] and not (recommended is not None and kept[-1, 0] <= recommended):
         kept = kept[:-1]
-    return (kept, *(_within(windows, kept) for windows in finer))
+    return (kept, *(_within(windows, kept) for windows in inner))
 
 
 def coverage(runs: Sequence[Samples]) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
