@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice.ranking import EQUALLY_GOOD
+from d2rpick.choice.ranking import LIKE_LEVELS
 from d2rpick.flight.energy_alone import round_off
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     """Upper bounds for the rigid time of the tr that is recommended at each of many td, of their shape (n,) [time].
 
     Where the level is all that decides, that tr does not lie before the energy first comes near the level at td: by
-    the tolerance, or by what counts as equally good where it passes the level itself and turns twice before td.  Where
+    the tolerance, or by what counts as like levels where it passes the level itself and turns twice before td.  Where
     a model of the vibration decides at some td, or the level is round-off, the start of the flight is the bound.  Zero
     where that start is not known.
     """
@@ -38,7 +38,7 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     passed = time[np.minimum(_reached(energy, level, np.full(times.shape, -_ROUNDING)), time.size - 1)]
     turns = np.searchsorted(history.turns, times) - np.searchsorted(history.turns, passed, side="right")
     passes = (turns >= 2) & (level > _ROUNDING * np.abs(history.energy).max())
-    near = np.where(passes, min(tolerance, EQUALLY_GOOD), tolerance) + _ROUNDING
+    near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + _ROUNDING
     entered = time[np.maximum(_reached(energy, level, near) - 1, 0)]  # or since, but after the state before
     return np.asarray(np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0))
 
