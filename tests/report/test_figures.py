@@ -37,7 +37,9 @@ def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> N
     assert marks(axes) == [1]  # the recommended one alone
     assert answer._core.windows is not None
     bands = [one for one in axes.patches if isinstance(one, Rectangle) and one.get_height() < 0.1]
-    assert len(bands) == len(answer._core.windows)
+    drawn = sum(one.get_width() for one in bands)
+    assert drawn == pytest.approx(sum(one.end - one.start for one in answer._core.windows), rel=0.03)
+    assert len(bands) < len(answer._core.windows)  # gaps that nobody sees are closed
 
 
 def test_few_candidates_are_marks_acceptable_or_not() -> None:
