@@ -5,6 +5,7 @@ The command line, ``study``, ``check --history``, ``card`` and Python go this on
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from d2rpick.choice.examine import examine
@@ -127,19 +128,25 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
 
 def _comparison(verdict: Verdict, run: Run, switched: Reference) -> Comparison:
     from d2rpick.choice.comparison import compare_runs
+    from d2rpick.choice.judged_parts import judged_parts
 
     situation = verdict.situation
     flight, parts = situation.flight, situation.history.parts
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
-    return compare_runs(
-        situation.history,
-        switched.history,
-        (verdict.candidate.tr, situation.td),
+    pair = verdict.candidate.tr, situation.td
+    judged = judged_parts((run, switched.run), (situation.history, switched.history), pair)
+    found = compare_runs(
+        judged.reference,
+        judged.switched,
+        pair,
         situation.latest_td if situation.latest_td > situation.td else float("inf"),
         situation.settings.tolerance,
         momenta=(run.momentum(together), _momentum(switched.run, together)),
         centres=(run.centre(parts), switched.run.centre(parts)) if parts else (None, None),
+        known=judged.known,
     )
+    objections, notes = (*judged.objections, *found.objections), (*judged.notes, *found.notes)
+    return replace(found, objections=objections, notes=notes)
 
 
 def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:

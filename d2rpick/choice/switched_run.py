@@ -7,27 +7,24 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.choice.rigid_parts import FEWEST, kinetic_energies, rigid_parts, with_energy
 from d2rpick.choice.warnings import Caution
-from d2rpick.errors import FormatError, RangeError
+from d2rpick.errors import RangeError
 from d2rpick.flight.energy_alone import round_off
 from d2rpick.histories.history import Given
-from d2rpick.histories.samples import window
+from d2rpick.histories.names import listing
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.choice.of_run import Reference
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History, Part, Samples
+    from d2rpick.histories.history import History, Part
 
     Times = tuple[float, float]
 
-# Of a part that is deformable fewer states follow each other without kinetic energy, or with one internal energy.
-_FEWEST: Final = 12
-# An internal energy that changes by less is one value: solvers write single precision.
-_SAME: Final = 1e-6
 # Evidence that tells the start of a flight to some states; the energy alone gives time away there.
 _SHARP: Final = ("momentum", "contact-energy", "energy-balance")
 # A flight that begins so many output intervals after tr has begun with the window: its start is known no better.
@@ -107,21 +104,21 @@ def switched_history(
     windows : tuple of (float, float)
         Those that are done: ``done``, and others in which the parts have no kinetic energy.
     cautions : tuple of Caution
-        What was recognised beside ``done``.
+        What was recognised beside ``done``, and parts that were not rigid in it.
 
     Raises
     ------
     RangeError
         If a window lies outside the record, or the parts were deformable in it.
     """
-    history = reference.history
+    history, cautions = reference.history, list[Caution]()
     for tr, td in done:
         for time in (tr, td):
             history.energy_at(time)
-        _check_rigid(reference, tr, td)
+        cautions += _partly_rigid(reference, tr, td)
     absent = _absent_times(reference)
     more = tuple(one for one in absent if not any(tr < one[1] and one[0] < td for tr, td in done))
-    cautions = [
+    cautions += [
         Caution(
             "rigid-times",
             f"the parts were rigid from {a:.6g} to {b:.6g}, give or take an output interval: taken as done",
@@ -156,28 +153,28 @@ def _around(history: History, flights: Sequence[Flight], tr: float, td: float) -
     return best if best and shared(best) > 0 else None
 
 
-def _check_rigid(reference: Reference, tr: float, td: float) -> None:
-    """Raise RangeError where no part was rigid in a window, as far as single parts tell."""
-    history, parts = reference.history, _deformable(reference)
-    time = history.time
-    inside = window(time, np.nextafter(tr, td), np.nextafter(td, tr))
-    inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))  # switched at the first step after tr
-    if not parts or len(time[inside]) < _FEWEST:
+def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Caution]:
+    """Name the parts asked for that deform in a window; RangeError where no part was rigid, as far as parts tell."""
+    run, history, parts = *reference, _deformable(reference)
+    rigid = rigid_parts(run, parts, history.time, tr, td)
+    if rigid is None:
         return
-    energies, kinetic = reference.run.part_energies(parts)[inside], _kinetic(reference, parts)
-    if float(np.abs(energies).max()) <= round_off(history):
+    if rigid.any():
+        names = [part.title or f"part {part.id}" for part, one in zip(parts, rigid.tolist(), strict=True) if not one]
+        if names and history.parts:
+            found = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {listing(names)}"
+            yield Caution("partly-rigid", f"{found}; the window counts as done for the others")
+        return
+    if float(np.abs(history.between(tr, td)[1]).max(initial=0.0)) <= round_off(history):
         return  # a free fall looks the same
-    still = np.ptp(energies, axis=0) <= _SAME * np.abs(energies).max(axis=0)
-    absent = (kinetic[inside] == 0).all(axis=0) if kinetic is not None else np.zeros(len(parts), dtype=bool)
-    if not (still | absent).any():
-        where = f"{', '.join(history.source)}: the parts deform from {tr:.6g} to {td:.6g}"
-        raise RangeError(f"{where}, a window that is said to be done; give the run that was switched so")
+    where = f"{', '.join(history.source)}: the parts deform from {tr:.6g} to {td:.6g}"
+    raise RangeError(f"{where}, a window that is said to be done; give the run that was switched so")
 
 
 def _absent_times(reference: Reference) -> tuple[Times, ...]:
     """Times in which parts have no kinetic energy although the run moves: a rigid body has it instead."""
     parts, balance = _deformable(reference), reference.history.balance
-    kinetic = _kinetic(reference, parts) if parts else None
+    kinetic = kinetic_energies(reference.run, parts) if parts else None
     if kinetic is None or balance is None or balance.kinetic is None:
         return ()
     time = reference.history.time
@@ -190,24 +187,10 @@ def _stretches(states: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last of states that follow each other."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]])))
     pairs = edges.reshape(-1, 2)
-    return [(int(a), int(b) - 1) for a, b in pairs if b - a >= _FEWEST]
+    return [(int(a), int(b) - 1) for a, b in pairs if b - a >= FEWEST]
 
 
 def _deformable(reference: Reference) -> tuple[Part, ...]:
     """Give the chosen parts, or all, that have internal energy at the times of the history."""
     run, history = reference.run, reference.history
-    parts = history.parts or run.parts
-    if not parts:
-        return ()
-    energies = run.part_energies(parts)
-    if len(energies) != history.time.size:
-        return ()
-    return tuple(part for part, energy in zip(parts, energies.T, strict=True) if energy.any())
-
-
-def _kinetic(reference: Reference, parts: Sequence[Part]) -> Samples | None:
-    """Kinetic energies of parts, shape (n, parts); None where they are not written."""
-    try:
-        return reference.run.part_kinetic_energies(parts)
-    except FormatError:
-        return None
+    return with_energy(run, history.parts or run.parts, history)

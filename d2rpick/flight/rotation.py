@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 _SHOWN: Final = 0.25
 # Steps of Gauss and Newton; a dozen bring a good start to the last digit.
 _MOST_STEPS: Final = 25
-# Change of the rate, as a share of one turn over the record, by which derivatives are taken and below which it ends.
+# Change of the rate, as a share of one turn over the record, by which derivatives are taken and below which it ends;
+# and the share of the rest that a step gains below which it ends.
 _SMALL: Final = 1e-6
+_LEAST_GAIN: Final = 1e-4
 # Directions in which arms move by less than this share of the others, squared, cannot be told: along the axis.
 _ALONG_AXIS: Final = 1e-6
 
@@ -65,11 +67,12 @@ def steady_rotation(time: Samples, ways: Samples, masses: Samples, least: float 
         damped = normal + damping * np.trace(normal) * np.eye(3) / 3 + np.finfo(float).tiny * np.eye(3)
         step = -np.linalg.solve(damped, slope.T @ rest.ravel())
         trial = _rest(time, ways, rate + step, weights)
-        if float(np.sum(trial**2)) <= float(np.sum(rest**2)):
+        gain = 1 - float(np.sum(trial**2)) / max(float(np.sum(rest**2)), np.finfo(float).tiny)
+        if gain >= 0:
             rate, rest, damping = rate + step, trial, damping / 10
         else:
             damping *= 10
-        if float(np.abs(step).max()) <= small:
+        if 0 <= gain <= _LEAST_GAIN or float(np.abs(step).max()) <= small:
             break
     turned = float(np.sum(rest**2))
     return Rotation(rate, turned) if turned <= _SHOWN * stood else Rotation(np.zeros(3), stood)

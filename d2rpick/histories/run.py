@@ -127,6 +127,11 @@ class Run:
         found = next((one for one in self.momenta(parts, None) if (one.parts is not None) == of_parts), None)
         return Track(found.time, found.of(found.chosen)) if found else None
 
+    @property
+    def part_time(self) -> Samples:
+        """Times of the states of single parts [time]."""
+        return self._holder().part_time
+
     @cached_property
     def springs(self) -> tuple[Part, ...]:
         """Parts of springs and dampers, as far as their energies tell."""

@@ -126,7 +126,7 @@ def show_span(axes: Axes, span: tuple[float, float], scale: Scale, cut: tuple[st
         )  # fmt: skip
 
 
-def mark_times(axes: Axes, tr: float | None, td: float, *, narrow: bool) -> None:
+def mark_times(axes: Axes, tr: float | None, td: float | None, *, narrow: bool) -> None:
     """Mark the switch times; their labels stand above the axes, away from each other and from the edges.
 
     Where a label would reach over an edge it changes its side if there is room.

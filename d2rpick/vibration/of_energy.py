@@ -65,7 +65,7 @@ class OfEnergy:
         turns = find_turns(energy)[0]
         near = time[turns[measures.level_errors(energy[turns], level) <= tolerance]]
         return [
-            *(Moment(c.time, "crossing", c.rising) for c in find_crossings(time, energy, level) if c.time < self.td),
+            *(Moment(t, "crossing", up) for t, up in find_crossings(time, energy, level) if t < self.td),
             *(Moment(t, "extremum", None) for t in near.tolist()),
         ]
 

@@ -79,6 +79,13 @@ def open_window_to_td() -> float:
     return _ratio((*suggest, "--td-window", *map(str, _WINDOWS["narrow"])), (*suggest, "--td", str(_TD)))
 
 
+def explore_to_td(file: str, td: str, *options: str) -> float:
+    """`explore` of 200 td over `suggest --td`: processes; a file of the samples, or "noisy" for 1e5 noisy states."""
+    name = str(_noisy(100_000)) if file == "noisy" else f"sample_data/{file}"
+    rest = ("--exit-zero", "-q", "-f", "json", *options, name)
+    return _ratio(("-m", "d2rpick", "explore", *rest), ("-m", "d2rpick", "suggest", "--td", td, *rest), rounds=1)
+
+
 def clean_growth(command: str) -> float:
     """A command on a clean oscillator of 1e6 states over the same of 1e5."""
 

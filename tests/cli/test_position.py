@@ -1,0 +1,51 @@
+"""The position error in what suggest, verify and plan write, of a car that a solver computed."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.cli.test_output import check_by_schema
+from tests.command import answer, run
+from tests.shared import shared
+
+
+def car() -> str:
+    return str(shared("openradioss/car_drop/carT01.gz"))
+
+
+def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
+    found = answer("suggest", "--td", "0.1464", "--part", "1-17", car())
+    check_by_schema(found)
+    best = found["candidates"][0]
+    assert best["position_error"] == pytest.approx(2.5e-3, abs=1e-3)
+    assert {one["position_error_part"] for one in found["candidates"] if one["position_error"]} == {"engine"}
+    early = [one for one in found["candidates"] if one["tr"] < 0.0384]
+    assert early
+    assert all(one["position_error"] is None for one in early)  # in the load
+    assert "out-of-place" not in {warning["code"] for warning in found["warnings"]}
+    table = run("suggest", "-q", "--td", "0.1464", "--part", "1-17", "--limit", "1", car()).stdout
+    assert "off by 0.00" in table
+    assert "at td: engine is frozen elsewhere" in table
+    head = run("suggest", "-q", "--td", "0.1464", "--part", "1-17", "-f", "csv", car()).stdout.partition("\n")[0]
+    assert "position_error,position_error_part" in head
+
+
+def test_verify_warns_where_it_is_large() -> None:
+    found = answer("verify", "--tr", "0.0826", "--td", "0.1464", "--part", "1-17", car())
+    check_by_schema(found)
+    assert found["position_error"] == pytest.approx(7.5e-3, rel=0.3)
+    assert found["position_error_part"] == "engine"
+    (told,) = [one["message"] for one in found["warnings"] if one["code"] == "out-of-place"]
+    assert told.startswith("engine is frozen elsewhere than it is at td = 0.1464")
+    assert "1.4% of its path in the flight" in told
+    alone = answer("verify", "--tr", "0.0826", "--td", "0.1464", "--part", "12", car())
+    assert (alone["position_error"], alone["position_error_part"]) == (None, None)
+
+
+def test_plan_gives_it_for_every_window() -> None:
+    found = answer("plan", "--part", "1-17", car())
+    check_by_schema(found)
+    (row,) = [one for one in found["windows"] if one["status"] == "supported"]
+    assert row["position_error"] == pytest.approx(2.5e-3, abs=1e-3)
+    assert row["position_error_part"] == "engine"
+    assert "off by 0.00" in run("plan", "-q", "--part", "1-17", car()).stdout
