@@ -230,7 +230,7 @@ def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_
         "0.01",
         "0.1",
         "--max-residual",
-        "2",
+        "2.5",
         "--strict",
     )
     page = page_of(tmp_path, "--td", "0.064", *choosing, ENERGY)
