@@ -71,10 +71,8 @@ def _thinned(times: Samples, errors: Samples, windows: Samples) -> Samples:
     kept = np.flatnonzero(np.isin(times, windows))
     while True:
         off = np.abs(errors - np.interp(times, times[kept], errors[kept]))
-        piece = np.searchsorted(kept, np.arange(times.size), side="right")
-        order = np.lexsort((off, piece))
-        worst = order[np.flatnonzero(np.diff(piece[order], append=-1))]  # the last of each piece
-        new = worst[off[worst] > _EXACT / 2]
+        worst = np.repeat(np.maximum.reduceat(off, kept), np.diff(kept, append=times.size))
+        new = np.flatnonzero((off == worst) & (off > _EXACT / 2))
         if not new.size:
             return np.stack([times[kept], errors[kept]])
         kept = np.union1d(kept, new)
