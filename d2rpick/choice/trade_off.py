@@ -81,8 +81,8 @@ def explore_of(
         If td or the window lies outside the record, or no flight is seen.
     """
     history = reference.history
-    window = longest_flight(history, settings) if td_window is None else td_window
     fits = Fits()
+    window = longest_flight(history, settings, fits) if td_window is None else td_window
     look = looking(history, settings, fits)
     situation, inside = within_flight(look, history, window)
     suggestion = suggest_of(reference, window, settings, fits=fits)

@@ -37,6 +37,8 @@ _MANY: Final = 40
 _BEFORE, _AFTER = 0.25, 0.15
 # Height of a name, as a share of the axes.
 _LINE: Final = 0.055
+# A line to a name begins at the left of it.
+_ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
 # The lowest level may be so much lower than the others before it counts for the axis.
 _LOWEST: Final = 50.0
 
@@ -143,7 +145,7 @@ def _name(axes: Axes, named: Sequence[_Named], *, narrow: bool) -> None:
         axes.annotate(
             one.name, (1, place), xycoords="axes fraction", xytext=(1.03, at), textcoords="axes fraction", va="center",
             fontsize="x-small" if narrow else "small", color=one.colour, annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": one.colour, "linewidth": 0.6, "linestyle": one.pattern},
+            arrowprops={"arrowstyle": "-", "color": one.colour, "linewidth": 0.6, "linestyle": one.pattern, **_ENDS},
         )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.report.html import Markup, document, drawings, pairs, remarks, resource, section, table, tag
 from d2rpick.report.study import HEAD, outcome, rows, td_of
+from d2rpick.report.tables import known
 from d2rpick.studies.common import runs_of
 
 if TYPE_CHECKING:
@@ -34,7 +35,8 @@ def as_page(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> 
 def _sections(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> Iterator[Markup]:
     yield tag("section", _common(answer), remarks(answer.cautions), pairs(outcome(answer)))
     yield drawings({"Internal energies of all runs, with the tr of each, the common one and td": drawing})
-    yield section("Runs", table("Runs", [name.replace("+-", "\u00b1") for name in HEAD], rows(answer)))
+    head = [name.replace("+-", "\u00b1") for name in HEAD]
+    yield section("Runs", table("Runs", *known(head, rows(answer))))
     yield section("Files", tag("pre", _files(answer), class_="wrap"))
     yield section("Method and limits", resource("method.html"))
     yield section("To repeat this", tag("pre", shlex.join(command), class_="wrap"))

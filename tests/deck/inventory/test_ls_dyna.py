@@ -102,6 +102,10 @@ def test_long_format(tmp_path: Path) -> None:
         ("*ELEMENT_BEAM_PID\n" + row(1, 7, 1, 2, 3) + row(7, 9), {7: {"beam": 1}}),
         ("*ELEMENT_DISCRETE\n" + row(1, 7, 1, 2, 0) + "       2       9       3       4       0   1.00E+00\n",
          {7: {"spring": 1}, 9: {"spring": 1}}),
+        ("*ELEMENT_SOLID_H20\n" + (row(1, 7) + row(*range(1, 11)) + row(*range(11, 21))) * 2, {7: {"solid": 2}}),
+        ("*ELEMENT_SOLID_TET4TOTET10\n" + row(1, 7) + row(1, 2, 3, 5), {7: {"solid": 1}}),
+        ("*ELEMENT_SEATBELT\n" + row(1, 7, 1, 2) + "*ELEMENT_SEATBELT_SLIPRING\n" + row(1, 1, 2, width=10),
+         {7: {"seatbelt": 1}}),
         ("*ELEMENT_TSHELL\n" + row(1, 7, *range(1, 9)), {7: {"thick shell": 1}}),
         ("*ELEMENT_MASS\n       1       1             0.5       7\n", {}),
     ],
@@ -132,11 +136,17 @@ def test_ids_move_with_a_transform_and_parts_of_other_files_share_nodes(tmp_path
 
 
 def test_what_is_not_followed_is_said(tmp_path: Path) -> None:
-    strange = "*ELEMENT_SOLID_H64\n" + row(1, 7) + "*INCLUDE\nabsent.k\n*ELEMENT_SHELL\n" + row(1, 5, 1, 2, 4, 99)
+    strange = "*ELEMENT_SOLID_STRANGE\n" + row(1, 7) + "*INCLUDE\nabsent.k\n*ELEMENT_SHELL\n" + row(1, 5, 1, 2, 4, 99)
     found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}{strange}       2")
     assert not found.complete
     told = " ".join(found.notes)
-    for words in ("ELEMENT_SOLID_H64", "absent.k was not read", "is it cut", "part 5, which no *PART", "1 nodes of"):
+    for words in (
+        "ELEMENT_SOLID_STRANGE",
+        "absent.k was not read",
+        "is it cut",
+        "part 5, which no *PART",
+        "1 nodes of",
+    ):
         assert words in told
 
 
