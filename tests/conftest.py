@@ -12,7 +12,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 from hypothesis import settings
 
-from d2rpick.choice import examine
+from d2rpick.choice import examine, explored
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.identify import Identification, identify, identify_several
 
@@ -37,3 +37,5 @@ def remembered(fitter: Callable[..., Identification]) -> Callable[..., Identific
 
 # What a fit is does not depend on who asks; the tests of the fits themselves call them where they are defined.
 vars(examine).update(identify=remembered(identify), identify_several=remembered(identify_several))
+# Pages explore few td: what they show of each is the same.
+vars(explored).update(STEPS=5, _LEAST=5)

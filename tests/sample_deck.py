@@ -1,10 +1,13 @@
-"""The coarse deck in ``sample_data``: the rollover box with its step and the sled, as LS-DYNA shells.
+"""The coarse decks in ``sample_data``: the rollover box with its step and the sled, as shells.
 
-Run as ``python -m tests.sample_deck``.  It has the parts of the sample histories of the box, for ``d2rpick parts``.
+Run as ``python -m tests.sample_deck``.  The LS-DYNA deck has the parts of the sample histories of the box, for
+``d2rpick parts``.  The Radioss decks let box and step fly, free for 20 ms and rigid for 20 ms, for
+``d2rpick calibrate``; their listings are what the solver printed, cut to the summary.
 """
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,10 +15,14 @@ import numpy as np
 from tests.command import ROOT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
+
+    from d2rpick.histories.history import Samples
 
 DECK = ROOT / "sample_data" / "rollover_box.k"
+FLYING = ROOT / "sample_data" / "flying_box"
 _X, _Y, _Z = np.linspace(-0.9, 0.0, 4), np.linspace(0.0, 1.5, 6), np.linspace(0.2, 1.4, 5)
+_SLED, _MAIN = 3, 9999  # a part, and the main node of the rigid body
 _CARDS = """*SECTION_SHELL
 $#   secid    elform      shrf       nip
          1         2       1.0         3
@@ -37,10 +44,10 @@ class _Mesh:
         self.nodes: dict[tuple[float, ...], int] = {}
         self.shells: list[tuple[int, list[int]]] = []
 
-    def grid(self, part: int, fixed: int, at: float, one: Sequence[float], other: Sequence[float]) -> None:
+    def grid(self, part: int, fixed: int, at: float, one: Samples, other: Samples) -> None:
         """Fill a rectangle, at a constant coordinate ``fixed``, with shells."""
-        for a, b in zip(one[:-1], one[1:], strict=True):
-            for c, d in zip(other[:-1], other[1:], strict=True):
+        for a, b in itertools.pairwise(one):
+            for c, d in itertools.pairwise(other):
                 corners = [(a, c), (b, c), (b, d), (a, d)]
                 self.shells.append((part, [self._node(*np.insert(corner, fixed, at)) for corner in corners]))
 
@@ -50,7 +57,22 @@ class _Mesh:
 
 
 def deck() -> str:
-    """Text of the deck."""
+    """Text of the LS-DYNA deck."""
+    return "\n".join(_lines(_mesh())) + "\n"
+
+
+def radioss() -> dict[str, str]:
+    """Texts of the starter and of two legs by the names of their files."""
+    step = "/VERS/2022\n/DT\n0.9 0.0\n/DTIX\n5e-05 5e-05\n"
+    rest = "/TFILE/4\n0.001\n/PRINT/-2000\n/MON/ON\n"
+    legs = {
+        f"BOX_000{leg}.rad": f"/RUN/BOX/{leg}\n{stop}\n{step}/RBODY/{word}\n9999\n{rest}"
+        for leg, stop, word in ((1, 0.02, "OFF"), (2, 0.04, "ON"))
+    }
+    return {"BOX_0000.rad": "\n".join(_starter(_mesh())) + "\n", **legs}
+
+
+def _mesh() -> _Mesh:
     mesh = _Mesh()
     for z in (_Z[0], _Z[-1]):
         mesh.grid(1, 2, z, _X, _Y)
@@ -63,7 +85,7 @@ def deck() -> str:
         mesh.grid(2, 0, x, _Y, step)
     mesh.grid(2, 2, 0.0, _X[-2:], _Y)
     mesh.grid(3, 2, -0.01, np.linspace(-2.0, 2.0, 5), np.array([0.0, 1.5]))
-    return "\n".join(_lines(mesh)) + "\n"
+    return mesh
 
 
 def _lines(mesh: _Mesh) -> Iterator[str]:
@@ -80,5 +102,36 @@ def _lines(mesh: _Mesh) -> Iterator[str]:
     yield "*END"
 
 
+def _starter(mesh: _Mesh) -> Iterator[str]:
+    shells = [(part, nodes) for part, nodes in mesh.shells if part != _SLED]
+    used = sorted({node for _, nodes in shells for node in nodes})
+    places = {number: place for place, number in mesh.nodes.items()}
+    yield "#RADIOSS STARTER\n/BEGIN\nBOX\n      2022         0"
+    yield f"{'kg':>20}{'m':>20}{'s':>20}\n" * 2 + "/TITLE\nflying box\n/MAT/PLAS_JOHNS/1\nsteel"
+    yield f"{7850:20d}\n{2.1e11:20g}{0.3:20g}{0:10d}\n{3.5e8:20g}{6e8:20g}{0.5:20g}{0:20d}{0:20d}"
+    yield f"{0:20d}{0:20d}{0:10d}{0:10d}{0:20d}{0:20d}\n" + f"{0:20d}" * 4
+    for number, (form, thickness) in enumerate(((24, 0.005), (12, 0.002)), start=1):
+        yield f"/PROP/SHELL/{number}\nshell\n{form:10d}{0:10d}{0:10d}{0:10d}{'':20}{0:20d}\n" + f"{0:20d}" * 5
+        yield f"{3:10d}{0:10d}{thickness:20g}{0:20d}{'':10}{1:10d}{1:10d}"
+    yield "/NODE"
+    for node in used:
+        yield f"{node:10d}" + "".join(f"{value:20.6f}" for value in places[node])
+    yield f"{_MAIN:10d}{-0.45:20.6f}{0.75:20.6f}{0.8:20.6f}"
+    for number, title in ((1, "box"), (2, "step")):
+        yield f"/PART/{number}\n{title}\n{number:10d}{1:10d}\n/SHELL/{number}"
+        for id_, (part, nodes) in enumerate(shells, start=1):
+            if part == number:
+                yield f"{id_:10d}" + "".join(f"{node:10d}" for node in nodes)
+    for group, members in ((1, used), (2, [*used, _MAIN])):
+        yield f"/GRNOD/NODE/{group}\nnodes"
+        yield from ("".join(f"{node:10d}" for node in members[at : at + 10]) for at in range(0, len(members), 10))
+    yield f"/RBODY/1\nbody\n{_MAIN:10d}{0:10d}{0:10d}{0:10d}{0:20d}{1:10d}{0:10d}{0:10d}{0:10d}"
+    yield f"{0:20d}{0:20d}{0:20d}\n" * 2 + f"{0:10d}{0:10d}{0:10d}"
+    yield f"/INIVEL/TRA/1\nflight\n{4:20d}{0:20d}{2:20d}{2:10d}{0:10d}\n/TH/PART/1\nparts\nDEF\n{1:10d}{2:10d}\n/END"
+
+
 if __name__ == "__main__":
     DECK.write_text(deck(), "utf-8")
+    FLYING.mkdir(exist_ok=True)
+    for name, text in radioss().items():
+        (FLYING / name).write_text(text, "utf-8")

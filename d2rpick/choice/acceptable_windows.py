@@ -9,42 +9,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.verify import approve
+from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.roots import narrow
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.candidates import Candidates
+    from d2rpick.choice.candidates import Candidate, Candidates
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
 
-# Each level of tolerance is this part of the one before.
-_FINER = 0.25
 # Halvings of the sampling interval at an end of a window: to a millionth of it.
 _HALVINGS = 20
 
 
-def tolerance_levels(tolerance: float) -> tuple[float, ...]:
-    """The tolerance, a quarter of it, and so on, down to the first below which errors count as equal [-].
+def acceptable_windows(situation: Situation, candidates: Candidates, recommended: float | None) -> Samples:
+    """Find the windows in which a tr is acceptable.
 
-    Examples
-    --------
-    >>> tolerance_levels(0.2)
-    (0.2, 0.05, 0.0125)
-    """
-    levels = [tolerance]
-    while levels[-1] > EQUALLY_GOOD:
-        levels.append(levels[-1] * _FINER)
-    return tuple(levels)
-
-
-def acceptable_windows(situation: Situation, candidates: Candidates, recommended: float | None) -> tuple[Samples, ...]:
-    """Find the windows in which a tr is acceptable, at the tolerance and at each finer level.
-
-    Every end and middle at the full tolerance was judged by the rule of ``verify``; ends lie inside.  In between the
-    rule cannot change: between neighbouring points of the grid the energy is linear, or the deformation monotone.
+    Every end and middle was judged by the rule of ``verify``; ends lie inside.  In between the rule cannot change:
+    between neighbouring points of the grid the energy is linear, or the deformation monotone.
 
     Parameters
     ----------
@@ -57,19 +41,51 @@ def acceptable_windows(situation: Situation, candidates: Candidates, recommended
 
     Returns
     -------
-    tuple of array, each of shape (n, 2)
-        For each of ``tolerance_levels``: first and last time of each window, ascending [time].
+    array of shape (n, 2)
+        First and last time of each window, ascending [time].
     """
-    levels = tolerance_levels(situation.settings.tolerance)
     if situation.at_rest:  # any tr before td is right
-        return (np.array([[situation.earliest_tr, np.nextafter(situation.td, -np.inf)]]),) * len(levels)
-    grid = _grid(situation, candidates)
-    widest, *finer = _windows_below(situation, grid, np.minimum(levels, _residual_left(situation)))
+        return np.array([[situation.earliest_tr, np.nextafter(situation.td, -np.inf)]])
+    grid = monotone_grid(situation, candidates)
+    widest = _windows_below(situation, grid, min(situation.settings.tolerance, _residual_left(situation)))
     judged = approve(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
     kept = widest[np.reshape(judged, (-1, 3)).all(axis=1)]
     if kept.size and kept[-1, 1] >= grid[-1] and not (recommended is not None and kept[-1, 0] <= recommended):
         kept = kept[:-1]
-    return (kept, *(_within(windows, kept) for windows in finer))
+    return kept
+
+
+def clear_of_td(situation: Situation, windows: Samples) -> Samples:
+    """Give the windows without what lies within one output interval of td: nothing is saved there."""
+    time = situation.history.time
+    state = int(np.searchsorted(time, situation.td))
+    end = situation.td - float(time[state] - time[state - 1])
+    kept = windows[windows[:, 0] < end]
+    return np.stack([kept[:, 0], np.minimum(kept[:, 1], end)], axis=1)
+
+
+def alike_windows(situation: Situation, candidates: Candidates, chosen: Candidate, acceptable: Samples) -> Samples:
+    """Find where in the acceptable windows a tr keeps the timing tolerance: its error is at most 0.05 above the chosen.
+
+    The timing tolerance of a candidate is how far it may be off before its lock-in error grows by 0.05; on the energy
+    alone the level error counts as that does.
+
+    Parameters
+    ----------
+    situation : Situation
+    candidates : Candidates
+        All of them.
+    chosen : Candidate
+    acceptable : array of shape (n, 2)
+        As `acceptable_windows` gave them.
+
+    Returns
+    -------
+    array of shape (k, 2)
+        First and last time of each window, ascending [time].
+    """
+    level = float(situation.errors(np.array([chosen.tr]))[0]) + TOLERATED_GROWTH
+    return common_windows([acceptable, _windows_below(situation, monotone_grid(situation, candidates), level)])
 
 
 def coverage(runs: Sequence[Samples]) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
@@ -116,7 +132,7 @@ def common_windows(runs: Sequence[Samples]) -> Samples:
     return np.asarray(stretches[counts == len(runs)])
 
 
-def _grid(situation: Situation, candidates: Candidates) -> Samples:
+def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     """Times in the flight before td between which the rule changes once at most."""
     history, td = situation.history, situation.td
     start = situation.earliest_tr
@@ -135,26 +151,15 @@ def _residual_left(situation: Situation) -> float:
     return -1.0 if share is None or share > limit**2 else float(np.sqrt(limit**2 - share))
 
 
-def _windows_below(situation: Situation, grid: Samples, levels: Samples) -> list[Samples]:
-    """Windows in which the error stays at or below each level, each of shape (n, 2)."""
-    inside = np.pad(situation.errors(grid) <= levels[:, np.newaxis], ((0, 0), (1, 1)))
-    inner = inside[:, 1:-1]
-    level, first = np.nonzero(inner & ~inside[:, :-2])
-    last = np.nonzero(inner & ~inside[:, 2:])[1]
-    around = np.clip([first - 1, last + 1], 0, grid.size - 1)
-    within, beyond = grid[np.stack([first, last], axis=1)], grid[around.T]
-    limits = levels[level, np.newaxis]
-    if level.size:
-        within, *_ = narrow(
-            lambda t: situation.errors(t.ravel()).reshape(t.shape) <= limits, within, beyond, steps=_HALVINGS
-        )
-    return [within[level == i] for i in range(levels.size)]
-
-
-def _within(finer: Samples, kept: Samples) -> Samples:
-    """Windows of a finer level that lie in windows of the full tolerance."""
-    holder = np.searchsorted(kept[:, 0], finer[:, 0], side="right") - 1
-    inside = (
-        (holder >= 0) & (finer[:, 1] <= kept[np.maximum(holder, 0), 1]) if kept.size else np.zeros(len(finer), bool)
-    )
-    return np.asarray(finer[inside])
+def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples:
+    """Windows in which the error stays at or below a level, shape (n, 2)."""
+    inside = np.pad(situation.errors(grid) <= level, 1)
+    first = np.flatnonzero(inside[1:-1] & ~inside[:-2])
+    last = np.flatnonzero(inside[1:-1] & ~inside[2:])
+    within = grid[np.stack([first, last], axis=1)]
+    if not within.size:
+        return within
+    beyond = grid[np.clip([first - 1, last + 1], 0, grid.size - 1).T]
+    return narrow(
+        lambda t: situation.errors(t.ravel()).reshape(t.shape) <= level, within, beyond, steps=_HALVINGS
+    ).within

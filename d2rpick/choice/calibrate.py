@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Pull towards the measured ratios: times of a leg are right within some 5 %, ratios of weights within a half.
-_PULL: Final = 0.1
-# A weight is told by the legs where they decide more than half of it.
+# Times of a leg are right within some 5 %, measured ratios of weights within a half: one over the other.
+_DOUBT: Final = 0.1
+# A weight is told by the legs where, with this doubt, they decide more than half of it.
 _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
@@ -108,15 +108,17 @@ def _rows(observations: Sequence[Observation], classes: Sequence[str]) -> tuple[
 
 
 def _solved(scaled: Samples) -> tuple[Samples, NDArray[np.bool_]]:
-    """Least squares with a weak pull to 1, none below 0; and which unknowns the rows decide."""
+    """Least squares, none below 0, over the unknowns that the rows decide; the others stay 1.  Give both."""
     from scipy.optimize import lsq_linear
 
-    count = scaled.shape[1]
-    pulled = np.vstack([scaled, _PULL * np.eye(count)])
-    answer = lsq_linear(pulled, np.append(np.ones(len(scaled)), np.full(count, _PULL)), bounds=(0.0, np.inf))
     normal = scaled.T @ scaled
-    resolution = np.linalg.solve(normal + _PULL**2 * np.eye(count), normal)
-    return np.asarray(answer.x), np.diag(resolution) > _TOLD
+    resolution = np.linalg.solve(normal + _DOUBT**2 * np.eye(len(normal)), normal)
+    told = np.diag(resolution) > _TOLD
+    found = np.ones(len(normal))
+    if told.any():
+        left = 1 - scaled[:, ~told].sum(axis=1)
+        found[told] = lsq_linear(scaled[:, told], left, bounds=(0.0, np.inf)).x
+    return found, told
 
 
 def _share(one: Observation, values: Mapping[str, float]) -> float:

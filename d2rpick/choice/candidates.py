@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
@@ -146,8 +147,8 @@ class Candidates(Sequence[Candidate]):
         """Give the same, ranked in this order of their places."""
         return replace(
             self,
-            moments=tuple(self.moments[i] for i in order.tolist()),
-            known=tuple(self.known[i] for i in order.tolist()),
+            moments=tuple(map(self.moments.__getitem__, order.tolist())),
+            known=tuple(map(self.known.__getitem__, order.tolist())),
             tr=self.tr[order],
             energy=self.energy[order],
             level_error=self.level_error[order],
@@ -232,9 +233,12 @@ def find_candidates(situation: Situation) -> Candidates:
     if start is not None and situation.at_rest:
         return judge(situation, [Moment(max(start, float(situation.history.time[0])), "start", None)])
     found = situation.vibration.moments(situation.settings.tolerance)
-    of_level = np.array([one.tr for one in found if one.kind != "match"])
-    new = [one for one in found if one.kind != "match" or np.all(np.abs(of_level - one.tr) > situation.history.step)]
-    return judge(situation, sorted(new, key=lambda one: one.tr))
+    matches = [one for one in found if one.kind == "match"]
+    if matches:
+        of_level = np.array([one.tr for one in found if one.kind != "match"])
+        known = {one for one in matches if not np.all(np.abs(of_level - one.tr) > situation.history.step)}
+        found = [one for one in found if one not in known]
+    return judge(situation, sorted(found, key=itemgetter(0)))  # a Moment begins with its time
 
 
 def judge(situation: Situation, found: Sequence[Moment]) -> Candidates:

@@ -47,9 +47,9 @@ def margin_before_contact(history: History, flight: Flight, given: float | None 
 def landing_spread(history: History, flight: Flight) -> float | None:
     r"""Tell how far the velocity error of a switch may move the next landing.
 
-    A switch takes the velocity of the vibration from all parts, and freezes them away from where they rest: both by
-    the amplitude :math:`a = \sqrt{2 T / m} / \omega` at most.  The centre of mass goes on as before, so a surface
-    that is off by that amplitude touches the ground earlier or later by
+    A switch takes the velocity of the vibration from all parts, and freezes them away from where they rest: by the
+    amplitude :math:`a = \sqrt{2 T / m} / \omega` in root mean square.  The centre of mass goes on as before, so a
+    surface that is off by that amplitude touches the ground earlier or later by
 
     .. math:: \delta t = \frac{a}{v_n} = \frac{1}{\omega} \sqrt{\frac{T}{K_n}}, \quad
         K_n = \frac{m v_n^2}{2} = K\, \frac{(p \cdot n)^2}{p^2}

@@ -14,7 +14,6 @@ from d2rpick.choice.part_steps import steps_of
 from d2rpick.choice.part_verdicts import rows_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import FormatError, RangeError
-from d2rpick.flight.position_error import drift_of
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.measures import run_time_share
 
@@ -26,9 +25,10 @@ if TYPE_CHECKING:
     from d2rpick.choice.part_steps import Steps
     from d2rpick.choice.part_verdicts import PartRow
     from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Situation
     from d2rpick.choice.switched_run import Times
     from d2rpick.deck.inventory.model import Inventory
-    from d2rpick.histories.history import History, Part
+    from d2rpick.histories.history import Part
     from d2rpick.histories.run import Run
 
 # Savings that differ by less cannot be told apart: the cost model is right within some points.
@@ -136,8 +136,7 @@ def parts_of(
     inventory = model.inventory if model else None
     steps = steps_of(inventory, printed or {})
     rows = rows_of(facts, model, steps)
-    flight = None if facts.longest is None else facts.flights[facts.longest]
-    comparison = _Comparison(run, settings, model, rows, steps, flight)
+    comparison = _Comparison(run, settings, model, rows, steps)
     sets: list[PartSet] = []
     for one in _sets(rows, inventory, given):
         td = next((other.window[1] for other in sets if other.window), None)  # the same for all, to be compared
@@ -207,7 +206,6 @@ class _Comparison:
     model: CostModel | None
     rows: Sequence[PartRow]
     steps: Steps
-    flight: tuple[float, float] | None
 
     def of(self, one: PartSet, times: Times | float | None) -> PartSet:
         """Complete a set, in a window, or in that for a td."""
@@ -249,31 +247,27 @@ class _Comparison:
         """Find when the set may be rigid; RangeError with the reason where it may not."""
         reference = Reference.of(self.run, Selection(parts=tuple(map(str, one.parts))))
         if isinstance(times, tuple):
-            verify_of(reference, *times, self.settings)  # objects to times outside the record
+            situation = verify_of(reference, *times, self.settings).situation
             tr, td = times
         else:
             answer = suggest_of(reference, times, self.settings, with_better=False)
             if answer.recommended is None:
                 why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
                 raise RangeError("; ".join(why) or "no tr can be recommended")
-            tr, td = answer.recommended.tr, answer.recommended.td
+            situation, (tr, td) = answer.situation, (answer.recommended.tr, answer.recommended.td)
         time = reference.history.time
         one = replace(one, window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0]))
-        return self._with_position(one, reference.history, tr, td)
+        return _with_position(one, situation, tr)
 
-    def _with_position(self, one: PartSet, history: History, tr: float, td: float) -> PartSet:
-        """Find how far the body is out of place at td since its parts moved against each other before."""
-        momenta = next((momenta for momenta in history.momenta if momenta.parts is not None), None)
-        if momenta is None or momenta.parts is None or history.masses is None or self.flight is None:
-            return one
-        if len(one.bodies) > 1:
-            return replace(one, reasons=(_SEVERAL,))
-        members = [at for at, part in enumerate(momenta.parts) if part.id in one.parts]
-        drift = drift_of(momenta, history.masses, members, self.flight)
-        error = float(drift.errors(np.array([tr]), td)[0]) if drift else np.nan
-        if drift is None or np.isnan(error):
-            return one
-        return replace(one, position_error=error, position_limit=drift.limit, position_part=drift.part)
+
+def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
+    """Add how far the body is out of place at td since its parts moved against each other before."""
+    if len(one.bodies) > 1:
+        return replace(one, reasons=(_SEVERAL,))
+    drift, error = situation.drift, float(situation.position_errors(np.array([tr]))[0])
+    if drift is None or np.isnan(error):
+        return one
+    return replace(one, position_error=error, position_limit=drift.limit, position_part=drift.part)
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:

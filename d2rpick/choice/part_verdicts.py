@@ -80,6 +80,8 @@ def _described(part: int, facts: RunFacts, model: CostModel | None, steps: Steps
     fact, inventory = facts.parts.get(part), model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
     counts = inventory.counts.get(part, Counter()) if inventory and data else None
+    if inventory and not counts and not inventory.complete:
+        counts = None  # they may be in a file that was not read
     by_deck, (step, source) = steps.masses.get(part), steps.of(part)
     mass = fact.mass if fact and fact.mass is not None else by_deck
     title = data.title if data and data.title else fact.part.title if fact else ""
@@ -158,6 +160,8 @@ def _not_known(row: PartRow, facts: RunFacts, inventory: Inventory | None, data:
         yield "without a deck it is not known whether it is discrete, already rigid, or shares nodes"
     elif data is None:
         yield "not in the deck"
+    elif row.elements is None:
+        yield "its elements are not in what was read of the deck"
     elif data.material is None:
         yield "its material is not in the deck"
     if row.id not in facts.parts:

@@ -179,7 +179,7 @@ def _windows(
         return ()
     from d2rpick.choice.acceptable_windows import acceptable_windows  # not above: an oscillator does without it
 
-    found = acceptable_windows(situation, candidates, best.tr if best else None)[0].tolist()
+    found = acceptable_windows(situation, candidates, best.tr if best else None).tolist()
     return tuple(AcceptableWindow(low, high, (high - low) / (situation.td - start)) for low, high in found)
 
 

@@ -47,23 +47,24 @@ def suggest_in_longest_flight(history: History, settings: Settings) -> Suggestio
     RangeError
         If nothing in the record shows a flight.
     """
-    return suggest_in_window(history, longest_flight(history, settings), settings)
+    fits = Fits()
+    return suggest_in_window(history, longest_flight(history, settings, fits), settings, fits)
 
 
-def longest_flight(history: History, settings: Settings) -> tuple[float, float]:
+def longest_flight(history: History, settings: Settings, fits: Fits | None = None) -> tuple[float, float]:
     """Give the longest flight as a window within the record [time]; RangeError where nothing shows a flight."""
-    flights = flights_of(history, settings)
+    flights = flights_of(history, settings, fits)
     if not flights:
         found = f"{', '.join(history.source)}: nothing in the record shows a flight"
         raise RangeError(f"{found}; name td, or a window for it")
     return max((bounds(history, flight) for flight in flights), key=lambda one: one[1] - one[0])
 
 
-def flights_of(history: History, settings: Settings) -> tuple[Flight, ...]:
+def flights_of(history: History, settings: Settings, fits: Fits | None = None) -> tuple[Flight, ...]:
     """Find all flights; where the energy is all there is, one oscillator for the whole record, else none is sought."""
     if any(True for _ in witnesses(history)) or not settings.replay:
         return find_flights(history, settings)
-    middle = examine(history, float(history.time[0] + history.time[-1]) / 2, settings)
+    middle = examine(history, float(history.time[0] + history.time[-1]) / 2, settings, fits)
     if middle.flight.source == "oscillator":
         return (middle.flight,)
     return find_flights(history, replace(settings, replay=False))

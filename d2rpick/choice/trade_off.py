@@ -72,8 +72,8 @@ def explore_of(
     td : float, optional
         Offered too, and what others are compared with [time].
     steps : int
-        So many td on an even grid; beside them every peak of the energy or, of more than ``steps`` of them, the highest
-        in each interval of the grid.
+        So many td on an even grid, and every peak of the energy.  Where there are more peaks than that, the highest in
+        each interval of the grid takes its place.
 
     Raises
     ------
@@ -81,8 +81,8 @@ def explore_of(
         If td or the window lies outside the record, or no flight is seen.
     """
     history = reference.history
-    window = longest_flight(history, settings) if td_window is None else td_window
     fits = Fits()
+    window = longest_flight(history, settings, fits) if td_window is None else td_window
     look = looking(history, settings, fits)
     situation, inside = within_flight(look, history, window)
     suggestion = suggest_of(reference, window, settings, fits=fits)
@@ -111,10 +111,10 @@ def _times(situation: Situation, window: tuple[float, float], steps: int) -> tup
     grid = np.linspace(*window, steps + 1)[1:]  # nothing can be rigid before the first
     peaks = np.array(situation.peaks(*window))
     if peaks.size > steps:
-        height = situation.vibration.energies(peaks)
         place = np.searchsorted(grid, peaks)
-        order = np.lexsort((-height, place))
-        peaks = peaks[order[np.diff(place[order], prepend=-1) > 0]]
+        order = np.lexsort((-situation.vibration.energies(peaks), place))
+        highest = order[np.diff(place[order], prepend=-1) > 0]
+        peaks, grid = peaks[highest], np.delete(grid, place[highest])
     return np.union1d(grid, peaks), set(peaks.tolist())
 
 
@@ -128,11 +128,12 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
     unbeaten = set()
     for known in (True, False):
         group = [one for one in offers if _found(one) and (one.basis != "energy") == known]
-        least = np.inf
+        least, longest = np.inf, np.inf
         for one in sorted(group, key=lambda one: (-(one.rigid_time or 0.0), _printed(one))):
-            if _printed(one) < least:
+            error, rigid = _printed(one), one.rigid_time or 0.0
+            if error < least or (error, rigid) == (least, longest):  # equal pairs do not beat each other
                 unbeaten.add(one.td)
-                least = _printed(one)
+                least, longest = error, rigid
     return (replace(one, unbeaten=one.td in unbeaten) for one in offers)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -94,21 +96,22 @@ def view(history: History, flight: Flight, times: list[float], known: float | No
         inner = first, last
     else:
         end = flight.end if flight.end is not None else known if known is not None else last
-        inner = min(flight.start, *times), max(end, *times)
+        inner = max(first, min(flight.start, *times)), min(last, max(end, *times))
+        inner = inner if inner[0] < inner[1] else (first, last)
     beyond = _BEYOND * (inner[1] - inner[0])
     start, end = max(first, inner[0] - beyond), min(last, inner[1] + beyond)
     flown = _flown(history, flight, inner)
     low, high = float(flown.min()), float(flown.max())
-    time, energy = history.between(start, end)
-    highest = float(energy.max())
-    later = flight.end is not None and float(time[energy.argmax()]) >= flight.end
-    return View(start, end, low, high, highest, "" if highest <= high else "landing" if later else "load")
+    after = end if flight.end is None else flight.end
+    landed = float(history.between(after, end)[1].max(initial=high))
+    highest = float(history.between(start, end)[1].max(initial=landed))
+    return View(start, end, low, high, highest, "" if highest <= high else "landing" if landed == highest else "load")
 
 
 def _flown(history: History, flight: Flight, inner: tuple[float, float]) -> Samples:
-    """Energies in the flight, but for its ends; of all that is shown where it has no state."""
+    """Energies in the flight, but for its ends; where it has no state, those between which it lies."""
     start = inner[0] if flight.start is None else flight.start
     end = inner[1] if flight.end is None else flight.end
     off = _UNSURE * (end - start)
     flown = history.between(start + off, end - off)[1]
-    return flown if flown.size else history.between(*inner)[1]
+    return flown if flown.size else history.energies_at(np.array(inner))

@@ -12,9 +12,8 @@ from d2rpick.report.formats import FORMATS, Shown, write
 
 EXAMPLES = """\b
 Examples:
-  d2rpick calibrate reference/ switched/
-  d2rpick calibrate -f toml -o site.toml reference/ switched/
-  d2rpick parts --deck main.k --weights site.toml run/
+  d2rpick calibrate sample_data/flying_box
+  d2rpick calibrate -f toml -o site.toml sample_data/flying_box
 """
 
 

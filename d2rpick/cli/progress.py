@@ -28,7 +28,8 @@ def reading(names: Sequence[str], *, quiet: bool) -> Iterator[None]:
     start = perf_counter()
     with _telling(lambda seconds: f"reading {what}{more} ... {seconds:.0f} s", quiet=quiet):
         yield
-    if click.get_current_context().meta.get("d2rpick.verbose"):
+    context = click.get_current_context(silent=True)
+    if context and context.meta.get("d2rpick.verbose"):
         click.echo(f"read {what}{more} in {perf_counter() - start:.2f} s", err=True)
 
 

@@ -74,8 +74,9 @@ def command(
     from d2rpick.report.formats import Shown, write
     from d2rpick.report.reproduction import Reproduction
 
+    place = _made(output_dir)  # the page may go there
     output = Output.of({**options, "report": report}, *solver)
-    curves, place = _solver(solver), _made(output_dir)  # before the half minute that the box takes
+    curves = _solver(solver)  # before the half minute that the box takes
     answer = Reproduction(table(), list(_exhibits(section, curves)))
     files = _write(output, place, answer)
     if report:

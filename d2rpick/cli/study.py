@@ -21,7 +21,8 @@ from d2rpick.report.formats import FORMATS, Shown, write
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.studies.study import Question, Row, Study
+    from d2rpick.studies.row import Row
+    from d2rpick.studies.study import Question, Study
     from d2rpick.studies.workers import Farm
 
 EXAMPLES = """\b
@@ -52,7 +53,11 @@ class Work:
 
 @click.command("study", epilog=EXAMPLES)
 @click.argument("run", metavar="RUN...", nargs=-1, type=shared.FILE)
-@click.option("--td", type=shared.TIME, required=True, metavar="T", help="Switch back to deformable at this time.")
+@click.option("--td", type=shared.TIME, metavar="T", help="Switch back to deformable at this time.")
+@click.option(
+    "--td-window", type=(shared.TIME, shared.TIME), metavar="LO HI",
+    help="Let each run choose its time to switch back within this window.",
+)  # fmt: skip
 @click.option(
     "--from", "listed", envvar="D2RPICK_STUDY_FROM", metavar="LIST", type=shared.FILE,
     help="File with more names of runs, one per line; - is stdin.",
@@ -83,11 +88,12 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
     from d2rpick.studies.study import Question, summarise
 
     work, plot, report = Work.of(options), options["plot"], options["report"]
+    td = _td(options["td"], options["td_window"])
     sources = _sources(run, options["listed"])
     output = Output.of(options, *sources)
     _check_ledger(work.resume, {"output-file": output.file, "plot": plot, "report": report})
     question = Question(
-        options["td"], shared.settings(options), shared.selection(options), options["input_format"],
+        td, shared.settings(options), shared.selection(options), options["input_format"],
         curve=bool(plot or report),
     )  # fmt: skip
     asked, rows = fingerprint(question), []
@@ -106,6 +112,18 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
         click.echo(f"d2rpick: no run could be judged; the first: {with_options(rows[0].message or '')}", err=True)
         ctx.exit(2)
     finish(ctx, objection=answer.objection, exit_zero=exit_zero)
+
+
+def _td(td: float | None, window: tuple[float, float] | None) -> float | tuple[float, float]:
+    """Give what is asked for, a time or a window; UsageError for neither, both, or an empty window."""
+    if td is not None and window:
+        raise click.UsageError("--td and --td-window exclude each other")
+    if window and not window[0] < window[1]:
+        raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty; give the lower time first")
+    asked = td if td is not None else window
+    if asked is None:
+        raise click.UsageError("name the time to switch back with --td, or a window for it with --td-window")
+    return asked
 
 
 def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:

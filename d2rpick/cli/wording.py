@@ -14,6 +14,7 @@ OPTIONS: Final = {
     "td": "--td",
     "td_window": "--td-window",
     "time": "--time",
+    "weights": "--weights",
     "tr": "--tr",
     "write_as": "--write-as",
 }

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
 # A contact energy that never exceeds its printed digits by this factor shows no contact at all.
 _VISIBLE = 100
+# One for each record: it is asked about many td.
+_LAWS: Final[WeakKeyDictionary[Balance, Remembered]] = WeakKeyDictionary()
 
 
 def shows_contacts(balance: Balance) -> bool:
@@ -30,8 +33,9 @@ def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     time, energy = balance.time, balance.sliding
     if energy is None or not time[0] <= td <= time[-1]:
         return None
-    law = Remembered(_Constant(time, energy))
-    window = lasting_window(law, td, float(np.ptp(energy)), _noise(balance))
+    if balance not in _LAWS:
+        _LAWS[balance] = Remembered(_Constant(time, energy))
+    window = lasting_window(_LAWS[balance], td, float(np.ptp(energy)), _noise(balance))
     if window is None or (window[0] == 0 and balance.external_work is None):
         return None
     first, last = window

@@ -55,23 +55,28 @@ def find_crossings(time: Samples, energy: Samples, level: float) -> tuple[Crossi
     >>> find_crossings(np.array([0.0, 1.0, 2.0]), np.array([3.0, 1.0, 0.0]), 1.0)
     (Crossing(time=1.0, rising=False),)
     """
+    times, rising = passages(time, energy, level)
+    return tuple(map(Crossing, times.tolist(), rising.tolist()))
+
+
+def passages(time: Samples, energy: Samples, level: float) -> tuple[Samples, NDArray[np.bool_]]:
+    """Times of the crossings by the rule of ``find_crossings``, and which of them rise, both of shape (k,)."""
     side = np.sign(energy - level)
     off = np.flatnonzero(side)
     if not off.size:
-        return ()
-    found = []
-    if off[0] > 0:
-        found.append(Crossing(float(time[0]), bool(side[off[0]] > 0)))
+        return np.zeros(0), np.zeros(0, dtype=bool)
     turn = np.flatnonzero(side[off[:-1]] != side[off[1:]])
     before, after = off[turn], off[turn + 1]
     share = np.where(
         after == before + 1, (level - energy[before]) / (energy[before + 1] - energy[before]), 1.0
     )  # with samples on the level in between, the first of them: a share of 1
     at = time[before] + share * (time[before + 1] - time[before])
-    found += map(Crossing, at.tolist(), (side[after] > 0).tolist())
+    rising = side[after] > 0
+    if off[0] > 0:
+        at, rising = np.append(time[0], at), np.append(side[off[0]] > 0, rising)
     if off[-1] < side.size - 1:
-        found.append(Crossing(float(time[off[-1] + 1]), bool(side[off[-1]] < 0)))
-    return tuple(found)
+        at, rising = np.append(at, time[off[-1] + 1]), np.append(rising, side[off[-1]] < 0)
+    return at, rising
 
 
 def find_extrema(time: Samples, energy: Samples) -> tuple[Extremum, ...]:

@@ -111,6 +111,7 @@ class Legs:
         several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
         self._files = sorted(legs, key=_start) if several else [*legs]
         self._legs = [leg for leg in self._files if not several or _start(leg) > -np.inf] or self._files
+        self._energies: tuple[tuple[int, ...], Samples] | None = None  # of the parts that were asked for last
 
     @property
     def source(self) -> str:
@@ -214,8 +215,15 @@ class Legs:
         return self._joined([leg.channel(name) for leg in self._legs], self._kept[0])
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """One quantity of some parts."""
-        return self._joined([leg.part_channel(quantity, ids) for leg in self._legs], self._parts_kept[0])
+        """One quantity of some parts; their energies are read-only, since several ask for those of the same parts."""
+        if quantity == "internal_energy" and self._energies and self._energies[0] == tuple(ids):
+            return self._energies[1]
+        values = self._joined([leg.part_channel(quantity, ids) for leg in self._legs], self._parts_kept[0])
+        if quantity == "internal_energy":
+            values = values.view()
+            values.flags.writeable = False
+            self._energies = tuple(ids), values
+        return values
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """Those of the coarsest leg."""

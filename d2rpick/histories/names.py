@@ -206,12 +206,12 @@ def in_seconds(text: str) -> float | None:
     return float(f"{float(found[1]) * sizes[found[2]]:.12g}") if found else None
 
 
-def near_miss(wanted: str, known: Sequence[str]) -> str:
-    """Ask for the name that was perhaps meant, or say nothing."""
+def near_miss(wanted: str, known: Sequence[str], likeness: float = 0.6) -> str:
+    """Ask for the name that was perhaps meant, or say nothing; ``likeness`` from 0 to 1 is the least that counts."""
     import difflib
 
     folded = {name.casefold(): name for name in known}
-    close = difflib.get_close_matches(wanted.casefold(), folded, n=1)
+    close = difflib.get_close_matches(wanted.casefold(), folded, n=1, cutoff=likeness)
     return f" (did you mean {folded[close[0]]!r}?)" if close else ""
 
 

@@ -15,9 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
 _NUMBER: Final = rb"([-+.\dEe]+)"
-_CONTROLLED: Final = re.compile(
-    rb"dt of cycle +\d+ is controlled by +[\w ]*?\d+ +of part +(\d+)[^\0]*?\n time step\.+ +" + _NUMBER
-)
+_STEP: Final = re.compile(rb"is controlled by +[\w ]*?\d+ +of part +(\d+)|^ time step\.+ +" + _NUMBER, re.MULTILINE)
 _TABLE: Final = re.compile(rb"smallest timesteps *\r?\n[^\n]*\n[^\n]*part +timestep *\r?\n((?:[^\n]*\n)*?) *(?:\n|\Z)")
 _ROW: Final = re.compile(rb"^ *[a-z][a-z ]* +\d+ +(\d+) +" + _NUMBER + rb"\s*$", re.MULTILINE)
 _HEAD: Final = 64 << 20  # bytes of a file that are searched: it begins with what matters
@@ -47,10 +45,15 @@ def printed_steps(run: Run, *beside: str) -> dict[int, tuple[float, str]]:
 
 
 def _of_glstat(run: Run) -> Iterator[tuple[str, int, float]]:
+    """Pair the part that controls each cycle with the step printed below it."""
     for file in run.files:
-        text = file.data[:_HEAD]
-        if b"is controlled by" in text:
-            yield from (("glstat", *_pair(*match.groups())) for match in _CONTROLLED.finditer(text))
+        part: bytes | None = None
+        for line in _STEP.finditer(file.data[:_HEAD]):
+            if line[1]:
+                part = line[1]
+            elif part:
+                yield ("glstat", *_pair(part, line[2]))
+                part = None
 
 
 def _of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float]]:

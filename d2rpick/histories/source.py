@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 STDIN = "-"
 _GZIP = b"\x1f\x8b"
+# Files of a folder often share their suffix, and have it in common with any name that has it.
+_LIKENESS = 0.8
 _NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
 
 # What solvers call their databases in the folder of a run.
@@ -142,7 +144,7 @@ def _meant(name: str) -> str:
         beside = os.listdir(folder or ".")  # noqa: PTH208  not pathlib: start-up
     except OSError:
         return ""
-    return near_miss(wanted, beside)
+    return near_miss(wanted, beside, _LIKENESS)
 
 
 def _unpacked(name: str, packed: bytes | OnDisk) -> Source:

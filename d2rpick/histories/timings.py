@@ -30,9 +30,8 @@ _D3HSP_SETUP: Final = re.compile(
     rb"^ *(?:Keyword Processing|Initialization|MPP Decomposition)" + _D3HSP_ROW, re.MULTILINE
 )
 _D3HSP_CYCLES: Final = re.compile(rb"Problem cycle *= *(\d+)")
-_ZONE: Final = re.compile(
-    rb"^ time\.{5,} *" + _NUMBER + rb"[^\0]*?^ time per zone cycle\.\(nanosec\)\.\. *(\d+)", re.MULTILINE
-)
+_ZONE: Final = re.compile(rb"^ time(?:\.{5,}| per zone cycle\.\(nanosec\)\.\.) +" + _NUMBER, re.MULTILINE)
+_PER_ZONE: Final = b" time per zone"
 
 
 class Timing(NamedTuple):
@@ -72,7 +71,13 @@ def read_timing(path: str) -> Timing:
 
 def read_zone_times(path: str) -> ZoneTimes:
     """Read the time per zone cycle of a glstat; FormatError where it has none above zero."""
-    pairs = [(float(time), int(value)) for time, value in _ZONE.findall(_read(path))]
+    pairs: list[tuple[float, float]] = []
+    time = 0.0
+    for line in _ZONE.finditer(_read(path)):
+        if line[0].startswith(_PER_ZONE):
+            pairs.append((time, float(line[1])))
+        else:
+            time = float(line[1])
     times = np.array(pairs, np.float64).reshape(-1, 2)
     times = times[times[:, 1] > 0]
     if not len(times):

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.health import Health
     from d2rpick.choice.judged_card import SolverInput
+    from d2rpick.choice.quality import Quality
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.suggest import Pair
     from d2rpick.choice.trade_off import TradeOff
@@ -107,6 +108,11 @@ class Suggestion(Answer):
     better_pair: Pair | None
     _core: choice.Suggestion = field(repr=False)
 
+    @property
+    def quality(self) -> Quality | None:
+        """How good the recommended pair is: ``grade`` good, fair or poor, with ``reasons``; None without one."""
+        return self._core.quality
+
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick suggest``, schema d2rpick/suggest/1."""
         from d2rpick.report.suggestion import as_json
@@ -170,6 +176,11 @@ class Verdict(Answer):
     def tr(self) -> float:
         """When the parts are switched to rigid [time]."""
         return self.candidate.tr
+
+    @property
+    def quality(self) -> Quality | None:
+        """How good the pair is: ``grade`` good, fair or poor, with ``reasons``; None where it does not verify."""
+        return self._core.quality
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick verify``, schema d2rpick/verify/1."""

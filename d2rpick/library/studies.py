@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.warnings import Caution
     from d2rpick.library.arguments import Choosing, Parts
-    from d2rpick.studies.study import Common, Row
+    from d2rpick.studies.common import Common
+    from d2rpick.studies.row import Row
     from d2rpick.studies.study import Study as Core
 
 
@@ -29,10 +30,11 @@ class Study:
     """Answer of `study`; nothing of it changes.
 
     ``runs`` has a row per run; ``agree`` is whether the intervals of tr intersect, None without a tr; ``common`` is one
-    tr for all judged runs, with the window they share, or None with the reason.  Times are in the unit of the runs.
+    tr for all judged runs, with the window they share and the ``errors`` of the runs at it, or None with the reason.
+    Times are in the unit of the runs; ``td`` is None where each run has its own.
     """
 
-    td: float
+    td: float | None
     runs: tuple[Row, ...] = field(repr=False)
     agree: bool | None
     common: Common
@@ -60,9 +62,9 @@ class Study:
         >>> d2.study(["sample_data/energy.csv"], td=0.0687534).to_frame()["status"].tolist()
         ['ok']
         """
-        from d2rpick.studies.resume_file import PLAIN
+        from d2rpick.report.study import RUN
 
-        return frame_of(self.to_dict()["runs"], PLAIN, td=self.td)
+        return frame_of(self.to_dict()["runs"], RUN, td=self.td)
 
     def plot(self) -> Figure:
         """Draw the energies over each other, with every tr, as a matplotlib Figure."""
@@ -82,8 +84,9 @@ class Study:
 
 def study(
     runs: Iterable[arguments.Path],
-    td: float,
+    td: float | None = None,
     *,
+    td_window: tuple[float, float] | None = None,
     parts: Parts | None = None,
     flying: Parts | None = None,
     time: str | int | None = None,
@@ -101,6 +104,8 @@ def study(
         Each a file, or a folder with the files of one run; patterns are replaced by what they match, each a run.
     td : float
         When the parts are switched back [time].
+    td_window : (float, float)
+        Instead of ``td``: where each run chooses its own [time].
     parts, flying, **choosing
         As for `suggest`.
     time, energy, channels, input_format
@@ -130,13 +135,14 @@ def study(
     from d2rpick.studies.study import Question, ask, failed, find_runs, summarise
     from d2rpick.studies.workers import answers, on_cores
 
+    if (td is None) == (td_window is None):
+        raise TypeError("td or td_window was expected, and not both")
+    asked = arguments.number("td", td) if td_window is None else arguments.window("td_window", td_window)
     names = find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
     selection = selection_of(time, energy, channels)._replace(
         parts=arguments.part_names("parts", parts), flying=arguments.part_names("flying", flying)
     )
-    question = Question(
-        arguments.number("td", td), arguments.settings(choosing), selection, known_format(input_format), True
-    )
+    question = Question(asked, arguments.settings(choosing), selection, known_format(input_format), True)
     if not (isinstance(jobs, int) and jobs > 0):
         raise ValueError(f"jobs is {jobs!r}, a whole number of at least 1 was expected")
     rows: dict[int, Row] = {}
@@ -145,5 +151,6 @@ def study(
             row = failed(names[answer.number], answer.error) if answer.error else answer.result
             rows[answer.number] = replace(row, source=names[answer.number])
     core = summarise(question.td, [rows[number] for number in range(len(names))])
-    command = ("study", "--td", repr(question.td), *options_of(selection, choosing), *names)
+    times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked))
+    command = ("study", *times, *options_of(selection, choosing), *names)
     return Study(core.td, core.rows, core.agree, core.common, core.cautions, command, core)

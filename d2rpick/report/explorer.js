@@ -106,7 +106,7 @@
       data: flight.whole,
     }),
     motion: () => ({
-      height: 220, scales: { x: { time: false, range: flight.view }, y: { range: (_, low, high) => [1.1 * low, 1.1 * high] } },
+      height: 220, scales: { x: { time: false, range: flight.view }, y: { range: (_, low, high) => padded(low, high) } },
       series: [{}, line("ink"), line("switched")],
       axes: [axis(flight.time, { values: times }), axis("deformation [√energy]", { size: 62 })], data: motion(),
     }),
@@ -156,13 +156,16 @@
   Object.entries({ role: "slider", tabindex: "0", "aria-label": "td, time to switch back to deformable", "aria-orientation": "horizontal" })
     .forEach(([name, value]) => handle.setAttribute(name, value));
 
+  const spoken = (one) => `td ${one.text.td}, tr ${one.text.tr}, ${one.text.said}`;
+
   function show(next, message = "") {
     row = next;
+    typed.removeAttribute("aria-invalid");
     find(".back").textContent = `Back to td = ${flight.rows[flight.start].text.td}`;
     said.textContent = message;
     typed.value = row.text.td;
     const first = flight.rows[0], last = flight.rows[flight.rows.length - 1];
-    Object.entries({ valuemin: first.td, valuemax: last.td, valuenow: row.td, valuetext: `td ${row.text.td}, tr ${row.text.tr}, ${row.text.said}` })
+    Object.entries({ valuemin: first.td, valuemax: last.td, valuenow: row.td, valuetext: spoken(row) })
       .forEach(([name, value]) => handle.setAttribute(`aria-${name}`, value));
     section.querySelectorAll("[data-value]").forEach((place) => {
       const text = place.dataset.value === "command" ? data.command.join(row.text.exact_td) : row.text[place.dataset.value] ?? "";
@@ -198,7 +201,8 @@
 
   function toPeak(direction) {
     const peaks = flight.rows.filter((one) => one.peak && direction * (one.td - row.td) > 0);
-    if (peaks.length) show(direction > 0 ? peaks[0] : peaks[peaks.length - 1]);
+    const next = direction > 0 ? peaks[0] : peaks[peaks.length - 1];
+    if (next) show(next, spoken(next));
     else said.textContent = direction > 0 ? "No later peak of the energy." : "No earlier peak of the energy.";
   }
 
@@ -209,11 +213,10 @@
       typed.setAttribute("aria-invalid", "true");
       return;
     }
-    typed.removeAttribute("aria-invalid");
     const next = nearest(td);
-    const [first, last] = [flight.rows[0].text.td, flight.rows[flight.rows.length - 1].text.td];
-    const outside = (td < flight.rows[0].td && Number(first) !== td) || (td > flight.rows[flight.rows.length - 1].td && Number(last) !== td);
-    const what = outside ? `td was computed from ${first} to ${last}` : "this td was not computed";
+    const first = flight.rows[0], last = flight.rows[flight.rows.length - 1];
+    const outside = td < first.td || td > last.td;
+    const what = outside ? `td was computed from ${first.text.td} to ${last.text.td}` : "this td was not computed";
     show(next, Number(next.text.td) === td || next.td === td ? "" : `${text}: ${what}; the nearest is ${next.text.td}.`);
   }
 
@@ -227,7 +230,9 @@
   function listen() {
     const over = charts.energy.over;
     over.append(handle);
+    over.addEventListener("click", toPointer);
     over.addEventListener("pointerdown", (event) => {
+      if (event.pointerType === "touch" && event.target !== handle) return;  // a finger may be about to scroll
       dragging = event.pointerId;
       handle.focus({ preventScroll: true });
       toPointer(event);
@@ -239,7 +244,9 @@
         charts.trade.valToPos(one.rigid, "x") - event.clientX + box.left, charts.trade.valToPos(one.error, "y") - event.clientY + box.top,
       );
       const known = flight.rows.filter((one) => one.error !== null);
-      if (known.length) show(known.reduce((best, one) => away(one) < away(best) ? one : best));
+      if (!known.length) return;
+      const next = known.reduce((best, one) => away(one) < away(best) ? one : best);
+      show(next, spoken(next));
     });
   }
 
@@ -258,7 +265,7 @@
     event.preventDefault();
     step(by);
   });
-  find(".back").addEventListener("click", () => show(flight.rows[flight.start]));
+  find(".back").addEventListener("click", () => show(flight.rows[flight.start], spoken(flight.rows[flight.start])));
   find(".earlier").addEventListener("click", () => toPeak(-1));
   find(".later").addEventListener("click", () => toPeak(1));
   chooser?.addEventListener("change", () => {

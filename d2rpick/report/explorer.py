@@ -118,6 +118,7 @@ def _values(flights: Sequence[Mapping[str, Any]]) -> Markup:
     full = (tag("span", f"{name} = ", tag("b", data_value=f"exact_{name}")) for name in ("tr", "td"))
     listed = (tag("div", tag("dt", name), tag("dd", data_value=key)) for key, name in VALUES.items() if key in known)
     shown = (
+        tag("h3", "The best pair for this td"),
         tag("div", *times, class_="times"),
         tag("p", "in full: ", join(full, ", "), class_="soft exact"),
         tag("dl", *listed),

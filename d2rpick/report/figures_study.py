@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from d2rpick.choice.view import scale_of
 from d2rpick.report.figures import GOOD, REFERENCE, SIZES, SWITCHED, finish, mark_times, plain, show_span
+from d2rpick.studies.common import runs_of
 from d2rpick.studies.outliers import outliers, short_names
-from d2rpick.studies.study import runs_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from d2rpick.histories.history import Samples
-    from d2rpick.studies.study import Row, Study
+    from d2rpick.studies.row import Row
+    from d2rpick.studies.study import Study
 
 # Okabe and Ito's palette, without the yellow that white swallows; dashes tell apart lines of the same colour.
 _COLOURS: Final = (REFERENCE, SWITCHED, GOOD, "#0072b2", "#cc79a7", "#e69f00", "#56b4e9")
@@ -36,6 +37,8 @@ _MANY: Final = 40
 _BEFORE, _AFTER = 0.25, 0.15
 # Height of a name, as a share of the axes.
 _LINE: Final = 0.055
+# A line to a name begins at the left of it.
+_ENDS: Final = {"relpos": (0, 0.5), "shrinkA": 1}
 # The lowest level may be so much lower than the others before it counts for the axis.
 _LOWEST: Final = 50.0
 
@@ -116,10 +119,11 @@ def _show(axes: Axes, answer: Study, drawn: Sequence[Row]) -> None:
         return
     first, last = min(float(one[0, 0]) for one in curves), max(float(one[0, -1]) for one in curves)
     times = [row.tr for row in drawn if row.tr is not None]
-    early = min([*times, answer.td if answer.common.tr is None else answer.common.tr]) if times else first
-    span = max(first, early - _BEFORE * (answer.td - early)), min(last, answer.td + _AFTER * (answer.td - early))
+    td = max((row.td for row in drawn if row.td is not None), default=last) if answer.td is None else answer.td
+    early = min([*times, td if answer.common.tr is None else answer.common.tr]) if times else first
+    span = max(first, early - _BEFORE * (td - early)), min(last, td + _AFTER * (td - early))
     levels = np.array([row.energy_td for row in drawn if row.energy_td is not None])
-    inner, seen = (np.concatenate([levels, *_energies(curves, *window)]) for window in ((early, answer.td), span))
+    inner, seen = (np.concatenate([levels, *_energies(curves, *window)]) for window in ((early, td), span))
     # the lowest level stays in sight beside the middle one
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
     show_span(axes, span, scale_of(float(inner.min()), float(inner.max()), level), ("highest run", float(seen.max())))
@@ -141,7 +145,7 @@ def _name(axes: Axes, named: Sequence[_Named], *, narrow: bool) -> None:
         axes.annotate(
             one.name, (1, place), xycoords="axes fraction", xytext=(1.03, at), textcoords="axes fraction", va="center",
             fontsize="x-small" if narrow else "small", color=one.colour, annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": one.colour, "linewidth": 0.6, "linestyle": one.pattern},
+            arrowprops={"arrowstyle": "-", "color": one.colour, "linewidth": 0.6, "linestyle": one.pattern, **_ENDS},
         )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # More columns than this do not fit on a narrow screen.
 _FIT = 3
-_HINT = "The table goes on to the right: scroll it sideways."
+_HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
 _NOTHING = "'none'"
 # Characters that no page may hold.

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 SCHEMA = "d2rpick/parts/1"
 HEAD = (
-    "", "part", "title", "elements", "formulation", "material", "mass", "energy", "scatter", "flies", "deforms", "cost",
-    "step", "shares nodes with", "verdict", "why",
+    "", "part", "title", "verdict", "elements", "formulation", "material", "mass", "energy", "scatter", "flies",
+    "deforms", "cost", "step", "shares nodes with", "why",
 )  # fmt: skip
 SET_HEAD = (
     "", "set", "parts", "elements", "mass", "saved of a step", "step grows", "tr", "td", "run time", "saved",
@@ -196,6 +196,7 @@ def rows(found: Parts) -> list[list[tables.Cell]]:
             "*" if row.id in best else " ",
             row.id,
             row.title,
+            verdict(row),
             _counted(row),
             ", ".join(row.formulations) or None,
             row.material,
@@ -207,7 +208,6 @@ def rows(found: Parts) -> list[list[tables.Cell]]:
             _percent(row.cost_share),
             _short(row.smallest_step),
             _listed(row.shares_nodes),
-            verdict(row),
             "; ".join(row.reasons),
         ]
         for row in found.rows

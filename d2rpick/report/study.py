@@ -7,17 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 from d2rpick.errors import printable
 from d2rpick.report import tables
+from d2rpick.studies.common import runs_of
 from d2rpick.studies.resume_file import PLAIN, plain
-from d2rpick.studies.study import runs_of
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
+    from d2rpick.studies.row import Row
     from d2rpick.studies.study import Study
 
 SCHEMA = "d2rpick/study/1"
-HEAD = ("run", "tr", "+-", "E(td)", "R", "basis", "status", "message")
+# Keys of a run in JSON, and columns of the csv.
+RUN = (*PLAIN, "common_error")
+HEAD = ("run", "tr", "+-", "td", "E(td)", "R", "at common", "basis", "status", "message")
 
 
 def as_table(answer: Study) -> str:
@@ -35,18 +38,27 @@ def as_markdown(answer: Study) -> str:
 
 def as_csv(answer: Study) -> str:
     """One row per run, a column for each key of the JSON output."""
-    cells = ([_joined(value) for value in plain(row).values()] for row in answer.rows)
-    return tables.as_csv(PLAIN, cells).rstrip("\n")
+    cells = ([_joined(value) for value in one.values()] for one in runs(answer))
+    return tables.as_csv(RUN, cells).rstrip("\n")
 
 
 def as_json(answer: Study, command: Sequence[str]) -> str:
     """The whole answer by schema d2rpick/study/1."""
-    return tables.as_json({**_front(answer, command), "runs": [plain(row) for row in answer.rows], **_shared(answer)})
+    return tables.as_json({**_front(answer, command), "runs": runs(answer), **_shared(answer)})
 
 
 def as_last_line(answer: Study, command: Sequence[str]) -> str:
     """The JSON output without the runs, in one line: what follows their lines."""
     return json.dumps({**_front(answer, command), **_shared(answer)}, allow_nan=False)
+
+
+def runs(answer: Study) -> list[dict[str, Any]]:
+    """Values of each run by their keys in JSON, with its error at the common tr."""
+    return [plain(row) | {"common_error": error} for row, error in _with_errors(answer)]
+
+
+def _with_errors(answer: Study) -> Iterator[tuple[Row, float | None]]:
+    return zip(answer.rows, answer.common.errors or [None] * len(answer.rows), strict=True)
 
 
 def rows(answer: Study) -> list[list[tables.Cell]]:
@@ -56,13 +68,15 @@ def rows(answer: Study) -> list[list[tables.Cell]]:
             row.source,
             row.tr,
             None if row.tr_low is None or row.tr_high is None else f"{(row.tr_high - row.tr_low) / 2:.1e}",
+            row.td,
             row.energy_td,
             tables.measure(row.residual),
+            tables.measure(error),
             row.basis,
             row.status,
             row.message or ", ".join(row.warnings),
         ]
-        for row in answer.rows
+        for row, error in _with_errors(answer)
     ]
 
 
@@ -76,13 +90,22 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
     shared = f"none: {common.reason}"
     if common.tr is not None and common.window:
         low, high = common.window
+        known = [error for error in common.errors if error is not None]
         shared = f"{common.tr:g}, acceptable in {answer.judged} of {runs_of(answer.judged)}; "
-        shared += f"so is every tr from {low:.6g} to {high:.6g}"
+        shared += f"so is every tr from {low:.6g} to {high:.6g}; "
+        shared += f"error there {tables.measure(min(known))} to {tables.measure(max(known))}"
     return [
-        ("td", f"{answer.td:.6g}, {answer.judged} of {runs_of(len(answer.rows))} judged"),
+        ("td", f"{td_of(answer)}, {answer.judged} of {runs_of(len(answer.rows))} judged"),
         ("tr", found),
         ("common tr", shared),
     ]
+
+
+def td_of(answer: Study) -> str:
+    """The td of all runs, or the window in which each has its own."""
+    if answer.td_window:
+        return "of each run in {:.6g} to {:.6g}".format(*answer.td_window)
+    return f"{answer.td:.6g}"
 
 
 def _front(answer: Study, command: Sequence[str]) -> dict[str, Any]:
@@ -92,6 +115,7 @@ def _front(answer: Study, command: Sequence[str]) -> dict[str, Any]:
         "command": list(command),
         "warnings": [{"code": caution.code, "message": caution.message} for caution in answer.cautions],
         "td": answer.td,
+        "td_window": answer.td_window,
     }
 
 
@@ -103,6 +127,8 @@ def _shared(answer: Study) -> dict[str, Any]:
         "common_tr": common.tr,
         "common_window": common.window,
         "common_reason": common.reason,
+        "common_keeps_timing_tolerance": common.keeps_tolerance,
+        "common_errors": list(common.errors),
     }
 
 

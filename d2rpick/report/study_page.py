@@ -6,8 +6,9 @@ import shlex
 from typing import TYPE_CHECKING
 
 from d2rpick.report.html import Markup, document, drawings, pairs, remarks, resource, section, table, tag
-from d2rpick.report.study import HEAD, outcome, rows
-from d2rpick.studies.study import runs_of
+from d2rpick.report.study import HEAD, outcome, rows, td_of
+from d2rpick.report.tables import known
+from d2rpick.studies.common import runs_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -34,7 +35,8 @@ def as_page(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> 
 def _sections(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> Iterator[Markup]:
     yield tag("section", _common(answer), remarks(answer.cautions), pairs(outcome(answer)))
     yield drawings({"Internal energies of all runs, with the tr of each, the common one and td": drawing})
-    yield section("Runs", table("Runs", [name.replace("+-", "\u00b1") for name in HEAD], rows(answer)))
+    head = [name.replace("+-", "\u00b1") for name in HEAD]
+    yield section("Runs", table("Runs", *known(head, rows(answer))))
     yield section("Files", tag("pre", _files(answer), class_="wrap"))
     yield section("Method and limits", resource("method.html"))
     yield section("To repeat this", tag("pre", shlex.join(command), class_="wrap"))
@@ -45,8 +47,8 @@ def _common(answer: Study) -> Markup:
     if tr is None:
         text = tag("p", "None: ", answer.common.reason or "")
         return tag("div", tag("div", tag("h2", "One tr for all runs"), text, class_="card"), class_="choice")
-    times = (tag("span", tag("i", name), f"{time:.6g}") for name, time in (("tr", tr), ("td", answer.td)))
-    exact = f"in full: tr = {tr!r}, td = {answer.td!r}"
+    times = (tag("span", tag("i", name), text) for name, text in (("tr", f"{tr:.6g}"), ("td", td_of(answer))))
+    exact = f"in full: tr = {tr!r}" + ("" if answer.td is None else f", td = {answer.td!r}")
     rule = "Acceptable by the rules of d2rpick verify in every run that was judged."
     lines = (tag("div", *times, class_="times"), tag("p", rule), tag("p", exact, class_="soft"))
     return tag("div", tag("div", tag("h2", "One tr for all runs"), *lines, class_="card chosen"), class_="choice")

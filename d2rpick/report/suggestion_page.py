@@ -8,7 +8,7 @@ from d2rpick.report import page
 from d2rpick.report.explorer import explorer
 from d2rpick.report.html import Markup, drawings, pairs, remarks, section, table, tag
 from d2rpick.report.suggestion import HEAD, better_about, headline, outlook, rows, verdict
-from d2rpick.report.tables import known
+from d2rpick.report.tables import known, measure
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -71,7 +71,8 @@ def _recommended(answer: Suggestion) -> Markup:
     if pair is None or quality is None:
         nothing = tag("p", "No tr can be recommended for this td.")
         return tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")
-    told = pairs((name, text) for name, text in verdict(answer) if name in _TOLD)
+    wrong = [("residual", measure(pair.residual))] if pair.residual is not None else []
+    told = pairs([*((name, text) for name, text in verdict(answer) if name in _TOLD), *wrong])
     class_ = "card refused" if quality.grade == "poor" else "card chosen"
     return page.pair(headline(answer).capitalize(), (pair.tr, pair.td), told, answer.situation.history, class_)
 

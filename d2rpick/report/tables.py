@@ -47,7 +47,7 @@ def known(head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> tuple[list[str
     >>> known(["tr", "sign", "R"], [[0.5, None, "-"], [0.7, None, "-"]])
     (['tr'], [[0.5], [0.7]])
     """
-    kept = [i for i in range(len(head)) if any(row[i] not in (None, "-") for row in rows)]
+    kept = [i for i in range(len(head)) if any(row[i] not in (None, "", "-") for row in rows)]
     return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
 
 

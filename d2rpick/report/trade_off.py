@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.situation import frame, mechanics, read_line
 
@@ -101,29 +102,29 @@ COLUMNS: Final = (
 
 
 def answer(found: TradeOff) -> str:
-    """The shortest sensible answer in a sentence: which td, and what another one costs.
+    """The shortest sensible answer in a sentence: how good the td asked for is, and what a step to another one changes.
 
-    Examples
-    --------
-    td = 0.064: 0.0041 later, at td = 0.0681, the residual falls from 0.957 to 0.17, and the rigid time grows by 6.6 %
+    Without a td that was asked for, the step begins at the one that saves most.
     """
-    start, step = found.start, found.step
+    start, step, unit = found.start, found.step, found.situation.history.time_unit
     if start is None:
         return "no td in the window has an acceptable tr"
     named = f"td = {start.td:.6g}" + ("" if found.asked else " saves the most")
     if start.best is None:
         what = f"{named} has no acceptable tr"
-        return what if step is None else f"{what}; {_away(start, step)} has, {step.tr:.6g}"
+        return what if step is None else f"{what}; {_away(start, step, unit)} has one"
     what = f"{named}, {_error(start)}" if not found.asked else f"{named}: {_error(start)}"
     if step is None:
-        return f"{what}; no other td in the window halves that"
-    return f"{what}; {_away(start, step)} {_less(start, step)} and {_cost(start, step)}"
+        small = start.error is not None and start.error <= EQUALLY_GOOD
+        return f"{what}; no other td in the window {'is better' if small else 'has half of it'}"
+    return f"{what}; {_away(start, step, unit)} {_less(start, step)} and {_cost(start, step)}"
 
 
-def _away(start: Offer, step: Offer) -> str:
+def _away(start: Offer, step: Offer, unit: str) -> str:
     """Where the step leads."""
     apart = step.td - start.td
-    return f"{abs(apart):.2g} {'later' if apart > 0 else 'earlier'} (tr = {step.tr:.6g}, td = {step.td:.6g})"
+    size = f"{abs(apart):.2g} {unit}".rstrip()
+    return f"{size} {'later' if apart > 0 else 'earlier'} (tr = {step.tr:.6g}, td = {step.td:.6g})"
 
 
 def _less(start: Offer, step: Offer) -> str:
@@ -151,7 +152,7 @@ def _error(one: Offer) -> str:
     if one.error is None:
         return "a level above twice the mean energy"
     if one.basis == "energy":
-        return f"error {tables.measure(one.error)} of the level at td"
+        return f"error {tables.measure(one.error)} (by that the level at td is short of all vibration)"
     return f"residual {tables.measure(one.error)}"
 
 

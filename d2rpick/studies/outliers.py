@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.studies.study import Row
+    from d2rpick.studies.row import Row
 
 # Tukey's fences: so many times the distance of the quartiles beyond them.
 _FENCE: Final = 1.5

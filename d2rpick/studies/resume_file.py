@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.studies.study import FAILED, UNREADABLE, Row, Stamp, stamps
+from d2rpick.studies.row import FAILED, UNREADABLE, Row, Stamp
+from d2rpick.studies.study import stamps
 
 if TYPE_CHECKING:
     from d2rpick.studies.study import Question
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 # Keys of a line that are a row's plain values, in the order of the output.
 PLAIN: Final = (
     *("source", "tr", "tr_low", "tr_high", "energy_td", "residual", "status", "message", "basis", "warnings"),
-    "time_unit",
+    *("time_unit", "td"),
 )
 
 
@@ -45,7 +46,8 @@ def line(row: Row, asked: str) -> str:
     ``asked`` is the ``fingerprint`` of the question.
     """
     record = plain(row) | {
-        "acceptable": [windows.tolist() for windows in row.acceptable],
+        "acceptable": [windows.tolist() for windows in (row.acceptable, row.alike)],
+        "profile": None if row.profile is None else row.profile.tolist(),
         "files": [stamp._asdict() for stamp in row.files],
         "asked": asked,
     }
@@ -109,11 +111,14 @@ class Ledger:
     def _remember(self, record: dict[str, Any]) -> None:
         files = tuple(Stamp(**stamp) for stamp in record["files"])
         self._known.add(tuple(stamp.name for stamp in files))
-        if record["asked"] == self.asked and files and ("curve" in record or not self.curve):
+        whole = "profile" in record and ("curve" in record or not self.curve)
+        if record["asked"] == self.asked and files and whole:
             self._rows[files] = Row(
                 **{name: record[name] for name in PLAIN if name != "warnings"},
                 warnings=tuple(record["warnings"]),
-                acceptable=tuple(np.array(windows).reshape(-1, 2) for windows in record["acceptable"]),
+                acceptable=np.array(record["acceptable"][0]).reshape(-1, 2),
+                alike=np.array(record["acceptable"][1]).reshape(-1, 2),
+                profile=None if record["profile"] is None else np.array(record["profile"]).reshape(2, -1),
                 files=files,
                 curve=np.array(record["curve"]) if self.curve else None,
             )

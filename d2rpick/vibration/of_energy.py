@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.histories.crossings import find_crossings, find_turns
+from d2rpick.histories.crossings import find_turns, passages
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import SUNK, Moment
 from d2rpick.vibration.uncertainty import sampled_reach
@@ -62,10 +63,11 @@ class OfEnergy:
     def moments(self, tolerance: float) -> list[Moment]:
         """Crossings of the level at td, and samples where the energy turns near it."""
         time, energy = sampled_before(self.history, self.td, level := self.energy(self.td))
-        turns = find_turns(energy)[0]
+        times, rising = passages(time, energy, level)
+        earlier, turns = times < self.td, find_turns(energy)[0]
         near = time[turns[measures.level_errors(energy[turns], level) <= tolerance]]
         return [
-            *(Moment(c.time, "crossing", c.rising) for c in find_crossings(time, energy, level) if c.time < self.td),
+            *map(Moment, times[earlier].tolist(), repeat("crossing"), rising[earlier].tolist()),
             *(Moment(t, "extremum", None) for t in near.tolist()),
         ]
 

@@ -8,7 +8,7 @@ bends sharply unless the sign is turned there, at any other minimum it bends sha
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -17,9 +17,13 @@ from d2rpick.vibration.envelope import Envelope
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.one_mode import Mode
+
+Places: TypeAlias = "NDArray[np.intp]"
 
 # One way must be this many times smoother than the other to be believed.  At 24 samples per period of a chain of two
 # springs the least clear of 35 minima has 2.5, the usual ones have 5 to 60.
@@ -156,16 +160,19 @@ class _Zeros(NamedTuple):
 
 def _zeros(time: Samples, root: Samples) -> _Zeros:
     """Find the zeros from every sample, or every other, and so on: what leaves the fewest doubts."""
-    best, stride = _zeros_of(time, root), 2
-    while best.doubtful.size and _spacing(root[::stride]) >= _LEAST_APART:
-        coarser = _zeros_of(time[::stride], root[::stride])
+    best, stride = _zeros_of(time, root, _minima(root)), 2
+    while best.doubtful.size:
+        coarse = root[::stride]
+        minima = _minima(coarse)
+        if coarse.size < _LEAST_APART * max(1, minima.size):
+            break
+        coarser = _zeros_of(time[::stride], coarse, minima)
         best, stride = min(best, coarser, key=lambda found: found.doubtful.size), 2 * stride
     return best
 
 
-def _zeros_of(time: Samples, root: Samples) -> _Zeros:
-    """Zeros from just these samples."""
-    at = _minima(root)
+def _zeros_of(time: Samples, root: Samples, at: Places) -> _Zeros:
+    """Zeros from just these samples, whose minima are ``at``."""
     # two samples to either side tell how the root bends; of a minimum nearer to an end nothing is known
     early, late = at < 2, at >= root.size - 2
     inner = at[~early & ~late]
@@ -182,15 +189,10 @@ def _zeros_of(time: Samples, root: Samples) -> _Zeros:
     return _Zeros(time[left] + share * (time[left + 1] - time[left]), time[inner[doubt]], unseen)
 
 
-def _minima(values: Samples) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+def _minima(values: Samples) -> Places:
     """Indices of local minima, of a flat one the first; an end below its neighbour counts."""
     around = np.concatenate([[np.inf], values, [np.inf]])
     return np.flatnonzero((values < around[:-2]) & (values <= around[2:]))
-
-
-def _spacing(values: Samples) -> float:
-    """Mean number of samples from one minimum to the next."""
-    return values.size / max(1, _minima(values).size)
 
 
 def _bends(times: Samples, values: Samples) -> Samples:

@@ -135,6 +135,14 @@ def check_ratio() -> float | None:
         return ratio(lambda: deck.check(path), lambda: parse(path), _ROUNDS)
 
 
+def inventory_ratio() -> float:
+    """Reading the parts and elements of a 50 MB deck over a plain loop over all lines."""
+    from tests.benchmarks import deck
+
+    with deck.large_deck() as path:
+        return ratio(lambda: deck.inventory(path), lambda: deck.line_loop(path), _ROUNDS)
+
+
 def deck_memory() -> float:
     """Memory that it takes [MB]."""
     from tests.benchmarks import deck
@@ -184,7 +192,12 @@ ROWS = (
     Row("narrow window / --td, noise", choosing("window_to_td", "noisy", "narrow"), most=3.0),
     Row("wide window / --td, noise", choosing("window_to_td", "noisy", "wide"), most=3.0),
     Row("wide window / --td, energy alone", choosing("window_to_td", "noisy", "wide", "--no-verify"), most=3.0),
+    Row("narrow window / --td, end of the load unknown", choosing("open_window_to_td"), most=3.0),
     Row("wide window / --td, clean oscillator", choosing("window_to_td", "clean", "wide"), most=3.0),
+    Row("explore / --td, noise, 1e5 states", choosing("explore_to_td", "noisy", "0.9", "--after", "0.1"), most=10.0),
+    Row("explore / --td, one oscillator", choosing("explore_to_td", "energy.csv", "0.064"), most=10.0),
+    Row("explore / --td, a part", choosing("explore_to_td", "rolloverT01.gz", "0.37", "--part", "box"), most=10.0),
+    Row("explore / --td, energy alone", choosing("explore_to_td", "rollover.csv", "0.37", "--energy", "2"), most=10.0),
     Row("suggest, clean oscillator, 1e6 / 1e5 states", choosing("clean_growth", "suggest"), most=11.0),
     Row("verify, clean oscillator, 1e6 / 1e5 states", choosing("clean_growth", "verify"), most=11.0),
     Row("wide window, clean oscillator, 1e6 / 1e5 states", choosing("clean_growth", "--td-window"), most=11.0),
@@ -201,6 +214,7 @@ ROWS = (
     Row("  alternating call by call, in memory just freed", lambda: integration_ratio(repeats=1)),
     Row("cards of a 50 MB deck / loop over its lines", lambda: deck_ratio(numbered=False), most=1 / 3),
     Row("  with the number of each card's line", lambda: deck_ratio(numbered=True)),
+    Row("parts and elements of a 50 MB deck / loop over its lines", inventory_ratio, most=15.0),
     Row("check of a 50 MB deck / dynars.parse_deck", check_ratio),
     Row("  memory for the cards [MB]", deck_memory, most=32.0),
     Row("check / import click: processes", lambda: process_ratio("click", *CHECK)),
@@ -209,6 +223,7 @@ ROWS = (
     Row("loop over lines / matsum, 2000 states, 500 parts", reading("matsum_to_loop", None), least=5.0),
     Row("loop over lines / matsum, 2000 states, 1 part", reading("matsum_to_loop", 2501), least=25.0),
     Row("lasso-python / binout, 1e5 states", reading("lasso_to_binout"), least=12.0),
+    Row("binout, 1e5 states / dynars.Binout", reading("binout_to_dynars")),
     Row("memory / (2 answers + 64 MB): glstat", reading("memory_over_limit", "glstat"), most=1.0),
     Row("memory / (2 answers + 64 MB): matsum", reading("memory_over_limit", "matsum"), most=1.0),
     Row("memory / (2 answers + 64 MB): binout", reading("memory_over_limit", "binout"), most=1.0),

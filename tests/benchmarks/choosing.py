@@ -72,6 +72,20 @@ def window_to_td(kind: str, width: str, *options: str) -> float:
     return _ratio(_suggest(file, *options, window=_WINDOWS[width]), _suggest(file, *options))
 
 
+def open_window_to_td() -> float:
+    """The same where the end of the load is left to be found."""
+    file = str(_noisy(100_000))
+    suggest = ("-m", "d2rpick", "suggest", "--exit-zero", file)
+    return _ratio((*suggest, "--td-window", *map(str, _WINDOWS["narrow"])), (*suggest, "--td", str(_TD)))
+
+
+def explore_to_td(file: str, td: str, *options: str) -> float:
+    """`explore` of 200 td over `suggest --td`: processes; a file of the samples, or "noisy" for 1e5 noisy states."""
+    name = str(_noisy(100_000)) if file == "noisy" else f"sample_data/{file}"
+    rest = ("--exit-zero", "-q", "-f", "json", *options, name)
+    return _ratio(("-m", "d2rpick", "explore", *rest), ("-m", "d2rpick", "suggest", "--td", td, *rest), rounds=1)
+
+
 def clean_growth(command: str) -> float:
     """A command on a clean oscillator of 1e6 states over the same of 1e5."""
 

@@ -57,6 +57,17 @@ def number_cards(path: Path) -> None:
     assert [card.line for card in read_deck(str(path)).cards][-1] == 2 * NODES + 22
 
 
+def inventory(path: Path) -> None:
+    """Count the elements of every part, with masses, steps and shared nodes."""
+    from d2rpick.deck.inventory import read_inventory
+    from d2rpick.deck.inventory.size import masses_and_steps
+
+    found = read_inventory(str(path))
+    assert sum(counts.total() for counts in found.counts.values()) == ELEMENTS
+    assert found.neighbours[1] == {2}
+    assert set(masses_and_steps(found)) == {1, 2}
+
+
 def check(path: Path) -> None:
     """Read the deck and apply all rules."""
     assert [window.td for window in check_deck(str(path)).windows] == [0.09]

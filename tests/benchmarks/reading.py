@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -84,6 +85,24 @@ def lasso_to_binout() -> float | None:
     history = _read(file)
     np.testing.assert_allclose([history.time.sum(), history.energy.sum()], sums, rtol=1e-4)  # lasso adds in singles
     return seconds / median(_seconds(lambda: _read(file)) for _ in range(_ROUNDS))
+
+
+def binout_to_dynars() -> float | None:
+    """Reading time and internal energy of a binout of 1e5 states over dynars; None where that is not installed."""
+    try:
+        opened = import_module("dynars").Binout
+    except ImportError:
+        return None
+    file = _binout()
+
+    def theirs() -> tuple[Samples, Samples]:
+        run = opened(str(file))
+        return run.read("glstat", "time"), run.read("glstat", "internal_energy")
+
+    history = _read(file)
+    for ours, column in zip((history.time, history.energy), theirs(), strict=True):
+        np.testing.assert_array_equal(ours, column)
+    return _ratio(lambda: _read(file), theirs)
 
 
 def memory_over_limit(kind: str) -> float:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.acceptable_windows import acceptable_windows, common_windows, coverage, tolerance_levels
+from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows, clear_of_td, common_windows, coverage
+from d2rpick.choice.error_profile import error_at, error_profile
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import Suggestion, suggest
 from d2rpick.choice.verify import verify
@@ -30,7 +31,7 @@ TD = 0.064
 PAPER = History(TIME, ENERGY, ("paper",), "made", "energy")
 
 
-def windows_of(answer: Suggestion) -> tuple[Samples, ...]:
+def windows_of(answer: Suggestion) -> Samples:
     own = answer.recommended
     return acceptable_windows(answer.situation, answer.candidates, own.tr if own else None)
 
@@ -52,7 +53,7 @@ def check(answer: Suggestion, seed: int) -> None:
 def _check(answer: Suggestion, seed: int) -> None:
     situation = answer.situation
     history, td, asked = situation.history, situation.td, situation.settings
-    windows, *finer = windows_of(answer)
+    windows = windows_of(answer)
     assert np.all(windows[:, 0] <= windows[:, 1])
     assert np.all(windows[1:, 0] > windows[:-1, 1])
     rng = np.random.default_rng(seed)
@@ -64,8 +65,11 @@ def _check(answer: Suggestion, seed: int) -> None:
     anywhere = rng.uniform(history.time[0], last, 12) if last > history.time[0] else np.zeros(0)
     clear = anywhere[np.min(np.abs(anywhere[:, np.newaxis] - [*windows.ravel(), np.inf]), axis=1) > 1e-5 * history.step]
     assert [verify(history, t, td, asked).verified for t in clear] == holds(windows, clear).tolist()
-    for wider, narrower in zip((windows, *finer), finer, strict=False):
-        assert np.all(holds(wider, narrower.ravel()))
+    # the errors in the windows are those of ``verify``; where nothing vibrates there are none
+    profile = error_profile(situation, answer.candidates, windows)
+    for t in inside.ravel()[:4]:
+        error = 0.0 if situation.at_rest else verify(history, t, td, asked).candidate.error
+        assert error_at(profile, t) == pytest.approx(error, abs=1e-3)
 
 
 @settings(max_examples=40)
@@ -107,7 +111,7 @@ def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tol
     for history, td in ((record, TD), (rollover, 0.37)):
         for replay in (True, False):
             answer = suggest(history, td, Settings(tolerance=tolerance, replay=replay))
-            assert len(windows_of(answer)[0])
+            assert len(windows_of(answer))
             check(answer, 1)
 
 
@@ -121,28 +125,31 @@ def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> Non
     parts = suggest(chain.history(), td, Settings())
     assert parts.situation.basis == "parts"
     check(parts, 1)
-    assert len(windows_of(parts)[0])
+    assert len(windows_of(parts))
 
 
 def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_sign() -> None:
     answer = suggest(PAPER, TD, Settings())
-    for windows in windows_of(answer):
-        acceptable = np.array(sorted(c.tr for c in answer.candidates if c.acceptable))
-        assert len(windows) == len(acceptable)
-        assert np.all((windows[:, 0] < acceptable) & (acceptable < windows[:, 1]))
+    windows = windows_of(answer)
+    acceptable = np.array(sorted(c.tr for c in answer.candidates if c.acceptable))
+    assert len(windows) == len(acceptable)
+    assert np.all((windows[:, 0] < acceptable) & (acceptable < windows[:, 1]))
 
 
 def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
     answer = suggest(PAPER, TD, Settings())
-    assert windows_of(answer)[0][-1, 1] < TD - 0.01
+    assert windows_of(answer)[-1, 1] < TD - 0.01
     late = suggest(PAPER, 0.068, Settings(after=0.0655))
     assert late.recommended is None
-    assert not any(windows.size for windows in windows_of(late))
+    assert not windows_of(late).size
     flat = History(np.linspace(0, 1, 50), 1 + 1e-3 * np.cos(np.arange(50) * 2.0), ("flat",), "made", "energy")
     quiet = suggest(flat, 0.9, Settings(after=0.1, replay=False))
     assert quiet.recommended
-    (window,) = windows_of(quiet)[0]
+    (window,) = windows_of(quiet)
     assert window.tolist() == [0.1, np.nextafter(0.9, 0)]
+    (kept,) = clear_of_td(quiet.situation, windows_of(quiet))
+    assert kept == pytest.approx([0.1, 0.9 - 1 / 49])
+    assert not clear_of_td(quiet.situation, np.array([[0.881, 0.899]])).size
 
 
 @pytest.mark.parametrize(
@@ -154,18 +161,39 @@ def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
     ],
 )
 def test_where_nothing_verifies_there_is_no_window(asked: Settings) -> None:
-    assert not any(windows.size for windows in windows_of(suggest(PAPER, TD, asked)))
+    assert not windows_of(suggest(PAPER, TD, asked)).size
 
 
-def test_levels_end_where_errors_count_as_equal() -> None:
-    assert tolerance_levels(0.01) == (0.01,)
-    assert tolerance_levels(1.0)[-1] == 1 / 64
+def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it_is_larger() -> None:
+    """On the level alone the level error grows by 0.05."""
+    for history, asked in ((PAPER, Settings()), (PAPER, Settings(replay=False, after=0.005))):
+        answer = suggest(history, TD, asked)
+        best = answer.chosen
+        assert best is not None
+        windows = alike_windows(answer.situation, answer.candidates, best, windows_of(answer))
+        (around,) = (one for one in windows.tolist() if one[0] <= best.tr <= one[1])
+        if best.timing_tolerance is not None:
+            assert min(abs(end - best.tr) for end in around) == pytest.approx(best.timing_tolerance, rel=1e-3)
+        ends = [verify(history, end, TD, asked).candidate for end in windows.ravel()]
+        errors = [one.level_error if one.lock_in_error is None else one.lock_in_error for one in (best, *ends)]
+        assert errors[0] is not None
+        assert errors[1:] == pytest.approx([errors[0] + 0.05] * len(ends), abs=1e-6)
+
+
+def test_a_profile_is_short_where_the_error_is_smooth() -> None:
+    time = np.linspace(0, 0.15, 100_001)
+    answer = suggest(History(time, MODE.energy(time), ("fine",), "made", "energy"), 0.0687534, Settings())
+    windows = windows_of(answer)
+    profile = error_profile(answer.situation, answer.candidates, windows)
+    assert profile.shape[1] < 20 * len(windows)
+    assert np.all(np.diff(profile[0]) > 0)
+    assert error_profile(answer.situation, answer.candidates, windows[:0]).shape == (2, 0)
 
 
 def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
     other = Mode(1.004 * OMEGA_2, MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
     histories = [PAPER, History(TIME, other.energy(TIME), ("other",), "made", "energy")]
-    both = common_windows([windows_of(suggest(history, 0.0687534, Settings()))[0] for history in histories])
+    both = common_windows([windows_of(suggest(history, 0.0687534, Settings())) for history in histories])
     times = np.linspace(0.01, 0.06, 400)
     expected = [all(verify(history, t, 0.0687534, Settings()).verified for history in histories) for t in times]
     assert holds(both, times).tolist() == expected

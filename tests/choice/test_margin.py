@@ -83,6 +83,7 @@ def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     assert max(moved) == pytest.approx(1.1e-3, abs=1e-4)
     assert max(moved) < margin.time
     assert margin.spread is not None
+    assert margin.spread == pytest.approx(1.25e-3, abs=1e-5)
     assert max(moved) < margin.spread  # by the formula alone, too
 
 

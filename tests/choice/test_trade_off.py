@@ -73,7 +73,8 @@ def test_every_td_of_a_sample_is_answered_as_suggest_answers_it(name: str) -> No
     known = read([str(ROOT / "sample_data" / name)], SAMPLES[name])
     found = explore_of(known, Settings(), steps=12)
     low, high = found.td_window
-    assert {round(one.td, 12) for one in found.offers} >= {round(t, 12) for t in np.linspace(low, high, 13)[1:]}
+    cells = np.searchsorted(np.linspace(low, high, 13)[1:], [one.td - 1e-12 for one in found.offers])
+    assert set(cells.tolist()) == set(range(12))
     assert sum(one.recommended for one in found.offers) == 1
     check(found, known.history, Settings(), [*found.offers][:: len(found.offers) // 6])
 
@@ -81,7 +82,7 @@ def test_every_td_of_a_sample_is_answered_as_suggest_answers_it(name: str) -> No
 @st.composite
 def histories(draw: st.DrawFn) -> History:
     """Energy of some modes after a load that may ring, with or without noise, damping and a contact at the end."""
-    states = draw(st.integers(60, 400))
+    states = draw(st.integers(60, 250))
     time = np.linspace(0.0, 1.0, states)
     energy = np.zeros(states)
     for _ in range(draw(st.integers(1, 4))):
@@ -95,7 +96,7 @@ def histories(draw: st.DrawFn) -> History:
     return History(time, energy + share * noise, ("made",), "made", "E")
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(histories(), st.floats(0.3, 0.7), st.sampled_from([None, 0.1]))
 def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     history: History, td: float, after: float | None
@@ -104,4 +105,4 @@ def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     found = explore_of(reference(history), asked, (td - 0.15, td + 0.15), td=td, steps=6)
     assert found.asked is not None
     assert found.asked.td == td
-    check(found, history, asked, [found.asked, *found.offers[::5]])
+    check(found, history, asked, [found.asked, *found.offers[::6]])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from d2rpick.choice.examine import examine
 from d2rpick.choice.replayed import replayed_motion
@@ -46,6 +48,19 @@ def test_without_a_flight_the_whole_record_is_shown_and_nothing_is_cut() -> None
 def test_a_flight_without_an_end_lasts_as_far_as_it_is_known() -> None:
     assert view(made(), Flight(2.0, None, "oscillator"), [3.0], known=6.0).end == pytest.approx(6.24)
     assert view(made(), Flight(2.0, None, "momentum"), [3.0]).end == 10
+
+
+@given(
+    st.lists(st.floats(0, 1), min_size=3, max_size=9, unique=True), st.floats(0, 1), st.floats(0, 1), st.floats(0, 1)
+)
+def test_any_flight_of_any_record_can_be_shown(times: list[float], one: float, other: float, td: float) -> None:
+    time = np.sort(times) + np.arange(float(len(times)))
+    start, end = sorted((one * time[-1], other * time[-1]))
+    history = History(time, np.cos(time), ("made",), "made", "energy")
+    seen = view(history, Flight(start, end, "given"), [float(time[0] + td * (time[-1] - time[0]))])
+    assert time[0] <= seen.start < seen.end <= time[-1]
+    assert seen.low <= seen.high <= seen.highest
+    assert (seen.cut == "") == (seen.high == seen.highest)
 
 
 def test_the_motion_is_that_of_the_record_until_tr_rigid_then_and_continuous() -> None:

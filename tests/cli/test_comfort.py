@@ -136,9 +136,9 @@ def test_the_number_is_the_first_line_whatever_its_quality() -> None:
 
 def test_the_command_on_a_page_can_be_pasted(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    assert run("suggest", "--td", "0.064", "-q", "--report", str(page), ENERGY).exit_code == 0
+    assert run("study", "--td", "0.064", "-q", "--report", str(page), ENERGY).exit_code == 0
     first = page.read_text("utf-8")
-    line = re.search(r"d2rpick suggest --td 0\.064 [^<]+ --overwrite", first)
+    line = re.search(r"d2rpick study --td 0\.064 [^<]+ --overwrite", first)
     assert line is not None
     again = subprocess.run(
         [sys.executable, "-m", *line[0].split()], capture_output=True, check=False, cwd=ROOT, timeout=TIME_LIMIT

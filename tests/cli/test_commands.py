@@ -226,7 +226,7 @@ def test_the_sample_data_is_what_the_command_beside_it_writes(
 def test_the_module_runs_as_a_program() -> None:
     result = program("--version")
     assert (result.returncode, result.stderr) == (0, "")
-    assert result.stdout.split()[-1] == __version__
+    assert result.stdout.splitlines()[0].split()[-1] == __version__
 
 
 def test_a_reader_that_has_seen_enough_ends_the_program_silently() -> None:

@@ -17,14 +17,18 @@ from d2rpick.cli import rollover
 from d2rpick.cli.progress import Count
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import RigidWindow, simulate
+from d2rpick.models.rollover.scan import scan
 from d2rpick.report import figures_models
 from tests.command import answer, codes, run
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from matplotlib.lines import Line2D
+
+    from d2rpick.models.rollover.record import Record
+    from d2rpick.models.rollover.scan import Outcome
 
 SMALL = ("--mesh", "4", "--dt", "2e-4")
 SHORT = (*SMALL, "--t-end", "0.12")
@@ -33,6 +37,24 @@ COLUMNS = (
     "step_kinetic_energy,contact_energy,frictional_contact_energy,stonewall_energy,damping_energy,external_work,"
     "total_energy,energy_ratio"
 )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _scans_computed_once() -> Iterator[None]:
+    """A scan that is asked for in another form is not computed again."""
+    known: dict[tuple[object, ...], list[Outcome]] = {}
+
+    def scanned(
+        parameters: Parameters, reference: Record, times: Sequence[float], td: float, jobs: int | None = None
+    ) -> Iterator[Outcome]:
+        key = (parameters, reference.time.tobytes(), *times, td)
+        if key not in known:
+            known[key] = list(scan(parameters, reference, times, td, jobs))
+        yield from known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("d2rpick.models.rollover.scan.scan", scanned)
+        yield
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.h5", "run.glstat", "run.matsum"])
@@ -113,35 +135,35 @@ def points(line: Line2D) -> np.ndarray:
 
 
 def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
-    scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.14", "--t-end", "0.15", "-q", *SMALL)
+    asked = ("rollover", "--scan", "--jobs", "1", "--td", "0.14", "--t-end", "0.15", "-q", *SMALL)
     plot = tmp_path / "scan.png"
-    found = json.loads(run(*scan, "-f", "json", "--plot", str(plot)).stdout)
+    found = json.loads(run(*asked, "-f", "json", "--plot", str(plot)).stdout)
     schema = json.loads((files("d2rpick") / "schemas" / "rollover-1.json").read_text("utf-8"))
     jsonschema.Draft202012Validator.check_schema(schema)
     jsonschema.validate(found, schema, jsonschema.Draft202012Validator)
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert found["recommended"] in [one["tr"] for one in found["runs"]]
-    rows = list(csv.DictReader(io.StringIO(run(*scan, "-f", "csv").stdout)))
+    rows = list(csv.DictReader(io.StringIO(run(*asked, "-f", "csv").stdout)))
     assert [{name: float(cell) for name, cell in row.items()} for row in rows] == found["runs"]
-    text = run(*scan).stdout
+    text = run(*asked).stdout
     assert "\n* " in text
     assert f"recommended  tr = {found['recommended']:.6g}" in text
 
 
 def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
-    scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.06", "--t-end", "0.1", *SMALL)
-    result = run(*scan, "-f", "markdown")
+    asked = ("rollover", "--scan", "--jobs", "1", "--td", "0.06", "--t-end", "0.1", *SMALL)
+    result = run(*asked, "-f", "markdown")
     assert result.stdout.startswith("| tr |")
     told = {line.split(": ")[1] for line in result.stderr.splitlines()}
     assert told >= {"energy-only", "no-free-flight"}
-    assert codes(answer(*scan)) == told
+    assert codes(answer(*asked)) == told
 
 
 def test_a_scan_at_whose_td_nothing_can_be_recommended_says_so() -> None:
-    scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.04", "--t-end", "0.1", *SMALL)
-    assert run(*scan, "-q").stdout.endswith("\n\nrecommended  none\n")
-    assert [run(*scan, *extra).exit_code for extra in ((), ("-f", "csv"), ("--exit-zero",))] == [1, 1, 0]
-    found = answer(*scan)
+    asked = ("rollover", "--scan", "--jobs", "1", "--td", "0.04", "--t-end", "0.1", *SMALL)
+    assert run(*asked, "-q").stdout.endswith("\n\nrecommended  none\n")
+    assert [run(*asked, *extra).exit_code for extra in ((), ("-f", "csv"), ("--exit-zero",))] == [1, 1, 0]
+    found = answer(*asked)
     assert found["recommended"] is None
     assert "no-candidate" in codes(found)
 
@@ -161,8 +183,8 @@ def test_the_runs_of_a_scan_are_counted(quiet: bool, monkeypatch: pytest.MonkeyP
         yield counted[-1][0]
 
     monkeypatch.setattr(rollover, "counting", counting)
-    scan = ("rollover", "--scan", "--jobs", "1", "--td", "0.1", "--t-end", "0.11", "--mesh", "4", "--dt", "1e-3")
-    run(*scan, *(["-q"] if quiet else []))
+    asked = ("rollover", "--scan", "--jobs", "1", "--td", "0.1", "--t-end", "0.11", "--mesh", "4", "--dt", "1e-3")
+    run(*asked, *(["-q"] if quiet else []))
     ((count, silent),) = counted
     assert count.done == count.total > 1
     assert silent == quiet

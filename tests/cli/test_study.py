@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 FORMATS = ("table", "json", "csv", "markdown", "ndjson")
-KEYS = ("source", "tr", "tr_low", "tr_high", "energy_td", "residual", "status", "message")
+KEYS = ("source", "tr", "tr_low", "tr_high", "energy_td", "residual", "status", "message", "td", "common_error")
 
 
 @pytest.fixture
@@ -76,7 +76,9 @@ def test_every_format_says_the_same(runs: list[str]) -> None:
     for line in lines:
         check_line(line, "line")
     check_line(last, "last")
-    assert [{key: line[key] for key in one} for line, one in zip(lines, found["runs"], strict=True)] == found["runs"]
+    errors = last["common_errors"]
+    again = [{**line, "common_error": error} for line, error in zip(lines, errors, strict=True)]
+    assert [{key: line[key] for key in one} for line, one in zip(again, found["runs"], strict=True)] == found["runs"]
     assert {**last, "command": 0} == {**{key: found[key] for key in found if key != "runs"}, "command": 0}
     for form in ("table", "markdown"):
         text = run(*STUDY, *sources, "-f", form).stdout
@@ -85,8 +87,41 @@ def test_every_format_says_the_same(runs: list[str]) -> None:
 
 
 def test_the_common_tr_verifies_in_each_run(runs: list[str]) -> None:
-    tr = answer(*STUDY, *runs)["common_tr"]
-    assert all(run("verify", "--tr", repr(tr), "--td", str(variants.TD), name).exit_code == 0 for name in runs)
+    found = answer(*STUDY, *runs)
+    assert found["common_keeps_timing_tolerance"] is True
+    for name, one in zip(runs, found["runs"], strict=True):
+        verdict = answer("verify", "--tr", repr(found["common_tr"]), "--td", str(variants.TD), name)
+        assert verdict["verified"]
+        assert one["common_error"] == pytest.approx(verdict["residual"], abs=1e-3)
+    text = run(*STUDY, *runs).stdout
+    assert all(f"{one['common_error']:.3f}" in text for one in found["runs"])
+
+
+def test_a_window_for_td_lets_each_run_choose_its_own(runs: list[str]) -> None:
+    found = answer("study", "--td-window", "0.06", "0.07", *runs)
+    check_by_schema(found)
+    assert (found["td"], found["td_window"]) == (None, [0.06, 0.07])
+    for name, one in zip(runs, found["runs"], strict=True):
+        pair = answer("suggest", "--td-window", "0.06", "0.07", name)["recommended"]
+        assert (one["tr"], one["td"]) == (pair["tr"], pair["td"])
+        verdict = answer("verify", "--tr", repr(found["common_tr"]), "--td", repr(one["td"]), name)
+        assert verdict["verified"]
+        assert one["common_error"] == pytest.approx(verdict["residual"], abs=1e-3)
+    assert "of each run in 0.06 to 0.07" in run("study", "--td-window", "0.06", "0.07", *runs).stdout
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        ((), "name the time to switch back with --td"),
+        (("--td", "0.06", "--td-window", "0.06", "0.07"), "exclude each other"),
+        (("--td-window", "0.07", "0.06"), "is empty"),
+    ],
+)
+def test_one_td_or_a_window_for_it_is_needed(runs: list[str], args: tuple[str, ...], said: str) -> None:
+    result = run("study", *args, *runs)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert said in result.stderr
 
 
 def test_options_of_suggest_hold_for_each_run() -> None:

@@ -117,6 +117,7 @@ def test_pictures_and_pages(tmp_path: Path) -> None:
     found = d2.suggest(d2.read(ENERGY), float(TD))
     assert found.plot().axes
     page = found.report(tmp_path / "choice.html").read_text("utf-8")
+    assert '"command":["d2rpick suggest --td "' in page  # what can be explored
     assert "d2rpick suggest --td 0.0687534" in page
     assert found.recommended is not None
     verdict = d2.verify(d2.read(ENERGY), tr=found.recommended.tr, td=float(TD))

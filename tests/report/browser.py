@@ -40,13 +40,12 @@ class Browser:
     def __init__(self, driver: webdriver.Chrome) -> None:
         self.driver = driver
 
-    def open(self, page: Path, *, width: int = 1280, scripts: bool = True, **media: str) -> None:
+    def open(self, page: Path, *, width: int = 1280, **media: str) -> None:
         """Show a page at a width [px], with what the reader prefers: ``prefers_color_scheme="dark"``."""
         size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
         features = [{"name": name.replace("_", "-"), "value": value} for name, value in media.items()]
         self.ask("Emulation.setDeviceMetricsOverride", **size)
         self.ask("Emulation.setEmulatedMedia", media="", features=features)
-        self.ask("Emulation.setScriptExecutionDisabled", value=not scripts)
         self.driver.get(page.as_uri())
 
     def ask(self, command: str, **arguments: Any) -> Any:

@@ -20,6 +20,8 @@ COMMANDS = {
     "study": ("study", "--td", "0.064", ENERGY),
     "plan": ("plan", ENERGY),
     "trade_off": ("explore", "--steps", "5", ENERGY),
+    "parts": ("parts", "--deck", "sample_data/rollover_box.k", "sample_data/rollover_box.matsum"),
+    "calibration": ("calibrate", "sample_data/flying_box"),
     "reproduction": ("reproduce", "--section", "5", "--overwrite", "--output-dir"),
     "rollover": ("rollover", "--scan"),
     "findings": ("check", "--exit-zero", "sample_data/switching.k", "--history", "sample_data/energy.glstat"),

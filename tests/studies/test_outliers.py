@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from d2rpick.studies.outliers import outliers, short_names
-from d2rpick.studies.study import NONE, OK, UNREADABLE, Row
+from d2rpick.studies.row import NONE, OK, UNREADABLE, Row
 
 
 def row(name: str, tr: float | None = None, status: str = OK) -> Row:

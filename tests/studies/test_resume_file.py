@@ -6,6 +6,7 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -15,8 +16,11 @@ from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection
 from d2rpick.studies import study
 from d2rpick.studies.resume_file import Ledger, fingerprint, line
-from d2rpick.studies.study import Question, Row, ask
+from d2rpick.studies.study import Question, ask
 from tests import variants
+
+if TYPE_CHECKING:
+    from d2rpick.studies.row import Row
 
 QUESTION = Question(variants.TD, Settings())
 
@@ -25,8 +29,8 @@ def values(row: Row | None) -> dict[str, object]:
     """All of a row as plain values."""
     assert row is not None
     found = {name: getattr(row, name) for name in row.__dataclass_fields__}
-    found["acceptable"] = [windows.tolist() for windows in row.acceptable]
-    found["curve"] = None if row.curve is None else row.curve.tolist()
+    for name in ("acceptable", "alike", "profile", "curve"):
+        found[name] = None if found[name] is None else found[name].tolist()
     return found
 
 
@@ -142,5 +146,5 @@ def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(tmp_path: Pa
 def test_a_line_is_json_with_the_windows_of_the_row(tmp_path: Path) -> None:
     row = ask(QUESTION, variants.write(tmp_path / "run.csv"))
     found = json.loads(line(row, "asked"))
-    assert found["acceptable"] == [windows.tolist() for windows in row.acceptable]
+    assert found["acceptable"] == [row.acceptable.tolist(), row.alike.tolist()]
     assert np.array(found["acceptable"][0]).size

@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.verify import verify
 from d2rpick.histories.opening import Selection
-from d2rpick.studies.study import OK, Question, Row, ask, failed, fewest_digits, find_runs, summarise
+from d2rpick.studies.common import fewest_digits
+from d2rpick.studies.row import OK, Row
+from d2rpick.studies.study import Question, ask, failed, find_runs, summarise
 from tests import variants
 from tests.command import BOX, GLSTAT
 from tests.reading import read_history
@@ -24,11 +26,11 @@ ASKED = Question(variants.TD, Settings())
 
 
 def row(source: str, *windows: tuple[float, float], tr: float = 2.0, width: float = 0.1, **other: object) -> Row:
-    """A run with windows of acceptable tr, the same at every level."""
-    acceptable = (np.array(windows, float).reshape(-1, 2),) * 3
+    """A run with windows of acceptable tr, all alike, its error a straight line from 0 at 0 to 1 at td = 10."""
+    acceptable = np.array(windows, float).reshape(-1, 2)
     made = Row(
         source, OK, tr=tr, tr_low=tr - width, tr_high=tr + width, energy_td=1.0, residual=0.1, basis="oscillator",
-        acceptable=acceptable,
+        td=10.0, acceptable=acceptable, alike=acceptable, profile=np.array([[0.0, 10.0], [0.0, 1.0]]),
     )  # fmt: skip
     return replace(made, **other)  # type: ignore[arg-type]
 
@@ -112,8 +114,11 @@ def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(tmp_path: Pa
     found = ask(ASKED, variants.write(tmp_path / "run.csv"))
     one, two = summarise(variants.TD, [found]), summarise(variants.TD, [found, found])
     assert one.agree is two.agree is True
-    assert one.common == two.common
-    assert one.common.tr == pytest.approx(found.tr, abs=2e-5)
+    assert one.common._replace(errors=2 * one.common.errors) == two.common
+    assert one.common.tr is not None
+    assert found.tr is not None
+    assert one.common.tr <= found.tr
+    assert one.common.tr == pytest.approx(found.tr, abs=1e-3)
 
 
 @given(st.lists(st.tuples(st.floats(0, 1), st.floats(0, 0.3)), min_size=1, max_size=6))
@@ -135,16 +140,84 @@ def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_
 
 def test_runs_that_were_not_judged_are_left_out_and_named() -> None:
     answer = summarise(10.0, [row("a", (1, 2)), failed("bad", OSError())])
-    assert answer.common.tr == 1.5
+    assert answer.common.tr == 1.0
+    assert list(answer.common.errors) == [pytest.approx(0.1), None]
     assert answer.objection
     (caution,) = answer.cautions
     assert (caution.code, "bad" in caution.message) == ("runs-left-out", True)
 
 
-def test_the_worst_run_decides_among_windows_that_save_enough() -> None:
-    wide, fine = np.array([[1.0, 2.0], [3.0, 4.0], [8.0, 9.0]]), np.array([[3.4, 3.6], [8.4, 8.6]])
-    answer = summarise(10.0, [replace(row("a"), acceptable=(wide, fine, fine[1:]))])
-    assert (answer.common.tr, answer.common.window) == (3.5, (3.0, 4.0))
+def alike(*windows: tuple[float, float]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    return np.array(windows, float).reshape(-1, 2)
+
+
+def test_the_common_tr_is_the_earliest_within_the_timing_tolerance_of_every_run() -> None:
+    rows = [row("a", (1, 4), alike=alike((1.2, 1.4), (1.5, 3))), row("b", (0, 6), alike=alike((1.45, 5)))]
+    found = summarise(10.0, rows).common
+    assert (found.tr, found.window, found.keeps_tolerance) == (1.5, (1.0, 4.0), True)
+    assert found.errors == pytest.approx([0.15] * 2)
+
+
+def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_and_is_told() -> None:
+    """One error falls from 0.2 to 0, the other grows from 0 to 0.2: both are least in the middle."""
+    falling, growing = np.array([[1.0, 3.0], [0.2, 0.0]]), np.array([[1.0, 3.0], [0.0, 0.2]])
+    rows = [
+        row("a", (1, 3), tr=3.0, profile=falling, alike=alike((2.5, 3))),
+        row("b", (1, 3), tr=1.0, profile=np.insert(growing, 1, [2.0, 0.1], axis=1), alike=alike((1, 1.5))),
+    ]
+    answer = summarise(10.0, rows)
+    assert (answer.common.tr, answer.common.window, answer.common.keeps_tolerance) == (2.0, (1.0, 3.0), False)
+    assert answer.common.errors == pytest.approx([0.1, 0.1])
+    (caution,) = answer.cautions
+    assert caution.code == "timing-tolerance"
+    assert "grows by more than 0.05" in caution.message
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0, 5), st.floats(0.1, 4), st.floats(0, 1), st.floats(0, 1)).map(
+            lambda one: row(
+                "r", (one[0], one[0] + one[1]),
+                alike=alike(tuple(sorted(one[0] + share * one[1] for share in one[2:]))),  # type: ignore[arg-type]
+            )
+        ),
+        min_size=1,
+        max_size=5,
+    )
+)  # fmt: skip
+def test_a_common_tr_lies_in_the_windows_of_all_runs(rows: list[Row]) -> None:
+    found = summarise(10.0, rows).common
+    if found.tr is None:
+        assert max(one.acceptable[0, 0] for one in rows) > min(one.acceptable[0, 1] for one in rows)
+        return
+    for one in rows:
+        for windows in (one.acceptable, *[one.alike] * bool(found.keeps_tolerance)):
+            assert windows[0, 0] <= found.tr <= windows[0, 1]
+
+
+def test_the_errors_at_the_common_tr_are_those_of_verify(tmp_path: Path) -> None:
+    names = variants.variants(tmp_path)
+    for question in (ASKED, replace(ASKED, settings=Settings(replay=False, after=0.01))):
+        answer = summarise(variants.TD, [ask(question, name) for name in names])
+        tr = answer.common.tr
+        assert tr is not None
+        for name, error in zip(names, answer.common.errors, strict=True):
+            own = verify(read_history([name]), tr, variants.TD, question.settings).candidate.error
+            assert error == pytest.approx(own, abs=1e-3)
+
+
+def test_each_run_chooses_its_own_td_in_a_window(tmp_path: Path) -> None:
+    names = variants.variants(tmp_path)
+    window = (0.06, 0.07)
+    rows = [ask(Question(window, Settings()), name) for name in names]
+    answer = summarise(window, rows)
+    assert (answer.td, answer.td_window) == (None, window)
+    times = [found.td for found in rows if found.td is not None]
+    assert len(set(times)) == len(names)
+    assert all(window[0] <= td <= window[1] for td in times)
+    assert answer.common.tr is not None
+    for name, td in zip(names, times, strict=True):
+        assert verify(read_history([name]), answer.common.tr, td, Settings()).verified
 
 
 def test_different_bases_and_units_are_told() -> None:

@@ -33,6 +33,7 @@ _WIDEST: Final = 240  # columns that any line of a mesh uses
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
 _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")  # in lines that do not stand in columns
 _ID_ENDS: Final = 7  # last column of most ids: a line that has something there is not blank
+_HIGHEST: Final = 10**17  # no id comes near: a longer number would overflow
 NOTHING: Final = -1  # in place of what is not an id
 
 
@@ -168,7 +169,7 @@ def _integers(field: NDArray[np.uint8]) -> Integers:
         digits = letters - _ZERO
         is_digit = digits <= 9
         value = np.where(is_digit, 10 * value + digits, value)
-        known &= is_digit | (letters == _BLANK)
+        known &= (is_digit | (letters == _BLANK)) & (value < _HIGHEST)
         groups += is_digit & ~before
         before = is_digit
     return np.where(known & (groups <= 1), value, NOTHING)

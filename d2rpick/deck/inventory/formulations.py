@@ -69,5 +69,6 @@ def ls_dyna(kind: str, elform: int) -> Formulation | None:
 
 
 def _plain(kind: str, *, measured: bool) -> Formulation | None:
-    cost = {"beam": BEAM, "truss": BEAM, "spring": SPRING, "tetrahedron": SOLID, "pentahedron": SOLID}.get(kind)
+    alike = {"beam": BEAM, "truss": BEAM, "spring": SPRING, "seatbelt": SPRING}
+    cost = SOLID if kind in ("tetrahedron", "pentahedron", "thick shell") else alike.get(kind)
     return Formulation(kind, cost, measured and kind in ("beam", "spring")) if cost else None

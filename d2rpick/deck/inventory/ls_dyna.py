@@ -48,7 +48,8 @@ _KINDS: Final = {
 # Options whose lines hold reals or words, or ids in other columns than those of an element and its part.
 _OPTIONS: Final = {
     *("THICKNESS", "BETA", "MCID", "OFFSET", "ORTHO", "ORIENTATION", "COMPOSITE", "LONG", "SCALAR", "SCALR"),
-    *("SECTION", "ELFORM", "DOF", "PID", "WARPAGE", "ELBOW", "ID", "TITLE"),
+    *("SECTION", "ELFORM", "DOF", "PID", "WARPAGE", "ELBOW", "ID", "TITLE", "SHL4", "TO", "SHL8", "TET4TOTET10"),
+    *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
 _NO_ELEMENTS: Final = {
     "MASS",
@@ -116,7 +117,8 @@ def _notes(deck: Deck, cards: Sequence[Card], elements: Sequence[Elements], part
 def _element_cards(deck: Deck) -> Iterator[Card]:
     for card in deck.cards:
         kind = card.name.split("_")[1:2]
-        if card.name.startswith("ELEMENT_") and kind and kind[0] not in _NO_ELEMENTS:
+        fitting = card.name.startswith("ELEMENT_SEATBELT_")  # slip ring, retractor, sensor, ...
+        if card.name.startswith("ELEMENT_") and kind and kind[0] not in _NO_ELEMENTS and not fitting:
             yield card
 
 
@@ -162,17 +164,16 @@ def _real_elements(values: Integers, kind: _Kind) -> Integers:
 
 
 def _of_two_lines(values: Integers) -> tuple[Integers, Integers | None]:
-    """Join lines of an element and its part with those of its nodes below; give back one that waits for them."""
+    """Join lines of an element and its part with the first of its nodes below; give back one that waits for them."""
     heads = (values[:, :2] > 0).all(axis=1) & (values[:, 2:] == 0).all(axis=1)
     if not heads.any():
         return values, None
     waiting = values[-1:] if heads[-1] else None
     heads[-1] = False
     at = np.flatnonzero(heads)
-    joined = values.copy()
-    joined[at, 2:] = values[at + 1, :_TEN]
-    joined[at + 1] = 0
-    return joined if waiting is None else joined[:-1], waiting
+    joined = values[at]
+    joined[:, 2:] = values[at + 1, :_TEN]
+    return joined, waiting
 
 
 def _joined(blocks: Sequence[Integers]) -> Integers:

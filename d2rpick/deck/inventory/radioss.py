@@ -52,8 +52,10 @@ _ELASTIC: Final = {
 }  # density, then Young's modulus and Poisson's ratio
 _VOID: Final = {"VOID", "LAW0", "LAW00"}
 _AIRBAG: Final = {"FABRI", "FABR_A", "LAW19", "LAW58"}
-_SHELLS: Final = {"SHELL", "TYPE1"}
-_SOLIDS: Final = {"SOLID", "TYPE14"}
+_PLAIN_SHELLS: Final = {"SHELL", "TYPE1", "SH_ORTH", "TYPE9"}  # with their thickness in the same columns
+_SHELLS: Final = {*_PLAIN_SHELLS, "SH_COMP", "TYPE10", "SH_SANDW", "TYPE11", "SH_FABR", "TYPE16", "STACK", "TYPE17",
+                  "TYPE51"}  # fmt: skip
+_SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
 _BEAMS: Final = {"BEAM", "TYPE3"}
 _TRUSSES: Final = {"TRUSS", "TYPE2"}
 _SPRING: Final = {"SPRING", "TYPE4"}
@@ -212,7 +214,7 @@ def _properties(cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Iterator[tuple
         if words[1] in _SHELLS:
             found = _Property(
                 words[1], flags[0] or shell or _DEFAULT_SHELL, flags[2] or triangle or _DEFAULT_TRIANGLE,
-                section=Section(thickness=_at(rows, 3, 20)),
+                section=Section(thickness=_at(rows, 3, 20) if words[1] in _PLAIN_SHELLS else None),
             )  # fmt: skip
         elif words[1] in _SOLIDS:
             isolid, iframe = flags[0] or solid or _DEFAULT_SOLID, flags[7]
@@ -233,7 +235,7 @@ def _section(prop: _Property | None, kinds: set[str], *, turns: bool) -> Section
     found: dict[str, Formulation] = {}
     for kind in sorted(kinds):
         flags = (prop.shell, prop.triangle, prop.solid)
-        needed = {"shell": flags[0], "triangle": flags[1], "solid": flags[2]}.get(kind, 1)
+        needed = {"shell": flags[0], "triangle": flags[1]}.get(kind, 1)
         one = formulations.radioss(kind, *flags) if needed else None
         if one:
             found[kind] = one

@@ -42,6 +42,8 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "eroded_internal_energy": "eroded_ie",
 }
 
+_AXES: Final = ("x_momentum", "y_momentum", "z_momentum")  # side by side in the file
+
 _START: Final = b" time ="
 _TIME: Final[tuple[int | None, str]] = (None, "time")
 _MAT: Final = "mat.#"  # the line a part begins with
@@ -102,6 +104,7 @@ class Matsum(SolverFile):
             )
         self.complete = self._blocks.complete
         self.part_time = self._blocks.numbers([_TIME])[:, 0]
+        self._ahead: dict[tuple[str | int, ...], Samples] = {}  # read with what was asked for
         present = self._present()
         self.parts = tuple(Part(id_, self._legend.get(id_, "")) for id_ in present if id_ > _LUMPED)
         self.notes = self._blocks.notes + self._remarks(present)
@@ -132,8 +135,13 @@ class Matsum(SolverFile):
                 f"{self.source}: no part {', '.join(map(str, missing))}; "
                 f"choose from {', '.join(str(part.id) for part in self.parts) or 'none'}"
             )
-        names = [(id_, QUANTITIES[quantity]) for id_ in ids]
-        return self._blocks.numbers(names, anchors=[(id_, _MAT) for id_ in ids])
+        wanted: tuple[str | int, ...] = (quantity, *ids)
+        if wanted not in self._ahead:
+            together = _AXES if quantity in _AXES else (quantity,)  # who asks for one component asks for the others
+            names = [(id_, QUANTITIES[one]) for id_ in ids for one in together]
+            values = self._blocks.numbers(names, anchors=[(id_, _MAT) for id_, _ in names])
+            self._ahead = {(one, *ids): values[:, place :: len(together)] for place, one in enumerate(together)}
+        return self._ahead.pop(wanted)
 
     def _no_channels(self) -> FormatError:
         return FormatError(f"{self.source}: a matsum has parts only; choose with `parts` or add the glstat of the run")

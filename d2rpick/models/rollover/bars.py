@@ -35,7 +35,7 @@ class Bars:
         tension = self._stiffness * (length - self._rest)
         held = np.minimum(np.maximum(tension, -self._strength), self._strength)
         excess = tension - held
-        if np.any(excess):
+        if excess.any():
             flow = excess / self._stiffness
             self._rest += flow
             self._plastic_work += float(held @ flow)

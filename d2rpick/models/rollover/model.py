@@ -22,10 +22,12 @@ Ends = NDArray[np.intp]
 GRAVITY = 9.81
 _POSITIVE = (
     "braking", "stiffness", "yield_strain", "mass", "width", "height", "wall", "step_mass", "step_stiffness",
-    "step_yield_strain", "ground_stiffness",
+    "step_yield_strain", "ground_stiffness", "roof_strength",
 )  # fmt: skip
 # The step takes a quarter of the leading side, and at least one cell.
 _COARSEST = 4
+# Bars of a cell, the cells of the leading side first, then those of the roof.
+_BARS = 5
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class Parameters:
     """Of every bar of the box, E A [N]: racking at 20 Hz, where bodies of cars have their first modes."""
     yield_strain: float = 4.5e-3
     """At which the bars of the box yield [-]: in the trip it takes plastic work of the size of its vibration."""
+    roof_strength: float = 1.0
+    """Force at which the bars of the roof yield, over that of the other walls [-]."""
     damping: float = 0.2
     """Rate alpha of the damping, proportional to mass [1/s]: small, for it slows flight and roll as well."""
     mesh: int = 16
@@ -142,12 +146,14 @@ def build(parameters: Parameters) -> Structure:
     if p.drop is not None:
         places += 1j * (p.drop - p.ground - places.imag.min())
     of_box = 2 * cells
+    walls = Truss.between(places, _walls(cells), p.stiffness, p.yield_strain)
+    walls.strength[_BARS * p.mesh : _BARS * 2 * p.mesh] *= p.roof_strength
     both = of_box + np.arange(toes.size)
     return Structure(
         places=places,
         masses=np.repeat([p.mass / of_box, p.step_mass / toes.size], [of_box, toes.size]),
         of_box=of_box,
-        box=Truss.between(places, _walls(cells), p.stiffness, p.yield_strain),
+        box=walls,
         step=Truss.between(places, _step(cells, top), p.step_stiffness, p.step_yield_strain),
         skin=np.concatenate([np.arange(cells), both]),
         toes=both,

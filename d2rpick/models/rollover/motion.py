@@ -57,6 +57,8 @@ class Motion:
         self.every = int(np.ceil(interval / (_SAFETY * limit)))
         self.dt = interval / self.every
         self.damping = parameters.damping
+        self._weight: Plane = np.asarray(s.masses * (-1j * GRAVITY), dtype=np.complex128)
+        self._mobility = self.dt / s.masses
         self.places = s.places.copy()
         self.velocities: Plane = np.full(s.places.size, complex(parameters.speed))
         self.box, self.step = Bars(s.box, s.places.size), Bars(s.step, s.places.size)
@@ -96,13 +98,12 @@ class Motion:
         """Bring the velocities to half a step after the places; give their mean over the step, shape (n,) [m/s]."""
         s, before = self.structure, self.velocities
         push = self.contact.push(self.time, self.places, before)
-        weight = np.asarray(s.masses * (-1j * GRAVITY), dtype=np.complex128)
-        outer = weight + push.forces if push else weight
+        outer = self._weight + push.forces if push else self._weight
         forces = outer + self.step.forces(self.places)
         if not self.body:
             forces += self.box.forces(self.places)
         half = self.damping * self.dt / 2
-        after = ((1 - half) * before + self.dt / s.masses * forces) / (1 + half)
+        after = ((1 - half) * before + self._mobility * forces) / (1 + half)
         if self.body:
             self.body.push(forces[: s.of_box], self.damping, self.dt)
             after[: s.of_box] = self.body.velocities

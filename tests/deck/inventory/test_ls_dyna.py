@@ -10,16 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.deck.inventory import ls_dyna, read_inventory
-from d2rpick.deck.inventory.model import Inventory
 from d2rpick.deck.reader import read_deck
 from d2rpick.errors import DeckError
 from tests.decks import read, write
-from tests.sample_deck import DECK, deck
+from tests.sample_deck import DECK, FLYING, deck, radioss
 from tests.shared import shared
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+    from d2rpick.deck.inventory.model import Inventory
 
 HEAD = "*KEYWORD\n*PART\na\n         7         1         1\n*PART\nb\n         9         1         1\n"
 
@@ -45,29 +46,37 @@ def counted(found: Inventory) -> dict[int, dict[str, int]]:
 
 
 SHELLS = row(1, 7, 1, 2, 4, 3) + row(2, 7, 5, 6, 8, 7)
+WIDE = row(1, 7, 1, 2, 4, 3, width=10) + row(2, 7, 5, 6, 8, 7, width=10)
+LINES = SHELLS.splitlines(keepends=True)
+
+
+def after_each(line: str) -> str:
+    """Shells, each with a line of an option below."""
+    return "".join(f"{shell}{line}\n" for shell in LINES)
+
+
 FORMS = {
-    "plain": (nodes(), "*ELEMENT_SHELL\n" + SHELLS),
-    "i10": (nodes(10).replace("", "", 1), "*ELEMENT_SHELL %\n" + row(1, 7, 1, 2, 4, 3, width=10) + row(2, 7, 5, 6, 8, 7, width=10)),
-    "i10 in the name": (nodes(), "*ELEMENT_SHELL%\n" + row(1, 7, 1, 2, 4, 3, width=10) + row(2, 7, 5, 6, 8, 7, width=10)),
-    "commas": (nodes(), "*ELEMENT_SHELL\n1,7,1,2,4,3\n2,7,5,6,8,7\n"),
-    "commas and columns": (nodes(), "*ELEMENT_SHELL\n1,7,1,2,4,3\n" + row(2, 7, 5, 6, 8, 7)),
-    "parameter": ("*PARAMETER\nI      pid         7\n*NODE\n" + nodes(), "*ELEMENT_SHELL\n       1    &pid       1       2       4       3\n" + row(2, 7, 5, 6, 8, 7)),
-    "thickness": (nodes(), "*ELEMENT_SHELL_THICKNESS\n" + "".join(line + "             1.0" * 4 + "\n" for line in SHELLS.splitlines(True))),
-    "whole thickness": (nodes(), "*ELEMENT_SHELL_THICKNESS\n" + "".join(line + "               1" * 4 + "\n" for line in SHELLS.splitlines(True))),
-    "beta": (nodes(), "*ELEMENT_SHELL_BETA\n" + "".join(line + "             0.0\n" for line in SHELLS.splitlines(True))),
-    "comments and blank lines": (nodes(), "*ELEMENT_SHELL\n$#   eid     pid\n" + SHELLS.replace("\n", "\n$ 1 7 1 2 3\n\n", 1)),
-    "lower case": (nodes(), "*Element_Shell\n" + SHELLS),
-    "CR LF": (nodes(), ("*ELEMENT_SHELL\n" + SHELLS).replace("\n", "\r\n")),
-    "triangles": (nodes(), "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 4) + row(2, 7, 5, 6, 8)),
-    "trailing nodes": (nodes(), "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 3, 0, 0, 0, 0) + row(2, 7, 5, 6, 8, 7, 0, 0, 0, 0)),
-}  # fmt: skip
+    "plain": f"*ELEMENT_SHELL\n{SHELLS}",
+    "i10": f"*ELEMENT_SHELL %\n{WIDE}",
+    "i10 in the name": f"*ELEMENT_SHELL%\n{WIDE}",
+    "commas": "*ELEMENT_SHELL\n1,7,1,2,4,3\n2,7,5,6,8,7\n",
+    "commas and columns": f"*ELEMENT_SHELL\n1,7,1,2,4,3\n{LINES[1]}",
+    "parameter": "*PARAMETER\nI      pid         7\n*ELEMENT_SHELL\n" + SHELLS.replace("       7", "    &pid", 1),
+    "thickness": "*ELEMENT_SHELL_THICKNESS\n" + after_each("             1.0" * 4),
+    "whole thickness": "*ELEMENT_SHELL_THICKNESS\n" + after_each("               1" * 4),
+    "beta": "*ELEMENT_SHELL_BETA\n" + after_each("             0.0"),
+    "comments and blank lines": "*ELEMENT_SHELL\n$#   eid     pid\n" + SHELLS.replace("\n", "\n$ 1 7 1 2 3\n\n", 1),
+    "lower case": f"*Element_Shell\n{SHELLS}",
+    "CR LF": f"*ELEMENT_SHELL\n{SHELLS}".replace("\n", "\r\n"),
+    "triangles": "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 4) + row(2, 7, 5, 6, 8),
+    "trailing nodes": "*ELEMENT_SHELL\n" + SHELLS.replace("\n", "       0" * 4 + "\n"),
+}
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_two_shells_are_counted_in_every_form(tmp_path: Path, form: str) -> None:
-    mesh, elements = FORMS[form]
-    mesh = mesh if mesh.startswith("*") else f"*NODE{' %' if form == 'i10' else ''}\n{mesh}"
-    found = inventory(tmp_path, f"{HEAD}{mesh}{elements}*END\n")
+    mesh = f"*NODE %\n{nodes(10)}" if form == "i10" else f"*NODE\n{nodes()}"
+    found = inventory(tmp_path, f"{HEAD}{mesh}{FORMS[form]}*END\n")
     assert counted(found) == {7: {"shell": 2}}
     assert found.notes == ()
     assert found.rigid_nodes([7]) == (6 if form == "triangles" else 8)
@@ -93,6 +102,10 @@ def test_long_format(tmp_path: Path) -> None:
         ("*ELEMENT_BEAM_PID\n" + row(1, 7, 1, 2, 3) + row(7, 9), {7: {"beam": 1}}),
         ("*ELEMENT_DISCRETE\n" + row(1, 7, 1, 2, 0) + "       2       9       3       4       0   1.00E+00\n",
          {7: {"spring": 1}, 9: {"spring": 1}}),
+        ("*ELEMENT_SOLID_H20\n" + (row(1, 7) + row(*range(1, 11)) + row(*range(11, 21))) * 2, {7: {"solid": 2}}),
+        ("*ELEMENT_SOLID_TET4TOTET10\n" + row(1, 7) + row(1, 2, 3, 5), {7: {"solid": 1}}),
+        ("*ELEMENT_SEATBELT\n" + row(1, 7, 1, 2) + "*ELEMENT_SEATBELT_SLIPRING\n" + row(1, 1, 2, width=10),
+         {7: {"seatbelt": 1}}),
         ("*ELEMENT_TSHELL\n" + row(1, 7, *range(1, 9)), {7: {"thick shell": 1}}),
         ("*ELEMENT_MASS\n       1       1             0.5       7\n", {}),
     ],
@@ -123,12 +136,39 @@ def test_ids_move_with_a_transform_and_parts_of_other_files_share_nodes(tmp_path
 
 
 def test_what_is_not_followed_is_said(tmp_path: Path) -> None:
-    strange = "*ELEMENT_SOLID_H64\n" + row(1, 7) + "*INCLUDE\nabsent.k\n*ELEMENT_SHELL\n" + row(1, 5, 1, 2, 4, 99)
+    strange = "*ELEMENT_SOLID_STRANGE\n" + row(1, 7) + "*INCLUDE\nabsent.k\n*ELEMENT_SHELL\n" + row(1, 5, 1, 2, 4, 99)
     found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}{strange}       2")
     assert not found.complete
     told = " ".join(found.notes)
-    for words in ("ELEMENT_SOLID_H64", "absent.k was not read", "is it cut", "part 5, which no *PART", "1 nodes of"):
+    for words in (
+        "ELEMENT_SOLID_STRANGE",
+        "absent.k was not read",
+        "is it cut",
+        "part 5, which no *PART",
+        "1 nodes of",
+    ):
         assert words in told
+
+
+def test_large_ids_are_kept_apart_and_numbers_beyond_them_are_not_ids(tmp_path: Path) -> None:
+    head = "*KEYWORD LONG=Y\n*PART\na\n" + row(7, 1, 1, width=20) + "*ELEMENT_SHELL\n"
+    first = 4_000_000_000
+    shells = row(1, 7, first, first + 1, first + 2, first + 3, width=20) + row(2, 7, first, 5, 6, first + 9, width=20)
+    wide = f"{3:20d}{7:20d}{'9' * 20}{first:20d}{first:20d}\n"
+    found = inventory(tmp_path, f"{head}{shells}{wide}*END\n")
+    assert counted(found) == {7: {"shell": 2}}
+    assert found.rigid_nodes([7]) == 7
+
+
+def test_a_deck_cut_at_any_byte_counts_what_is_whole_or_says_that_it_is_cut(tmp_path: Path) -> None:
+    text = f"{HEAD}*NODE\n{nodes()}*ELEMENT_SHELL\n{SHELLS}"
+    whole = {7: {"shell": 2}}
+    for end in range(text.index("*ELEMENT") + 16, len(text)):
+        found = inventory(tmp_path, text[:end])
+        cut = text[end - 1] != "\n"
+        assert any("is it cut" in note for note in found.notes) == cut
+        assert counted(found) in ({}, {7: {"shell": 1}}, whole)
+        assert found.complete != cut
 
 
 def test_a_deck_without_parts_is_refused(tmp_path: Path) -> None:
@@ -138,7 +178,8 @@ def test_a_deck_without_parts_is_refused(tmp_path: Path) -> None:
 
 def test_materials_and_sections_are_told(tmp_path: Path) -> None:
     cards = (
-        "*MAT_RIGID\n" + row(1, width=10) + "*MAT_SPRING_ELASTIC\n" + row(2, width=10) + "*MAT_DAMPER_VISCOUS_TITLE\nd\n"
+        "*MAT_RIGID\n" + row(1, width=10) + "*MAT_SPRING_ELASTIC\n" + row(2, width=10)
+        + "*MAT_DAMPER_VISCOUS_TITLE\nd\n"
         + row(3, width=10) + "*MAT_FABRIC\n" + row(4, width=10) + "*MAT_SIMPLIFIED_RUBBER/FOAM\n" + row(5, width=10)
         + "*SECTION_SOLID\n" + row(1, 1, width=10)
     )  # fmt: skip
@@ -179,7 +220,8 @@ def test_real_decks_hold_what_a_plain_count_finds() -> None:
     assert {part: counts.total() for part, counts in found.counts.items()} == plain
 
 
-def test_the_sample_deck_is_what_its_module_writes() -> None:
+def test_the_sample_decks_are_what_their_module_writes() -> None:
     assert DECK.read_text("utf-8") == deck()
+    assert {name: (FLYING / name).read_text("utf-8") for name in radioss()} == radioss()
     found = read_inventory(str(DECK))
     assert counted(found) == {1: {"shell": 94}, 2: {"shell": 15}, 3: {"shell": 4}}

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.deck.inventory import radioss, read_inventory
-from d2rpick.deck.inventory.model import Inventory
 from d2rpick.deck.radioss import read_run
 from tests.deck.inventory.test_ls_dyna import counted, row
 from tests.shared import shared, shared_bytes
@@ -15,10 +14,13 @@ from tests.shared import shared, shared_bytes
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from d2rpick.deck.inventory.model import Inventory
+
 CAR = "openradioss/car_drop/"
 BEGIN = "#RADIOSS STARTER\n/BEGIN\nTEST\n      2022         0\n                  kg\n                  kg\n"
 PROPS = (
-    "/PROP/SHELL/1\nsh\n        24\n\n/PROP/SPRING/2\nspr\n                 0.1\n              200000                 300\n"
+    "/PROP/SHELL/1\nsh\n        24\n\n"
+    "/PROP/SPRING/2\nspr\n                 0.1\n              200000                 300\n"
     "/PROP/SPRING/3\nspr\n                 0.1\n              200000                   0\n"
     "/PROP/SOLID/4\nsol\n         1         4\n/PROP/SOLID/5\nsol\n         1         4"
     + "         0" * 5

@@ -398,6 +398,27 @@ def test_a_table_cut_anywhere_never_yields_a_wrong_number(
 
 
 @pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        ("", "0.5,12.25"),
+        ("time,IE\n", "0.5,12.25"),
+        ("IE,time\n", "12.25,0.5"),
+        ("time,IE,KE\n", "0.5,12.25,3.5"),
+        ("time,KE,IE\n", "0.5,3.5,12.25"),
+        ("Zeit;Innere Energie\n", "0,5;12,25"),
+        ("time IE\n", " 0.5 12.25"),
+    ],
+)
+def test_a_table_cut_inside_its_first_row_has_that_row_or_none(head: str, row: str) -> None:
+    for cut in range(len(row) + 1):
+        with contextlib.suppress(FormatError):
+            found = read(head + row[:cut])
+            assert (found.time.tolist(), found.energy.tolist()) in (([0.5], [12.25]), ([], []))
+            assert found.complete or (found.time.size == 0 and any("cut" in note for note in found.notes))
+    assert read(f"{head}{row}\n").energy.tolist() == [12.25]
+
+
+@pytest.mark.parametrize(
     ("rows", "states"),
     [
         ("0,1.00\n1,2.50\n2,3.75", 3),  # two decimals, as always

@@ -313,3 +313,14 @@ def test_what_is_no_model_or_no_window_is_refused() -> None:
         RigidWindow(0.2, 0.1)
     with pytest.raises(RangeError, match="end of the flight"):
         comparison_end(simulate(COARSE, 0.05), 0.06)
+
+
+def test_the_strength_of_the_roof_acts_after_the_landing_alone() -> None:
+    """It yields when it hits the ground; up to there the run is the same to the last digit."""
+    base, weak = (simulate(Parameters(mesh=8, roof_strength=share), 0.42) for share in (1.0, 0.7))
+    assert base.landed is not None
+    before = base.time < base.landed
+    np.testing.assert_array_equal(weak.internal_energy[before], base.internal_energy[before])
+    assert np.abs(weak.internal_energy - base.internal_energy).max() > 1.0
+    with pytest.raises(RangeError, match="roof_strength is 0"):
+        Parameters(roof_strength=0.0)

@@ -1,0 +1,121 @@
+"""Weights fitted to legs: what the legs tell is found, what they do not keeps its ratio."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.choice.calibrate import Observation, calibrate
+from d2rpick.choice.cost import MEASURED
+from d2rpick.choice.observed_cost import observations_of
+from d2rpick.errors import ConfigurationError, DeckError, FormatError
+from tests.deck.inventory.test_radioss import BEGIN, PROPS, nodes, wide
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+TRUE = {"QBAT": 2.0, "BT": 0.9, "solid": 1.5}
+REST, RIGID, NODES = 0.01, 0.1, 20_000
+ALL = {"QBAT": 400.0, "BT": 500.0, "solid": 300.0}
+
+
+def leg(counts: Mapping[str, float], rigid_nodes: float, *, elements: bool = True) -> Observation:
+    spent = sum(TRUE[name] * count for name, count in counts.items())
+    total = spent + REST * NODES + RIGID * rigid_nodes
+    return Observation("leg", counts, NODES, rigid_nodes, total, spent if elements else None)
+
+
+def legs(*, elements: bool = True) -> list[Observation]:
+    one_less = [leg({**ALL, name: 0.0}, NODES // 2, elements=elements) for name in ALL]
+    return [leg(ALL, 0, elements=elements), *one_less, leg(dict.fromkeys(ALL, 0.0), NODES, elements=elements)]
+
+
+@pytest.mark.parametrize("elements", [True, False])
+def test_weights_of_a_made_site_are_found(elements: bool) -> None:
+    found = calibrate(legs(elements=elements))
+    assert found.misfit < 0.03
+    for name, weight in TRUE.items():
+        assert found.weights.per_element[name] == pytest.approx(weight, rel=0.1)
+    assert found.weights.rigid_node == pytest.approx(RIGID, rel=0.15)
+    assert found.weights.element_share == pytest.approx(1 - REST * NODES / leg(ALL, 0).total, abs=0.03)
+    assert {*TRUE} <= {*found.told}
+
+
+def test_what_one_run_does_not_tell_apart_keeps_its_ratio() -> None:
+    found = calibrate([leg(ALL, 0)])
+    ratios = {found.weights.per_element[name] / MEASURED[name] for name in ALL}
+    assert max(ratios) / min(ratios) == pytest.approx(1, rel=0.02)
+    assert "solid" not in found.told
+
+
+def test_a_run_without_switching_is_needed() -> None:
+    with pytest.raises(ConfigurationError, match="no leg without rigid parts"):
+        calibrate([leg(ALL, 10)])
+
+
+def listing(cycles: int, elements: float, total: float) -> str:
+    """End of an engine listing."""
+    return (
+        f" ** CUMULATIVE CPU TIME SUMMARY **\n CONTACT SORTING.............: .2224E+00     1.53 %\n"
+        f" ELEMENT FORCES..............: {elements:.4E}    85.72 %\n"
+        f" TOTAL.......................: {total:.4E}   100.00 %\n"
+        f"     TOTAL NUMBER OF CYCLES  :   {cycles}\n"
+    )
+
+
+def run_folder(folder: Path) -> Path:
+    """A run of two legs, in the second of which part 1 of its two shells is rigid."""
+    parts = "".join(f"/PART/{n}\np{n}\n{wide(1, 1)}/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2))
+    body = f"/GRNOD/PART/1\ng\n{wide(1)}/RBODY/1\nbody\n{wide(9)[:-1]}{' ' * 50}{wide(1)}"
+    deck = f"{BEGIN}{nodes(9)}{parts}{PROPS}{body}/END\n"
+    (folder / "TEST_0000.rad").write_text(deck)
+    (folder / "TEST_0001.rad").write_text("/RUN/TEST/1\n0.1\n/RBODY/OFF\n9\n")
+    (folder / "TEST_0002.rad").write_text("/RUN/TEST/2\n0.2\n/RBODY/ON\n9\n")
+    (folder / "TEST_0001.out").write_text(listing(100, 0.8e-3, 1.0e-3))
+    (folder / "TEST_0002.out").write_text(listing(200, 0.8e-3, 1.4e-3))
+    return folder
+
+
+def test_legs_of_radioss_are_read_with_what_is_rigid_in_them(tmp_path: Path) -> None:
+    free, rigid = observations_of(str(run_folder(tmp_path)))
+    assert (free.counts, free.rigid_nodes) == ({"QEPH": 2.0}, 0.0)
+    assert [free.elements, free.total] == pytest.approx([8.0, 10.0])
+    assert (rigid.counts, rigid.rigid_nodes) == ({"QEPH": 1.0}, 4.0)
+    assert [rigid.elements, rigid.total] == pytest.approx([4.0, 7.0])
+    assert calibrate([free, rigid]).weights.per_element["QEPH"] == pytest.approx(4.0, rel=0.02)
+
+
+def test_a_glstat_tells_by_its_time_per_zone_cycle(tmp_path: Path) -> None:
+    windows = (
+        "*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1         0      0.02\n" + wide(0, 0, 0, 0, 1, 0) + wide(7, 0)
+        + "*DEFORMABLE_TO_RIGID_AUTOMATIC\n         2         0      0.05\n" + wide(0, 0, 0, 0, 0, 1) + wide(7)
+    )  # fmt: skip
+    shells = "".join(f"{n:8d}{part:8d}       1       2       3       4\n" for n, part in ((1, 7), (2, 9)))
+    section = "*SECTION_SHELL\n         1         2\n       1.0\n"
+    parts = "".join(f"*PART\np\n{part:10d}{1:10d}{1:10d}\n" for part in (7, 9))
+    mesh = "*NODE\n" + "".join(f"{n:8d}\n" for n in range(1, 5)) + f"*ELEMENT_SHELL\n{shells}"
+    (tmp_path / "main.k").write_text(f"*KEYWORD\n{parts}{section}{mesh}{windows}*END\n")
+    states = "".join(
+        f" time...........................   {time:.5E}\n time per zone cycle.(nanosec)..          {zone}\n"
+        for time, zone in ((0.0, 0), (0.01, 5000), (0.02, 5000), (0.03, 3000), (0.05, 3000), (0.06, 5000))
+    )
+    (tmp_path / "glstat").write_text(states)
+    free, rigid = observations_of(str(tmp_path))
+    assert (free.counts, free.elements) == ({"BT": 2.0}, None)
+    assert (rigid.counts, rigid.rigid_nodes) == ({"BT": 1.0}, 4.0)
+    assert [free.total, rigid.total] == pytest.approx([10.0, 6.0])
+
+
+def test_folders_that_say_nothing_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(DeckError, match="no main deck"):
+        observations_of(str(tmp_path))
+    folder = run_folder(tmp_path)
+    (folder / "TEST_0001.out").write_text("TOTAL NUMBER OF CYCLES : 7\n")
+    with pytest.raises(FormatError, match="no times of elements"):
+        observations_of(str(folder))
+    for name in ("TEST_0001.out", "TEST_0002.out"):
+        (folder / name).unlink()
+    with pytest.raises(FormatError, match="nothing says what the run took"):
+        observations_of(str(folder))

@@ -1,0 +1,134 @@
+"""The cost model: shares of a step, and what is said where they are not known."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.choice.cost import CostModel, Weights, saved_share
+from d2rpick.choice.weights_file import read_weights, written
+from d2rpick.deck.inventory.formulations import ls_dyna, radioss
+from d2rpick.deck.inventory.model import Elements, Formulation, Inventory, Material, PartData, Section
+from d2rpick.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+QBAT, UNKNOWN = Formulation("QBAT", "QBAT"), Formulation("strange", None, measured=False)
+
+
+def inventory(
+    counts: Mapping[int, int],
+    *,
+    solver: str = "ls-dyna",
+    formulations: Mapping[int, Formulation] | None = None,
+    rigid: int | None = None,
+    notes: tuple[str, ...] = (),
+) -> Inventory:
+    """Parts of shells in a row, each with nodes of its own."""
+    part = np.repeat(list(counts), list(counts.values()))
+    nodes = np.arange(4 * part.size).reshape(-1, 4)
+    own = formulations or {}
+    parts = {
+        one: PartData(
+            one, f"part {one}", Material("MAT", "rigid" if one == rigid else "deformable"),
+            Section({"shell": own.get(one, QBAT)}),
+        )
+        for one in counts
+    }  # fmt: skip
+    elements = (Elements("shell", part, nodes),)
+    return Inventory(solver, parts, elements, np.zeros((4 * part.size, 3)), notes, complete=not notes)
+
+
+def test_shares_of_parts_of_one_formulation_are_those_of_their_elements() -> None:
+    model = CostModel(inventory({1: 30, 2: 70}), Weights(rigid_node=0.0))
+    assert [model.share_of(part).value for part in (1, 2)] == pytest.approx([0.3, 0.7])
+    assert model.saved([2]).value == pytest.approx(0.7 * 0.87)
+    assert model.saved([1, 2]).value == pytest.approx(0.87)
+
+
+def test_elements_that_are_rigid_from_the_start_cost_nothing() -> None:
+    model = CostModel(inventory({1: 30, 2: 70}, rigid=2))
+    assert model.share_of(1).value == 1.0
+    assert model.saved([2]).value == 0.0
+
+
+def test_a_formulation_without_a_weight_leaves_every_share_open_but_with_one_of_its_own_it_is_known() -> None:
+    found = inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
+    share = CostModel(found).saved([1])
+    assert share.value is None
+    assert "strange" in str(share.reason)
+    assert CostModel(found, Weights({"QBAT": 1.0, "strange": 3.0})).share_of(1).value == pytest.approx(30 / 240)
+
+
+def test_a_deck_that_is_not_whole_leaves_the_cost_open() -> None:
+    share = CostModel(inventory({1: 30}, notes=("mesh.k was not read",))).saved([1])
+    assert share.value is None
+    assert "mesh.k was not read" in str(share.reason)
+
+
+def test_formulations_that_were_not_measured_are_named() -> None:
+    own = {1: QBAT, 2: Formulation("fully integrated (ELFORM 16)", "QBAT", measured=False)}
+    found = inventory({1: 1, 2: 1}, formulations=own)
+    assert CostModel(found).assumed == ("fully integrated (ELFORM 16)",)
+    assert CostModel(found, Weights({"QBAT": 1.0, own[2].name: 1.0})).assumed == ()
+
+
+@given(
+    total=st.floats(1.0, 1e9), part=st.floats(0.0, 1.0), share=st.floats(0.01, 1.0), nodes=st.integers(0, 10**6),
+    scale=st.floats(1e-3, 1e3),
+)  # fmt: skip
+def test_the_saved_share_lies_between_0_and_that_of_the_elements_and_has_no_unit(
+    total: float, part: float, share: float, nodes: int, scale: float
+) -> None:
+    weights = Weights({"BT": 1.0}, share, 0.05)
+    scaled = Weights({"BT": scale}, share, 0.05 * scale)
+    found = saved_share(weights, total, part * total, nodes)
+    assert 0.0 <= found <= share * (1 + 1e-12)
+    assert saved_share(scaled, scale * total, scale * part * total, nodes) == pytest.approx(found, abs=1e-9)
+    assert saved_share(weights, total, total, 0) == pytest.approx(share)
+
+
+@pytest.mark.parametrize(
+    ("found", "cost"),
+    [
+        (radioss("shell", 12, 0, 0), "QBAT"), (radioss("shell", 24, 0, 0), "QEPH"), (radioss("shell", 3, 0, 0), "BT"),
+        (radioss("shell", 99, 0, 0), None), (radioss("solid", 0, 0, 24), "solid"), (ls_dyna("shell", 2), "BT"),
+        (ls_dyna("shell", 16), "QBAT"), (ls_dyna("shell", 99), None), (ls_dyna("spring", 0), "spring"),
+    ],
+)  # fmt: skip
+def test_classes_of_formulations(found: Formulation, cost: str | None) -> None:
+    assert found.cost == cost
+    assert not (found.measured and "ELFORM" in found.name)
+
+
+def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
+    weights = Weights({"BT": 0.3, 'a "strange" one': 2.5}, 0.9, 0.01, "site")
+    (tmp_path / "site.toml").write_text(written(weights), "utf-8")
+    assert read_weights(str(tmp_path / "site.toml")) == weights
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "no table"), ("[per_element]\nBT = 'much'", "BT is 'much'"), ("[per_element]\nBT = -1", "at least 0"),
+        ("[per_element]\nBT = 0", "no weight is above 0"), ("element_share = 2\n[per_element]\nBT = 1", "up to 1"),
+        ("elementshare = 1\n[per_element]\nBT = 1", "not a key"), ("= 1", "cannot be read"),
+        ("[per_element]\nBT = nan", "at least 0"), ("[per_element]\nBT = true", "BT is True"),
+    ],
+)  # fmt: skip
+def test_weights_that_make_no_sense_are_refused_with_the_file(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "site.toml").write_text(text, "utf-8")
+    with pytest.raises(ConfigurationError, match="site") as error:
+        read_weights(str(tmp_path / "site.toml"))
+    assert told in str(error.value)
+
+
+def test_counts_by_part_are_counters() -> None:
+    assert inventory({1: 3}).counts == {1: Counter(shell=3)}

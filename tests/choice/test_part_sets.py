@@ -1,0 +1,170 @@
+"""Verdicts on parts, and sets of them: on a made run, and on the car that a real solver computed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.cost import CostModel
+from d2rpick.choice.part_sets import Parts, parts_of, recommended_parts
+from d2rpick.choice.part_steps import Steps
+from d2rpick.choice.settings import Settings
+from d2rpick.deck.inventory import read_inventory
+from d2rpick.errors import FormatError
+from d2rpick.histories.opening import open_run
+from d2rpick.vibration.measures import run_time_share
+from tests.command import ROOT
+from tests.sample_deck import DECK
+from tests.shared import shared, shared_bytes
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
+CAR = "openradioss/car_drop/"
+
+
+def asked(history: str, deck: str | None = None, **more: object) -> Parts:
+    model = CostModel(read_inventory(deck)) if deck else None
+    return parts_of(open_run([history]), Settings(), model, **more)  # type: ignore[arg-type]
+
+
+def test_without_a_deck_no_verdict_is_guessed_and_the_cost_stays_open() -> None:
+    found = asked(BOX)
+    assert [row.verdict for row in found.rows] == ["unknown", "unknown"]
+    assert [row.cost_share for row in found.rows] == [None, None]
+    assert found.sets == ()
+    assert found.recommended is None
+    assert [caution.code for caution in found.cautions] == ["no-deck"]
+    assert all(row.flight and row.flight.flies and row.flight.mean for row in found.rows)
+
+
+def test_parts_of_the_box_are_one_body_and_the_sled_is_rigid_already() -> None:
+    found = asked(BOX, str(DECK))
+    assert [(row.verdict, row.merge_with) for row in found.rows] == [("switch", None), ("merge", 1), ("keep", None)]
+    assert found.rows[2].reasons == ("already rigid",)
+    best = found.recommended
+    assert best is not None
+    assert (best.parts, best.bodies) == ((1, 2), ((1, 2),))
+    assert best.step_growth == float("inf")
+    assert best.rigid_fraction is not None
+    assert best.cost_share is not None
+    assert best.run_time_share == pytest.approx(run_time_share(best.rigid_fraction, best.cost_share, 1.0))
+
+
+def variant(folder: Path, *changes: tuple[str, str]) -> str:
+    text = DECK.read_text("utf-8")
+    for before, after in changes:
+        assert before in text
+        text = text.replace(before, after)
+    (folder / "main.k").write_text(text, "utf-8")
+    return str(folder / "main.k")
+
+
+STEP = "step\n         2         2         1"
+PLASTIC = "*MAT_PIECEWISE_LINEAR_PLASTICITY"
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ([(STEP, "step\n         2         2         3"), ("*END", "*MAT_FABRIC\n         3\n*END")], "airbag fabric"),
+        ([(STEP, "step\n         2         2         3"), ("*END", "*MAT_NULL\n         3\n*END")], "void material"),
+        ([("*ELEMENT_SHELL", "*ELEMENT_SHELL\n*SECTION_SOLID\n         9         1\n*ELEMENT_SHELL"),
+          (STEP, "step\n         2         9         1")], "do not turn"),
+    ],
+)  # fmt: skip
+def test_a_part_that_must_stay_deformable_is_kept_with_the_reason(
+    tmp_path: Path, changes: list[tuple[str, str]], reason: str
+) -> None:
+    found = asked(BOX, variant(tmp_path, *changes))
+    assert found.rows[1].verdict == "keep"
+    assert reason in " ".join(found.rows[1].reasons)
+    assert found.rows[0].verdict == "switch"
+
+
+def test_a_part_whose_material_is_missing_is_not_judged(tmp_path: Path) -> None:
+    found = asked(BOX, variant(tmp_path, (STEP, "step\n         2         2         5")))
+    assert (found.rows[1].verdict, found.rows[1].reasons) == ("unknown", ("its material is not in the deck",))
+
+
+def test_elements_in_a_file_that_is_missing_are_not_taken_for_none(tmp_path: Path) -> None:
+    part = "\nmore\n         4         1         1\n*SECTION_SHELL"
+    whole = asked(BOX, variant(tmp_path, ("\n*SECTION_SHELL", part)))
+    assert (whole.rows[3].verdict, whole.rows[3].reasons) == ("keep", ("no elements",))
+    found = asked(BOX, variant(tmp_path, ("\n*SECTION_SHELL", part), ("*END", "*INCLUDE\nmesh.k\n*END")))
+    assert found.rows[3].verdict == "unknown"
+    assert "not in what was read of the deck" in found.rows[3].reasons[0]
+    assert found.recommended is None
+
+
+def test_rigid_in_the_deck_but_with_energy_in_the_history_is_not_taken_for_rigid(tmp_path: Path) -> None:
+    found = asked(BOX, variant(tmp_path, (STEP, "step\n         2         2         2")))
+    assert found.rows[1].verdict == "merge"
+    assert "rigid in the deck, but it has internal energy in the history" in found.rows[1].reasons
+
+
+def test_a_deck_of_another_run_is_noticed(tmp_path: Path) -> None:
+    found = asked(BOX, variant(tmp_path, (STEP, "step\n        22         2         1")))
+    assert "parts-not-in-deck" in [caution.code for caution in found.cautions]
+    assert found.rows[1].verdict == "unknown"
+    assert found.recommended is None  # elements of a part that no *PART defines: the cost is not known
+    with pytest.raises(FormatError, match="no set of parts can be recommended"):
+        recommended_parts(open_run([BOX]), Settings(), CostModel(read_inventory(str(tmp_path / "main.k"))))
+
+
+def test_the_step_grows_by_what_stays_deformable() -> None:
+    steps = Steps(computed={1: 2e-6, 2: 6e-6}, printed={3: (3e-6, "glstat")})
+    assert steps.growth({1}, [1, 2, 3]) == pytest.approx(1.5)
+    assert steps.growth({2}, [1, 2, 3]) == 1.0
+    assert steps.growth({1, 2, 3}, [1, 2, 3]) == float("inf")
+    assert steps.growth({1}, [1, 2, 4]) is None  # the step of part 4 is not known
+    assert steps.growth({1, 4}, [1, 2, 4]) == 3.0
+
+
+@pytest.fixture(scope="module")
+def car(tmp_path_factory: pytest.TempPathFactory) -> Parts:
+    deck = tmp_path_factory.mktemp("car") / "CAR_0000.rad"
+    deck.write_bytes(shared_bytes(f"{CAR}decks/CAR_0000.rad.gz"))
+    return asked(str(shared(f"{CAR}carT01.gz")), str(deck), given=[12, 13, 14], times=(0.0496, 0.1464))
+
+
+def test_verdicts_on_the_car(car: Parts) -> None:
+    rows = {row.title: row for row in car.rows}
+    assert {name for name, row in rows.items() if not row.movable} == {"mounts", "suspension", "latches", "ground"}
+    assert all("dampers" in " ".join(rows[name].reasons) for name in ("mounts", "suspension", "latches"))
+    stopped = {name for name, row in rows.items() if row.flight and row.flight.deforms is False and row.movable}
+    assert stopped == {"floor", "side_p", "side_m", "bulkheads", "bows"}
+    assert {name for name, row in rows.items() if row.merge_with == 1} == {*rows} - {
+        *("floor", "engine", "wheels", "mounts", "suspension", "latches", "ground"),
+    }  # fmt: skip
+
+
+def test_savings_of_the_car_are_within_five_points_and_in_order(car: Parts) -> None:
+    measured = {"all that may": (0.80, 0.31), "stopped deforming": (0.33, 0.13), "given": (0.20, 0.075)}
+    found = {one.name: one for one in car.sets}
+    run = (0.1464 - 0.0496) / 0.24  # the runs that were measured ended at 0.24
+    predicted = {}
+    for name, (per_step, saving) in measured.items():
+        share = found[name].cost_share
+        assert share is not None
+        assert share == pytest.approx(per_step, abs=0.08)
+        predicted[name] = 1 - run_time_share(run, share, 1.0)
+        assert predicted[name] == pytest.approx(saving, abs=0.05)
+    assert sorted(predicted, key=lambda name: predicted[name]) == ["given", "stopped deforming", "all that may"]
+    assert car.recommended is found["all that may"]
+
+
+def test_where_the_car_comes_to_rest(car: Parts) -> None:
+    found = {one.name: one for one in car.sets}
+    assert found["all that may"].position_error == pytest.approx(2.2e-3, abs=0.7e-3)  # as the solver found, 30 %
+    assert found["given"].position_error is None  # six bodies
+    assert any("several rigid bodies" in reason for reason in found["given"].reasons)
+    assert all(one.angle_error is None for one in car.sets)
+
+
+def test_masses_that_are_written_come_before_those_of_the_deck(car: Parts) -> None:
+    assert {row.mass_source for row in car.rows} == {"history"}
+    assert np.isclose(sum(row.mass or 0.0 for row in car.rows if row.movable), 845.5, atol=0.2)

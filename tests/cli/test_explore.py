@@ -1,0 +1,110 @@
+"""``explore``: its forms, its schema, and that every td is what ``suggest`` says of it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import jsonschema
+import pytest
+
+import d2rpick as d2
+from tests.command import BOX, ENERGY, ROOT, answer, run
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
+WINDOW = ("--td-window", "0.06", "0.07", "--steps", "20")
+SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("explored", "options", "source"),
+    [
+        (WINDOW, (), ENERGY),
+        ((*WINDOW, "--td", "0.064"), ("--cost-share", "0.8"), ENERGY),
+        (("--steps", "6"), ("--part", "box"), MATSUM),
+        (("--steps", "3"), ("--part", "box", "--strict", "--max-residual", "0.1"), BOX),
+    ],
+)
+def test_the_json_keeps_its_schema_and_every_offer_is_what_suggest_says(
+    explored: tuple[str, ...], options: tuple[str, ...], source: str
+) -> None:
+    found = answer("explore", *explored, *options, source)
+    jsonschema.validate(found, SCHEMA)
+    offers = found["offers"]
+    assert offers[0].keys() == SCHEMA["properties"]["offers"]["items"]["properties"].keys()
+    assert all(low["td"] < high["td"] for low, high in pairwise(offers))
+    for one in offers[:: max(1, len(offers) // 5)]:
+        alone = answer("suggest", "--td", repr(one["td"]), *options, source)
+        best = next((c for c in alone["candidates"] if c["recommended"]), None)
+        assert (one["tr"], one["td"]) == (best and best["tr"], alone["td"])
+        assert (one["kinetic_share"], one["energy_td"], one["basis"]) == (
+            alone["kinetic_share"], alone["energy_td"], alone["basis"],
+        )  # fmt: skip
+        assert (one["quality"], one["expected"]) == (alone["quality"], alone["expected"])
+        for name in ("residual", "level_error", "lock_in_error", "timing_tolerance", "rigid_time", "run_time_share"):
+            assert one[name] == (best and best[name])
+
+
+def test_the_recommended_pair_is_that_of_suggest() -> None:
+    found, chosen = answer("explore", *WINDOW, ENERGY), answer("suggest", *WINDOW[:3], ENERGY)
+    assert found["recommended"] == chosen["recommended"]
+    (marked,) = (one for one in found["offers"] if one["recommended"])
+    assert {"tr": marked["tr"], "td": marked["td"]} == found["recommended"]
+
+
+def test_the_sentence_says_what_a_step_changes() -> None:
+    found = answer("explore", "--td", "0.064", *WINDOW, ENERGY)
+    assert found["answer"] == (
+        "td = 0.064: residual 0.957; 0.0048 later (tr = 0.0135867, td = 0.0687534) cuts the error to 0.000 "
+        "and makes the rigid time 7.9% longer"
+    )
+    assert (found["start"], found["step"]) == (0.064, found["recommended"]["td"])
+    near = answer("explore", "--td", "0.07", *WINDOW, ENERGY)["answer"]
+    assert near.startswith("td = 0.07: residual 0.299; 0.001 earlier (")
+    assert "costs 1." in near
+    good = answer("explore", "--td", "0.0687534", *WINDOW, ENERGY)["answer"]
+    assert good == "td = 0.0687534: residual 0.000; no other td in the window is better"
+
+
+def test_every_form_has_the_same_offers(tmp_path: Path) -> None:
+    found = answer("explore", *WINDOW, ENERGY)["offers"]
+    rows = list(csv.DictReader(io.StringIO(run("explore", *WINDOW, "-f", "csv", ENERGY).stdout)))
+    assert [float(row["td"]) for row in rows] == [one["td"] for one in found]
+    assert [float(row["residual"]) for row in rows] == [one["residual"] for one in found]
+    frame = d2.explore(d2.read(ENERGY), td_window=(0.06, 0.07), steps=20).to_frame()
+    assert frame["td"].tolist() == [one["td"] for one in found]
+    assert frame["unbeaten"].tolist() == [one["unbeaten"] for one in found]
+    table = run("explore", *WINDOW, "--limit", "3", ENERGY).stdout
+    assert f"... and {len(found) - 3} more td" in table
+    assert run("explore", *WINDOW, "-f", "markdown", ENERGY).stdout.startswith("|  | td |")
+    picture = tmp_path / "x.svg"
+    assert run("explore", *WINDOW, "-q", "--plot", str(picture), ENERGY).exit_code == 0
+    assert b"<svg" in picture.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("args", "told"),
+    [
+        (("--td-window", "0.07", "0.06"), "the lower time first"),
+        (("--td-window", "1", "2"), "outside the record"),
+        (("--td", "9"), "outside the record"),
+        (("--steps", "0"), "--steps"),
+    ],
+)
+def test_what_cannot_be_explored_is_refused(args: tuple[str, ...], told: str) -> None:
+    result = run("explore", *args, ENERGY)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert told in result.stderr
+
+
+def test_nothing_to_recommend_is_an_objection() -> None:
+    result = run("explore", "--steps", "4", "--max-residual", "0.001", "--td-window", "0.06", "0.064", ENERGY)
+    assert result.exit_code == 1
+    assert "no td in the window has an acceptable tr" in result.stdout
+    assert "no-candidate" in result.stderr

@@ -1,0 +1,149 @@
+"""The commands ``parts`` and ``calibrate`` in all their forms, and ``--deck`` where a cost share was asked for."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.choice.test_calibrate import run_folder
+from tests.cli.test_output import check_by_schema
+from tests.command import ROOT, answer, run
+from tests.sample_deck import DECK
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
+ENERGY = str(ROOT / "sample_data" / "energy.csv")
+WITH_DECK = ("--deck", str(DECK), BOX)
+
+
+@pytest.mark.parametrize("args", [WITH_DECK, (BOX,), ("--td", "0.37", *WITH_DECK), ("--deck", str(DECK), ENERGY)])
+def test_the_answer_keeps_its_schema(args: tuple[str, ...]) -> None:
+    found = answer("parts", *args)
+    check_by_schema(found)
+    assert (found["deck"] is None) == ("--deck" not in args)
+
+
+def test_all_forms_hold_the_same() -> None:
+    found = answer("parts", *WITH_DECK)
+    rows = list(csv.DictReader(io.StringIO(run("parts", "-q", "-f", "csv", *WITH_DECK).stdout)))
+    assert [row["verdict"] for row in rows] == [row["verdict"] for row in found["parts"]] == ["switch", "merge", "keep"]
+    assert rows[0]["elements"] == "94 shell"
+    assert run("parts", "-q", "-f", "value", *WITH_DECK).stdout == "1,2\n"
+    for form in ("table", "markdown"):
+        text = run("parts", "-q", "-f", form, *WITH_DECK).stdout
+        assert all(words in text for words in ("merge with 1", "already rigid", "all that may", "one rigid body"))
+    assert found["recommended"]["parts"] == [1, 2]
+
+
+def test_a_set_of_ones_own_is_compared() -> None:
+    sets = {tuple(one["parts"]): one for one in answer("parts", "--part", "step", *WITH_DECK)["sets"]}
+    assert sets[(2,)]["saving"] < sets[(1,)]["saving"] < sets[(1, 2)]["saving"]
+
+
+def test_a_given_window_and_step_ratio_count() -> None:
+    found = answer("parts", "--tr", "0.1", "--td", "0.3", "--step-ratio", "2", *WITH_DECK)
+    best = found["sets"][0]
+    assert (best["tr"], best["td"], found["step_ratio"]) == (0.1, 0.3, 2.0)
+    share = best["rigid_fraction"] * (1 - (1 - best["cost_share"]) / 2)
+    assert best["saving"] == pytest.approx(share)
+
+
+def test_the_page_holds_parts_and_sets(tmp_path: Path) -> None:
+    page = tmp_path / "parts.html"
+    assert run("parts", "-q", "--report", str(page), *WITH_DECK).exit_code == 0
+    text = page.read_text("utf-8")
+    assert all(words in text for words in ("all that may", "merge with 1", "already rigid", "SHA-256"))
+    assert "http" not in text.replace("http-equiv", "")
+
+
+@pytest.mark.parametrize(
+    ("args", "told"),
+    [
+        (("--tr", "0.1", BOX), "--tr needs --td"),
+        (("--tr", "0.3", "--td", "0.1", BOX), "tr must lie before td"),
+        (("--weights", "site.toml", BOX), "--weights needs --deck"),
+        (("--deck", "absent.k", BOX), "absent.k"),
+        (("--deck", BOX, BOX), "no keyword was found"),
+        (("--energy", "1", BOX), "--energy names one energy"),
+        (("--part", "77", *WITH_DECK), "no part 77"),
+        (("--weights", str(DECK), *WITH_DECK), "TOML file of weights was expected"),
+    ],
+)
+def test_wrong_use_is_said_in_one_line(args: tuple[str, ...], told: str) -> None:
+    result = run("parts", *args)
+    assert result.exit_code == 2
+    assert told in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_where_nothing_can_be_recommended_the_answer_is_an_objection(tmp_path: Path) -> None:
+    other = tmp_path / "main.k"
+    other.write_text(
+        DECK.read_text("utf-8").replace("         1         2       1.0", "         1        99       1.0")
+    )
+    result = run("parts", "--deck", str(other), BOX)
+    assert result.exit_code == 1
+    assert "no weight is known for shell (ELFORM 99)" in result.stdout
+    assert run("parts", "--exit-zero", "--deck", str(other), BOX).exit_code == 0
+    weights = tmp_path / "site.toml"
+    weights.write_text('[per_element]\n"shell (ELFORM 99)" = 1.0\nQBAT = 1.0\nBT = 1.0\n')
+    assert run("parts", "--deck", str(other), "--weights", str(weights), BOX).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "command", [("suggest", "--td", "0.37"), ("plan",), ("verify", "--tr", "0.0960392", "--td", "0.37")]
+)
+def test_a_deck_takes_the_place_of_a_cost_share(command: tuple[str, ...]) -> None:
+    def share(*more: str) -> float:
+        text = run(*command, "-q", "-f", "json", *more, BOX).stdout
+        found = json.loads(text)
+        rows = found.get("windows") or found.get("candidates") or [found]
+        return float(next(row["run_time_share"] for row in rows if row.get("recommended", True)))
+
+    cost = answer("parts", *WITH_DECK)["sets"][0]["cost_share"]
+    by_deck = share("--part", "1,2", "--deck", str(DECK))
+    assert by_deck == pytest.approx(share("--part", "1,2", "--cost-share", str(cost)))
+    assert share("--part", "recommended", "--deck", str(DECK)) == by_deck
+    assert share("--part", "1,2", "--deck", str(DECK), "--cost-share", "0.1") == share(
+        "--part", "1,2", "--cost-share", "0.1"
+    )
+
+
+def test_recommended_needs_a_deck_and_stands_alone() -> None:
+    result = run("plan", "--part", "recommended", BOX)
+    assert (result.exit_code, "--part recommended needs --deck" in result.stderr) == (2, True)
+    result = run("plan", "--part", "recommended", "--part", "3", *WITH_DECK)
+    assert (result.exit_code, "stands for a whole set" in result.stderr) == (2, True)
+
+
+def test_a_cost_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
+    cut = tmp_path / "main.k"
+    cut.write_text(DECK.read_text("utf-8").replace("*END", "*INCLUDE\nabsent.k\n*END"))
+    found = answer("plan", "--part", "1,2", "--deck", str(cut), BOX)
+    check_by_schema(found)
+    assert found["run_time_share"] is None
+    assert "absent.k was not read" in next(one["message"] for one in found["warnings"] if one["code"] == "cost-unknown")
+    whole = answer("suggest", "--td", "0.37", *WITH_DECK)
+    assert "cost-unknown" in [one["code"] for one in whole["warnings"]]  # no parts are named
+
+
+def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    folder = str(run_folder(tmp_path / "run"))
+    found = answer("calibrate", folder)
+    check_by_schema(found)
+    assert found["told"]
+    for form in ("table", "markdown", "csv"):
+        assert "QEPH" in run("calibrate", "-f", form, folder).stdout
+    site = tmp_path / "site.toml"
+    assert run("calibrate", "-f", "toml", "-o", str(site), folder).exit_code == 0
+    result = run("parts", "-q", "-f", "json", "--weights", str(site), "--exit-zero", *WITH_DECK)
+    assert json.loads(result.stdout)["weights"]["per_element"].keys() == {"QEPH"}
+    (tmp_path / "empty").mkdir()
+    assert run("calibrate", str(tmp_path / "empty")).exit_code == 2
