@@ -95,10 +95,10 @@ def command(
 def _page(found: TradeOff, run: Run, options: dict[str, Any]) -> str:
     """Draw the figures, wide and narrow, and write the page around them."""
     from d2rpick.choice.judged_card import input_for
-    from d2rpick.report.page import Record
+    from d2rpick.report.page import PageContext
     from d2rpick.report.trade_off_page import as_page, drawn
 
     request = card_request(run, options, found.situation.history)
     pair, judging = found.suggestion.recommended, shared.judging(options)
     card = input_for(found.suggestion.situation, pair.tr, request) if pair else None
-    return as_page(found, Record(run, shared.repeat(), judging, drawn(found), card, explorer=explorer_of([found])))
+    return as_page(found, PageContext(run, shared.repeat(), judging, drawn(found), card, explorer=explorer_of([found])))

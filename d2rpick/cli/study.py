@@ -21,7 +21,7 @@ from d2rpick.report.formats import FORMATS, Shown, write
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.studies.row import Row
+    from d2rpick.studies.row import StudyRow
     from d2rpick.studies.study import Question, Study
     from d2rpick.studies.workers import Farm
 
@@ -165,7 +165,7 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
         raise D2RPickError(f"{name}: --resume and standard output are the same file; send one elsewhere")
 
 
-def _files_of(rows: Sequence[Row]) -> tuple[str, ...]:
+def _files_of(rows: Sequence[StudyRow]) -> tuple[str, ...]:
     """Files that were read, those in folders too."""
     return tuple(dict.fromkeys(stamp.name for row in rows for stamp in row.files))
 
@@ -188,7 +188,7 @@ def _write_files(answer: Study, plot: str | None, report: str | None, output: Ou
         output.write(report, text_bytes(with_options(as_page(answer, shared.repeat(), drawing))))
 
 
-def _rows(question: Question, sources: Sequence[str], work: Work, *, quiet: bool) -> Iterator[Row]:
+def _rows(question: Question, sources: Sequence[str], work: Work, *, quiet: bool) -> Iterator[StudyRow]:
     """Rows in the order of the runs, each as soon as those before it are there."""
     from d2rpick.studies.resume_file import Ledger
     from d2rpick.studies.study import ask, failed

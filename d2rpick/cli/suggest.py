@@ -127,7 +127,7 @@ def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> 
     """Draw the figures, wide and narrow, explore the flight, and write the page around them."""
     from d2rpick.choice.explored import explored_around
     from d2rpick.choice.judged_card import input_for
-    from d2rpick.report.page import Record
+    from d2rpick.report.page import PageContext
     from d2rpick.report.suggestion_page import as_page, drawn
 
     run = reference.run
@@ -135,7 +135,7 @@ def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> 
     card = input_for(answer.situation, pair.tr, request) if pair else None
     explorer = explorer_of([explored_around(reference, answer.situation, answer.td_window)])
     judging = shared.judging(options)
-    return as_page(answer, Record(run, shared.repeat(), judging, drawn(answer), card, explorer=explorer))
+    return as_page(answer, PageContext(run, shared.repeat(), judging, drawn(answer), card, explorer=explorer))
 
 
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:

@@ -101,7 +101,7 @@ def _page(answer: Verdict, reference: Reference, switched: Run | None, options: 
     """Draw the figure, wide and narrow, explore the flight, and write the page around it."""
     from d2rpick.choice.explored import explored_around
     from d2rpick.choice.judged_card import input_for
-    from d2rpick.report.page import Record
+    from d2rpick.report.page import PageContext
     from d2rpick.report.verdict_page import as_page, drawn
 
     run = reference.run
@@ -109,4 +109,4 @@ def _page(answer: Verdict, reference: Reference, switched: Run | None, options: 
     card = input_for(answer.situation, answer.candidate.tr, request) if answer.verified else None
     explorer = explorer_of([explored_around(reference, answer.situation)])
     judging = shared.judging(options)
-    return as_page(answer, Record(run, shared.repeat(), judging, drawn(answer), card, switched, explorer))
+    return as_page(answer, PageContext(run, shared.repeat(), judging, drawn(answer), card, switched, explorer))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from d2rpick.library.arguments import Choosing, Parts
     from d2rpick.library.runs import Run
     from d2rpick.report.explorer import Explorer
-    from d2rpick.report.page import Record
+    from d2rpick.report.page import PageContext
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ class Answer:
         figures: dict[str, tuple[str, str]],
         tr: float | None,
         td_window: tuple[float, float] | None = None,
-    ) -> Record:
+    ) -> PageContext:
         from d2rpick.choice.explored import explored_around
         from d2rpick.choice.judged_card import CardRequest, input_for
         from d2rpick.choice.of_run import Reference
@@ -379,11 +379,11 @@ def page_record(
     figures: dict[str, tuple[str, str]],
     card: SolverInput | None,
     explorer: Explorer | None,
-) -> Record:
+) -> PageContext:
     """Give what a page shows besides the answer that ``command`` repeats."""
-    from d2rpick.report.page import Record
+    from d2rpick.report.page import PageContext
 
-    return Record(run.files, ("d2rpick", *command), (), figures, card, explorer=explorer)
+    return PageContext(run.files, ("d2rpick", *command), (), figures, card, explorer=explorer)
 
 
 def written(path: arguments.Path, page: str) -> Path:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.warnings import Caution
     from d2rpick.library.arguments import Choosing, Parts
     from d2rpick.studies.common import Common
-    from d2rpick.studies.row import Row
+    from d2rpick.studies.row import StudyRow
     from d2rpick.studies.study import Study as Core
 
 
@@ -35,7 +35,7 @@ class Study:
     """
 
     td: float | None
-    runs: tuple[Row, ...] = field(repr=False)
+    runs: tuple[StudyRow, ...] = field(repr=False)
     agree: bool | None
     common: Common
     warnings: tuple[Caution, ...]
@@ -145,7 +145,7 @@ def study(
     question = Question(asked, arguments.settings(choosing), selection, known_format(input_format), True)
     if not (isinstance(jobs, int) and jobs > 0):
         raise ValueError(f"jobs is {jobs!r}, a whole number of at least 1 was expected")
-    rows: dict[int, Row] = {}
+    rows: dict[int, StudyRow] = {}
     with on_cores(min(jobs, len(names)), "d2rpick.studies.study") as farm:
         for answer in answers(farm, partial(ask, question), names):
             row = failed(names[answer.number], answer.error) if answer.error else answer.result

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.models.rollover.model import Parameters, Plane
     from d2rpick.models.rollover.record import Record
-    from d2rpick.studies.row import Row
+    from d2rpick.studies.row import StudyRow
 
 TD: Final = 0.37
 _END: Final = 0.42
@@ -49,7 +49,7 @@ class Tried(NamedTuple):
     """
 
     variant: Variant
-    row: Row
+    row: StudyRow
     level_error: float
     roll_error: float
     end_error: float
@@ -192,7 +192,7 @@ def tried(base: Parameters) -> Trial:
     return Trial(window, bool(common.keeps_tolerance), runs, three)
 
 
-def _at(variant: Variant, row: Row, error: float, common: RigidWindow) -> Tried:
+def _at(variant: Variant, row: StudyRow, error: float, common: RigidWindow) -> Tried:
     reference, run = _run(variant.parameters), _run(variant.parameters, common)
     outcome = compare(reference, run, common.tr, common.td)
     end = float(np.degrees(run.roll[-1] - reference.roll[-1]))

@@ -38,21 +38,21 @@ COLUMNS: Final = 480
 _READ: Final = 3
 
 
-class Row(NamedTuple):
+class OfferRow(NamedTuple):
     """One td: ``numbers`` for the curves, and ``texts``, what stands beside them; both by name."""
 
     numbers: dict[str, Any]
     texts: dict[str, str]
 
 
-def table_of(rows: Sequence[Row]) -> dict[str, Any]:
+def table_of(rows: Sequence[OfferRow]) -> dict[str, Any]:
     """Give rows with their names written once: ``numbers`` and ``texts``, and in ``rows`` the values of both."""
     texts = list(dict.fromkeys(name for row in rows for name, text in row.texts.items() if text))
     values = [[list(row.numbers.values()), [row.texts.get(name, "") for name in texts]] for row in rows]
     return {"numbers": list(rows[0].numbers), "texts": texts, "rows": values}
 
 
-def row_of(offer: Offer, start: Offer, view: View, unit: str, deformation: float | None) -> Row:
+def row_of(offer: Offer, start: Offer, view: View, unit: str, deformation: float | None) -> OfferRow:
     """Give one td.
 
     Parameters
@@ -79,7 +79,7 @@ def row_of(offer: Offer, start: Offer, view: View, unit: str, deformation: float
         "peak": int(offer.peak),
         "unbeaten": int(offer.unbeaten),
     }
-    return Row(numbers, _texts(offer, start, f" {unit}" if unit else ""))
+    return OfferRow(numbers, _texts(offer, start, f" {unit}" if unit else ""))
 
 
 def _columns(windows: Sequence[AcceptableWindow], view: View) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from d2rpick.histories.history import Samples
-    from d2rpick.studies.row import Row
+    from d2rpick.studies.row import StudyRow
     from d2rpick.studies.study import Study
 
 # Okabe and Ito's palette, without the yellow that white swallows; dashes tell apart lines of the same colour.
@@ -44,7 +44,7 @@ _LOWEST: Final = 50.0
 
 
 class _Named(NamedTuple):
-    row: Row
+    row: StudyRow
     name: str
     colour: str
     pattern: str
@@ -76,7 +76,7 @@ def draw_study(answer: Study, *, narrow: bool = False) -> Figure:
     return figure
 
 
-def _named(drawn: Sequence[Row]) -> list[_Named]:
+def _named(drawn: Sequence[StudyRow]) -> list[_Named]:
     """Give the runs that have a colour and a name: all where they are few, else those that stand out."""
     chosen = list(drawn) if len(drawn) <= _NAMED else list(outliers(drawn))[:_MOST_OUTLIERS]
     names = dict(zip(map(id, drawn), short_names([row.source for row in drawn]), strict=True))
@@ -87,7 +87,7 @@ def _named(drawn: Sequence[Row]) -> list[_Named]:
     ]
 
 
-def _draw_others(axes: Axes, drawn: Sequence[Row], named: Sequence[_Named]) -> None:
+def _draw_others(axes: Axes, drawn: Sequence[StudyRow], named: Sequence[_Named]) -> None:
     """Draw the runs without a name in grey; taken together they stay as dark as ten lines."""
     told = {id(one.row) for one in named}
     curves = [row.curve.T for row in drawn if row.curve is not None and id(row) not in told]
@@ -101,7 +101,7 @@ def _draw_others(axes: Axes, drawn: Sequence[Row], named: Sequence[_Named]) -> N
     axes.autoscale_view()
 
 
-def _draw_times(axes: Axes, drawn: Sequence[Row]) -> None:
+def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
     """Mark the tr of each run at its level."""
     points = np.array([(row.tr, row.energy_td) for row in drawn if row.tr is not None])
     if points.size:
@@ -112,7 +112,7 @@ def _draw_times(axes: Axes, drawn: Sequence[Row]) -> None:
         )  # fmt: skip
 
 
-def _show(axes: Axes, answer: Study, drawn: Sequence[Row]) -> None:
+def _show(axes: Axes, answer: Study, drawn: Sequence[StudyRow]) -> None:
     """Show the time from a little before the first tr to a little after td; what is higher there is cut."""
     curves = [row.curve for row in drawn if row.curve is not None]
     if not curves:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Record:
+class PageContext:
     """What a page shows besides the answer.
 
     ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the
@@ -88,7 +88,7 @@ def parts(candidate: Candidate | None) -> Markup:
     return section(title, table(title, ("part", "sign", "share of the mismatch", "remark"), listed))
 
 
-def evidence(situation: Situation, health: Health | None, record: Record) -> Iterator[Markup]:
+def evidence(situation: Situation, health: Health | None, record: PageContext) -> Iterator[Markup]:
     """Tell what was read, how healthy it is, by what method it was judged, and how to repeat that."""
     yield section("What was read", _read(situation, record.run))
     yield section("Health of the reference run", *_health(health))
@@ -97,7 +97,7 @@ def evidence(situation: Situation, health: Health | None, record: Record) -> Ite
     yield section("To repeat this", *stdin, tag("pre", shlex.join(record.command), class_="wrap"))
 
 
-def solver_input(times: tuple[float, float], record: Record) -> Markup:
+def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
     """Give the solver's card where it is known whom it switches, else the command that prints it."""
     title, card = "Solver input", record.card
     assert card is not None

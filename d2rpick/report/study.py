@@ -14,7 +14,7 @@ from d2rpick.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.studies.row import Row
+    from d2rpick.studies.row import StudyRow
     from d2rpick.studies.study import Study
 
 SCHEMA = "d2rpick/study/1"
@@ -57,7 +57,7 @@ def runs(answer: Study) -> list[dict[str, Any]]:
     return [plain(row) | {"common_error": error} for row, error in _with_errors(answer)]
 
 
-def _with_errors(answer: Study) -> Iterator[tuple[Row, float | None]]:
+def _with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
     return zip(answer.rows, answer.common.errors or [None] * len(answer.rows), strict=True)
 
 

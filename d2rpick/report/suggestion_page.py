@@ -35,12 +35,12 @@ def drawn(answer: Suggestion) -> dict[str, tuple[str, str]]:
     return found
 
 
-def as_page(answer: Suggestion, record: page.Record) -> str:
+def as_page(answer: Suggestion, record: page.PageContext) -> str:
     """Write the page."""
     return page.run_page(record.run, _sections(answer, record), record.explorer)
 
 
-def _sections(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
+def _sections(answer: Suggestion, record: page.PageContext) -> Iterator[Markup]:
     yield choice(answer)
     if record.explorer:
         yield explorer(record.explorer)
@@ -48,7 +48,7 @@ def _sections(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
     yield from rest(answer, record)
 
 
-def rest(answer: Suggestion, record: page.Record) -> Iterator[Markup]:
+def rest(answer: Suggestion, record: page.PageContext) -> Iterator[Markup]:
     """Give the sections below the figures."""
     yield section("Candidates", *_candidates(answer))
     yield page.parts(answer.chosen)

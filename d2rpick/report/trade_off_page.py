@@ -32,12 +32,12 @@ def drawn(found: TradeOff) -> dict[str, tuple[str, str]]:
     }
 
 
-def as_page(found: TradeOff, record: page.Record) -> str:
+def as_page(found: TradeOff, record: page.PageContext) -> str:
     """Write the page."""
     return page.run_page(record.run, _sections(found, record), record.explorer)
 
 
-def _sections(found: TradeOff, record: page.Record) -> Iterator[Markup]:
+def _sections(found: TradeOff, record: page.PageContext) -> Iterator[Markup]:
     yield suggestion_page.choice(found.suggestion)
     yield tag("section", tag("p", answer(found)), remarks(found.cautions))
     if record.explorer:

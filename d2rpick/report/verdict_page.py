@@ -28,12 +28,12 @@ def drawn(answer: Verdict) -> dict[str, tuple[str, str]]:
     return {caption: figures.both_widths(figures_choice.draw_verdict, answer, "pair")}
 
 
-def as_page(answer: Verdict, record: page.Record) -> str:
+def as_page(answer: Verdict, record: page.PageContext) -> str:
     """Write the page."""
     return page.run_page(record.run, _sections(answer, record), record.explorer)
 
 
-def _sections(answer: Verdict, record: page.Record) -> Iterator[Markup]:
+def _sections(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
     situation, candidate = answer.situation, answer.candidate
     times = candidate.tr, situation.td
     class_ = "card chosen" if answer.verified else "card refused"

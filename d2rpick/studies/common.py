@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.history import Samples
-    from d2rpick.studies.row import Row
+    from d2rpick.studies.row import StudyRow
 
 # Runs that a sentence names.
 NAMED: Final = 3
@@ -38,7 +38,7 @@ class Common(NamedTuple):
     errors: tuple[float | None, ...] = ()
 
 
-def common_tr(rows: Sequence[Row]) -> Common:
+def common_tr(rows: Sequence[StudyRow]) -> Common:
     """Choose one tr for all runs that were judged: the earliest that keeps the timing tolerance of every run.
 
     Where none does, the earliest of those acceptable in all runs at which the run that loses most by it loses hardly
@@ -59,7 +59,7 @@ def common_tr(rows: Sequence[Row]) -> Common:
     return Common(tr, tuple(window), None, bool(keeping.size), errors)
 
 
-def _least_loss(judged: Sequence[Row], shared: Samples) -> tuple[float, float]:
+def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, float]:
     """Give the first stretch of the shared windows in which no run loses more than 0.02 above what one must lose."""
     profiles = [row.profile for row in judged if row.profile is not None]
     times = np.unique(np.concatenate([shared.ravel(), *(profile[0] for profile in profiles)]))
@@ -73,7 +73,7 @@ def _least_loss(judged: Sequence[Row], shared: Samples) -> tuple[float, float]:
     return float(times[first]), float(min(following, holder[1]))
 
 
-def _own_error(row: Row, profile: Samples) -> float:
+def _own_error(row: StudyRow, profile: Samples) -> float:
     return 0.0 if row.tr is None else error_at(profile, row.tr)
 
 
@@ -95,7 +95,7 @@ def runs_of(number: int) -> str:
     return "1 run" if number == 1 else f"{number} runs"
 
 
-def _why_none(judged: Sequence[Row]) -> str:
+def _why_none(judged: Sequence[StudyRow]) -> str:
     """Say which tr suits most runs, and which runs it does not suit."""
     stretches, counts = coverage([row.acceptable for row in judged])
     if not counts.size:

@@ -10,13 +10,13 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.studies.row import Row
+    from d2rpick.studies.row import StudyRow
 
 # Tukey's fences: so many times the distance of the quartiles beyond them.
 _FENCE: Final = 1.5
 
 
-def outliers(rows: Sequence[Row]) -> tuple[Row, ...]:
+def outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
     """Give the judged runs that stand out: those without a tr, then those whose tr lies beyond Tukey's fences.
 
     The farthest from the median come first.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.studies.row import FAILED, UNREADABLE, Row, Stamp
+from d2rpick.studies.row import FAILED, UNREADABLE, Stamp, StudyRow
 from d2rpick.studies.study import stamps
 
 if TYPE_CHECKING:
@@ -35,12 +35,12 @@ def fingerprint(question: Question) -> str:
     return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def plain(row: Row) -> dict[str, Any]:
+def plain(row: StudyRow) -> dict[str, Any]:
     """Give the values of a row by their keys in JSON results."""
     return {name: getattr(row, name) for name in PLAIN}
 
 
-def line(row: Row, asked: str) -> str:
+def line(row: StudyRow, asked: str) -> str:
     """Write a row as one line: its values, and what is needed to take it from there later.
 
     ``asked`` is the ``fingerprint`` of the question.
@@ -88,7 +88,7 @@ class Ledger:
     def __init__(self, name: str, question: Question) -> None:
         self.name, self.asked, self.curve = name, fingerprint(question), question.curve
         self.taken = self.outdated = self.damaged = 0
-        self._rows: dict[tuple[Stamp, ...], Row] = {}
+        self._rows: dict[tuple[Stamp, ...], StudyRow] = {}
         self._known: set[tuple[str, ...]] = set()
         if Path(name).exists() and not Path(name).is_file():
             raise FormatError(f"{name}: cannot be written (not a regular file); give another file")
@@ -113,7 +113,7 @@ class Ledger:
         self._known.add(tuple(stamp.name for stamp in files))
         whole = "profile" in record and ("curve" in record or not self.curve)
         if record["asked"] == self.asked and files and whole:
-            self._rows[files] = Row(
+            self._rows[files] = StudyRow(
                 **{name: record[name] for name in PLAIN if name != "warnings"},
                 warnings=tuple(record["warnings"]),
                 acceptable=np.array(record["acceptable"][0]).reshape(-1, 2),
@@ -123,7 +123,7 @@ class Ledger:
                 curve=np.array(record["curve"]) if self.curve else None,
             )
 
-    def find(self, source: str) -> Row | None:
+    def find(self, source: str) -> StudyRow | None:
         """Give the row of a run whose files are as they were, None where there is none."""
         files = stamps(source)
         row = self._rows.get(files)
@@ -139,7 +139,7 @@ class Ledger:
         damaged = f"; lines skipped, damaged or without a checksum: {self.damaged}" if self.damaged else ""
         return f"{self.taken} of {runs} runs reused from {self.name}{outdated}{damaged}"
 
-    def add(self, row: Row) -> None:
+    def add(self, row: StudyRow) -> None:
         """Append the row of a run that was judged; it is in the file when this returns."""
         if row.status in (FAILED, UNREADABLE):  # asked again next time
             return

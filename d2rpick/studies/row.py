@@ -23,7 +23,7 @@ class Stamp(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class StudyRow:
     """Answer for one run; times in the unit of its history, None for what is not known.
 
     ``status``: "ok"; "none", nothing can be recommended; "unreadable"; "out-of-range", the record does not reach td or

@@ -19,7 +19,7 @@ from d2rpick.histories.outline import outline
 from d2rpick.histories.selection import Selection
 from d2rpick.histories.source import expand
 from d2rpick.studies.common import NAMED, Common, common_tr, runs_of
-from d2rpick.studies.row import FAILED, NONE, OK, OUT_OF_RANGE, UNREADABLE, Row, Stamp
+from d2rpick.studies.row import FAILED, NONE, OK, OUT_OF_RANGE, UNREADABLE, Stamp, StudyRow
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Study:
 
     td: float | None
     td_window: tuple[float, float] | None
-    rows: tuple[Row, ...]
+    rows: tuple[StudyRow, ...]
     spread: Spread | None
     agree: bool | None
     common: Common
@@ -100,7 +100,7 @@ def _once(names: Iterable[str]) -> list[str]:
     return sorted({os.path.realpath(name): name for name in shortest_first}.values())
 
 
-def ask(question: Question, source: str) -> Row:
+def ask(question: Question, source: str) -> StudyRow:
     """Read and judge one run; whatever is wrong with it is said in the row.
 
     Raises
@@ -119,18 +119,18 @@ def ask(question: Question, source: str) -> Row:
     except (D2RPickError, OSError) as error:
         status = OUT_OF_RANGE if isinstance(error, RangeError) else UNREADABLE
         text = f"{source}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)
-        return Row(source, status, text, files=files)
+        return StudyRow(source, status, text, files=files)
     time, energy = reference.history.time, reference.history.energy
     curve = outline(time, energy, _STRETCHES) if question.curve else None
     return replace(row_of(source, answer), files=files, curve=curve)
 
 
-def row_of(source: str, answer: Suggestion) -> Row:
+def row_of(source: str, answer: Suggestion) -> StudyRow:
     """Keep of the answer for one run what a study needs."""
     best, situation = answer.chosen, answer.situation
     acceptable = clear_of_td(situation, acceptable_windows(situation, answer.candidates, best.tr if best else None))
     said = {caution.code: caution.message for caution in answer.cautions}
-    row = Row(
+    row = StudyRow(
         source=source,
         status=NONE,
         message=said.get("no-candidate"),
@@ -148,12 +148,12 @@ def row_of(source: str, answer: Suggestion) -> Row:
     return replace(row, status=OK, tr=best.tr, tr_low=best.tr_low, tr_high=best.tr_high, residual=best.residual)
 
 
-def failed(source: str, error: BaseException) -> Row:
-    """Row of a run whose process did not come back with one."""
+def failed(source: str, error: BaseException) -> StudyRow:
+    """StudyRow of a run whose process did not come back with one."""
     text = " ".join(str(error).split())
     if not isinstance(error, D2RPickError):
         text = f"internal error, please report it ({type(error).__name__}: {text})"
-    return Row(source, FAILED, f"{source}: {text}")
+    return StudyRow(source, FAILED, f"{source}: {text}")
 
 
 def stamps(source: str) -> tuple[Stamp, ...]:
@@ -165,7 +165,7 @@ def stamps(source: str) -> tuple[Stamp, ...]:
     return tuple(Stamp(path, state.st_size, state.st_mtime_ns) for path, state in found)
 
 
-def summarise(td: float | tuple[float, float], rows: Sequence[Row]) -> Study:
+def summarise(td: float | tuple[float, float], rows: Sequence[StudyRow]) -> Study:
     """Hold the rows of a study against each other; ``td`` as it was asked for."""
     times = [row.tr for row in rows if row.tr is not None]
     lows = [row.tr_low for row in rows if row.tr_low is not None]
@@ -177,7 +177,7 @@ def summarise(td: float | tuple[float, float], rows: Sequence[Row]) -> Study:
     return Study(one, window, tuple(rows), spread, agree, common, tuple(_cautions(rows, common)))
 
 
-def _cautions(rows: Sequence[Row], common: Common) -> Iterator[Caution]:
+def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     """What to be aware of: runs left out, where the others differ in kind, and what was said of single ones."""
     judged = [row for row in rows if row.judged]
     left = [row.source for row in rows if not row.judged]

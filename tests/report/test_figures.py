@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 import d2rpick as d2
 from d2rpick.report.figures_study import draw_study
 from d2rpick.studies.common import Common
-from d2rpick.studies.row import Row
+from d2rpick.studies.row import StudyRow
 from d2rpick.studies.study import Study
 from tests.command import BOX, ENERGY
 
@@ -59,13 +59,13 @@ def test_few_candidates_are_marks_acceptable_or_not() -> None:
     assert len(motion.lines) == 4  # both motions, tr and td
 
 
-def row(name: str, tr: float, level: float = 1.0) -> Row:
+def row(name: str, tr: float, level: float = 1.0) -> StudyRow:
     time = np.linspace(0, 1, 50)
     energy = level * (1 + 0.1 * np.sin(20 * time)) + 500 * (time > 0.95)
-    return Row(name, "ok", tr=tr, energy_td=level, curve=np.stack([time, energy]))
+    return StudyRow(name, "ok", tr=tr, energy_td=level, curve=np.stack([time, energy]))
 
 
-def study(*rows: Row) -> Study:
+def study(*rows: StudyRow) -> Study:
     return Study(0.8, None, rows, None, None, Common(None, None, "made"), ())
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from d2rpick.studies.outliers import outliers, short_names
-from d2rpick.studies.row import NONE, OK, UNREADABLE, Row
+from d2rpick.studies.row import NONE, OK, UNREADABLE, StudyRow
 
 
-def row(name: str, tr: float | None = None, status: str = OK) -> Row:
-    return Row(name, status, tr=tr)
+def row(name: str, tr: float | None = None, status: str = OK) -> StudyRow:
+    return StudyRow(name, status, tr=tr)
 
 
 def test_runs_without_a_tr_and_far_ones_stand_out_the_farthest_first() -> None:

@@ -20,12 +20,12 @@ from d2rpick.studies.study import Question, ask
 from tests import variants
 
 if TYPE_CHECKING:
-    from d2rpick.studies.row import Row
+    from d2rpick.studies.row import StudyRow
 
 QUESTION = Question(variants.TD, Settings())
 
 
-def values(row: Row | None) -> dict[str, object]:
+def values(row: StudyRow | None) -> dict[str, object]:
     """All of a row as plain values."""
     assert row is not None
     found = {name: getattr(row, name) for name in row.__dataclass_fields__}
@@ -34,7 +34,7 @@ def values(row: Row | None) -> dict[str, object]:
     return found
 
 
-def kept(folder: Path, question: Question = QUESTION) -> tuple[str, str, Row]:
+def kept(folder: Path, question: Question = QUESTION) -> tuple[str, str, StudyRow]:
     """A run, the ledger that holds it, and its row."""
     name, ledger = variants.write(folder / "run.csv"), str(folder / "ledger.ndjson")
     row = ask(question, name)

@@ -15,7 +15,7 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.verify import verify
 from d2rpick.histories.opening import Selection
 from d2rpick.studies.common import fewest_digits
-from d2rpick.studies.row import OK, Row
+from d2rpick.studies.row import OK, StudyRow
 from d2rpick.studies.study import Question, ask, failed, find_runs, summarise
 from tests import variants
 from tests.command import BOX, GLSTAT
@@ -25,10 +25,10 @@ from tests.shared import SHARED, shared
 ASKED = Question(variants.TD, Settings())
 
 
-def row(source: str, *windows: tuple[float, float], tr: float = 2.0, width: float = 0.1, **other: object) -> Row:
+def row(source: str, *windows: tuple[float, float], tr: float = 2.0, width: float = 0.1, **other: object) -> StudyRow:
     """A run with windows of acceptable tr, all alike, its error a straight line from 0 at 0 to 1 at td = 10."""
     acceptable = np.array(windows, float).reshape(-1, 2)
-    made = Row(
+    made = StudyRow(
         source, OK, tr=tr, tr_low=tr - width, tr_high=tr + width, energy_td=1.0, residual=0.1, basis="oscillator",
         td=10.0, acceptable=acceptable, alike=acceptable, profile=np.array([[0.0, 10.0], [0.0, 1.0]]),
     )  # fmt: skip
@@ -185,7 +185,7 @@ def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_a
         max_size=5,
     )
 )  # fmt: skip
-def test_a_common_tr_lies_in_the_windows_of_all_runs(rows: list[Row]) -> None:
+def test_a_common_tr_lies_in_the_windows_of_all_runs(rows: list[StudyRow]) -> None:
     found = summarise(10.0, rows).common
     if found.tr is None:
         assert max(one.acceptable[0, 0] for one in rows) > min(one.acceptable[0, 1] for one in rows)
