@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.library import arguments
+from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
 from d2rpick.library.repeat import asking, command_line
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class Answer(Document):
     """What a choice and a verdict have in common.
 
     ``situation`` is what the record tells about td, ``warnings`` are (``code``, ``message``), ``health`` how far the
@@ -69,15 +69,6 @@ class Answer:
     def kinetic_share(self) -> float | None:
         """K, the share of the vibration energy that no tr can save; None on basis ``"energy"`` [-]."""
         return self.situation.kinetic_share
-
-    def to_dict(self) -> dict[str, Any]:
-        """Give the JSON document of the command line as a dictionary; its schema is named in it."""
-        found: dict[str, Any] = json.loads(self.to_json())
-        return found
-
-    def to_json(self) -> str:
-        """Give the JSON document of the command line."""
-        raise NotImplementedError
 
     def _record(
         self,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.library import arguments
+from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Findings:
+class Findings(Document):
     """Answer of `check`; nothing of it changes.
 
     ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``; ``windows`` are those in
@@ -35,11 +35,6 @@ class Findings:
     warnings: tuple[Caution, ...]
     _checked: tuple[Checked, ...] = field(repr=False)
     _history: tuple[str, ...] | None = field(repr=False)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Give the JSON document of the command line as a dictionary; its schema is named in it."""
-        found: dict[str, Any] = json.loads(self.to_json())
-        return found
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick check``, schema d2rpick/check/1; paths relative to the working folder."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.library import arguments
 from d2rpick.library.answers import explorer_of, page_record, selection_for, written
+from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
 from d2rpick.library.repeat import asking, command_line
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Exploration:
+class Exploration(Document):
     """Answer of `explore`; nothing of it changes.
 
     ``offers`` are by ascending td, each with ``tr``, ``error``, ``rigid_time``, ``unbeaten``, ``quality`` and its
@@ -49,11 +49,6 @@ class Exploration:
         from d2rpick.report.trade_off import answer
 
         return answer(self._core)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Give the JSON document of the command line as a dictionary; its schema is named in it."""
-        found: dict[str, Any] = json.loads(self.to_json())
-        return found
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick explore``, schema d2rpick/explore/1."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.library import arguments
 from d2rpick.library.answers import explorer_of, selection_for, written
+from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
 from d2rpick.library.repeat import asking, command_line
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(Document):
     """Answer of `plan`; nothing of it changes.
 
     ``flights`` has a row per flight with ``window``, ``status`` and ``reason``; ``windows`` are the (tr, td) that this
@@ -48,11 +48,6 @@ class Plan:
     def rigid_fraction(self) -> float:
         """Share of the record in which the parts are rigid by ``windows`` [-]."""
         return self._core.rigid_fraction
-
-    def to_dict(self) -> dict[str, Any]:
-        """Give the JSON document of the command line as a dictionary; its schema is named in it."""
-        found: dict[str, Any] = json.loads(self.to_json())
-        return found
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick plan``, schema d2rpick/plan/1."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.library import arguments
 from d2rpick.library.answers import written
+from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(Document):
     """Answer of `study`; nothing of it changes.
 
     ``runs`` has a row per run; ``agree`` is whether the intervals of tr intersect, None without a tr; ``common`` is one
@@ -41,11 +41,6 @@ class Study:
     warnings: tuple[Caution, ...]
     command: tuple[str, ...] = field(repr=False)
     _core: Core = field(repr=False)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Give the JSON document of the command line as a dictionary; its schema is named in it."""
-        found: dict[str, Any] = json.loads(self.to_json())
-        return found
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick study``, schema d2rpick/study/1."""
