@@ -121,7 +121,9 @@ def loaded(*args: str) -> set[str]:
     return set(result.stderr.split())
 
 
-@pytest.mark.parametrize("args", [("--help",), ("--version",), ("suggest", "--help"), ("info", "--help")])
+@pytest.mark.parametrize(
+    "args", [("--help",), ("--version",), ("suggest", "--help"), ("explore", "--help"), ("info", "--help")]
+)
 def test_help_and_version_load_no_numbers(args: tuple[str, ...]) -> None:
     assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.histories.history", "d2rpick.choice.suggest"})
 

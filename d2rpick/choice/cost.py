@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.errors import ConfigurationError
@@ -109,7 +110,7 @@ class CostModel:
         """Cost of the elements of a part."""
         return self._of(part, self.inventory.counts.get(part, Counter()))
 
-    @property
+    @cached_property
     def total(self) -> Amount:
         """Cost of all elements."""
         return _sum(self.of_part(part) for part in self.inventory.counts)

@@ -88,14 +88,18 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
     """
     try:
         energies = run.part_energies(run.parts)
-        history, members = _history(run)
     except FormatError as error:
         return RunFacts({}, reason=str(error))
+    masses = _masses(run)
+    try:
+        history, members = _history(run)
+    except FormatError as error:  # nothing ever deforms
+        still = {part.id: PartFacts(part, masses.get(part.id), has_energy=False) for part in run.parts}
+        return RunFacts(still, reason=str(error))
     flights = flights_of(history, settings)
     spans = tuple(bounds(history, flight) for flight in flights)
     lengths = [end - start for start, end in spans]
     longest = int(np.argmax(lengths)) if lengths else None
-    masses = _masses(run)
     known = {
         part.id: PartFacts(
             part,

@@ -209,19 +209,19 @@ class _Comparison:
 
     def of(self, one: PartSet, times: Times | float | None) -> PartSet:
         """Complete a set, in a window, or in that for a td."""
-        reasons = [self.model and self.model.saved(one.parts).reason]
-        one = self._with_cost(one, self.model) if self.model else one
+        share = self.model.saved(one.parts) if self.model else Share(None)
+        reasons = [share.reason]
+        one = self._with_cost(one, self.model.inventory, share) if self.model else one
         try:
             one = self._with_window(one, times)
         except (FormatError, RangeError) as error:
             reasons.append(str(error))
         if one.rigid_fraction is not None and one.cost_share is not None:
-            share = run_time_share(one.rigid_fraction, one.cost_share, self.settings.step_ratio)
-            one = replace(one, run_time_share=share)
+            run_time = run_time_share(one.rigid_fraction, one.cost_share, self.settings.step_ratio)
+            one = replace(one, run_time_share=run_time)
         return replace(one, reasons=tuple(reason for reason in (*reasons, *one.reasons) if reason))
 
-    def _with_cost(self, one: PartSet, model: CostModel) -> PartSet:
-        inventory = model.inventory
+    def _with_cost(self, one: PartSet, inventory: Inventory, share: Share) -> PartSet:
         within = {part: counts.total() for part, counts in inventory.elements_within(one.parts).items()}
         whole = {part: counts.total() for part, counts in inventory.counts.items()}
         rigid = {part for part, count in within.items() if count == whole[part]}
@@ -231,7 +231,7 @@ class _Comparison:
             elements=sum(within.values()),
             element_fraction=sum(within.values()) / sum(whole.values()) if whole else None,
             mass_fraction=self._mass_fraction(one.parts),
-            cost_share=model.saved(one.parts).value,
+            cost_share=share.value,
             step_growth=self.steps.growth({*one.parts, *rigid}, computed),
         )
 

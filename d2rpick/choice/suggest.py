@@ -79,7 +79,7 @@ class Suggestion(NamedTuple):
         from d2rpick.choice.acceptable_windows import acceptable_windows  # not above: a table does without it
 
         best = self.recommended
-        found = acceptable_windows(self.situation, self.candidates, best.tr if best else None)[0].tolist()
+        found = acceptable_windows(self.situation, self.candidates, best.tr if best else None).tolist()
         return tuple((start, end) for start, end in found)
 
     @property

@@ -70,7 +70,7 @@ _JUDGING = ("input_format", "time", "energy", "flying", "channel", "after", "mar
 # What of the options of ``suggest`` a td is judged by.
 _ASKING = (
     *("part", *_JUDGING, "max_kinetic_share", "max_residual", "stiffness", "mass", "frame_mass", "beta", "alpha", "v0"),
-    *("fit_window", "no_verify", "strict", "cost_share", "step_ratio"),
+    *("fit_window", "no_verify", "strict", "cost_share", "step_ratio", "deck", "weights"),
 )
 
 

@@ -31,7 +31,8 @@ class Output(NamedTuple):
     def of(cls, options: dict[str, Any], *inputs: str) -> Output:
         """Take the options of ``file_options``; D2RPickError when a file to be written may not be."""
         file = None if options["output_file"] == "-" else options["output_file"]
-        output = cls(file, options["overwrite"], options["quiet"], inputs)
+        read = [options[name] for name in ("deck", "weights") if options.get(name)]
+        output = cls(file, options["overwrite"], options["quiet"], (*inputs, *read))
         plot = options.get("plot")
         if plot is not None:
             from d2rpick.report import figures

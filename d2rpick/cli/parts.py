@@ -62,10 +62,10 @@ def command(
         raise click.UsageError("--energy names one energy for the whole model; parts compares those of its parts")
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
-        deck = [options["deck"]] if options["deck"] else []
-        output = Output.of(options, *run.sources, *deck)
+        output = Output.of(options, *run.sources)
         model = model_of(options)
     given = select_parts(options["part"], run.parts, run.name) if options["part"] else ()
+    deck = [options["deck"]] if options["deck"] else []
     found = parts_of(
         run, settings, model, given=[part.id for part in given], times=times, printed=printed_steps(run, *deck)
     )

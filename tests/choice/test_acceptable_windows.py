@@ -215,3 +215,12 @@ def test_coverage_counts_at_every_time_the_runs_with_a_window_there(runs: list[S
     shared = common_windows(runs)
     assert holds(shared, times).tolist() == [count == len(runs) for count in expected]
     assert np.all(shared[:, 0] <= shared[:, 1])
+
+
+def test_a_suggestion_gives_its_windows_on_any_basis() -> None:
+    for replay in (True, False):
+        answer = suggest(PAPER, 0.0687534, Settings(replay=replay, after=0.005))
+        assert answer.recommended is not None
+        windows = answer.acceptable_windows
+        assert any(start <= answer.recommended.tr <= end for start, end in windows)
+        assert all(start < end for start, end in windows)

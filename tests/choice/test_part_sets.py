@@ -115,6 +115,13 @@ def test_a_deck_of_another_run_is_noticed(tmp_path: Path) -> None:
         recommended_parts(open_run([BOX]), Settings(), CostModel(read_inventory(str(tmp_path / "main.k"))))
 
 
+def test_parts_of_a_run_in_which_nothing_deforms_are_listed() -> None:
+    found = asked(str(shared("real/histories/dyna_pladebuk__Plade_300_150_4-BB-binout")))
+    assert len(found.rows) == 3
+    assert {row.verdict for row in found.rows} == {"keep"}
+    assert found.facts.reason
+
+
 def test_the_step_grows_by_what_stays_deformable() -> None:
     steps = Steps(computed={1: 2e-6, 2: 6e-6}, printed={3: (3e-6, "glstat")})
     assert steps.growth({1}, [1, 2, 3]) == pytest.approx(1.5)

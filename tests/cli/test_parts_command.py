@@ -115,6 +115,16 @@ def test_a_deck_takes_the_place_of_a_cost_share(command: tuple[str, ...]) -> Non
     )
 
 
+@pytest.mark.parametrize("command", ["parts", "plan", "suggest"])
+def test_a_deck_is_never_written_over(tmp_path: Path, command: str) -> None:
+    own = tmp_path / "main.k"
+    own.write_bytes(DECK.read_bytes())
+    result = run(command, "--part", "1", "--deck", str(own), "-o", str(own), "--overwrite", BOX)
+    assert result.exit_code == 2
+    assert "this is an input" in result.stderr
+    assert own.read_bytes() == DECK.read_bytes()
+
+
 def test_recommended_needs_a_deck_and_stands_alone() -> None:
     result = run("plan", "--part", "recommended", BOX)
     assert (result.exit_code, "--part recommended needs --deck" in result.stderr) == (2, True)

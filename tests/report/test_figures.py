@@ -42,6 +42,15 @@ def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> N
     assert len(bands) < len(answer._core.windows)  # gaps that nobody sees are closed
 
 
+@pytest.mark.parametrize("replay", [True, False])
+def test_the_band_is_known_on_every_basis(replay: bool) -> None:
+    answer = d2.suggest(d2.read(ENERGY), td=0.0687534, replay=replay)._core
+    assert answer.recommended is not None
+    windows = answer.acceptable_windows
+    assert any(start <= answer.recommended.tr <= end for start, end in windows)
+    assert all(start <= end < answer.situation.td for start, end in windows)
+
+
 def test_few_candidates_are_marks_acceptable_or_not() -> None:
     answer = d2.suggest(d2.read(ENERGY), td=0.064)
     energy, motion = answer.plot().axes

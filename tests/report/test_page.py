@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from d2rpick.cli import options, suggest
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROOT, run
 from tests.shared import shared
 
@@ -217,6 +218,30 @@ def test_the_command_for_radioss_names_the_parts(tmp_path: Path) -> None:
     words = page_of(tmp_path, "--td", "0.37", "--part", "box", "--flying", "box,step", ROLLOVER_T01).last_command()
     assert words[-6:] == ["--history", ROLLOVER_T01, "--flying", "box,step", "--part", "box"]
     assert run(*("1001" if word == "IDS" else word for word in words)).exit_code == 0
+
+
+def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_path: Path) -> None:
+    choosing = (
+        "--after",
+        "0.001",
+        "--tolerance",
+        "0.1",
+        "--fit-window",
+        "0.01",
+        "0.1",
+        "--max-residual",
+        "2.5",
+        "--strict",
+    )
+    page = page_of(tmp_path, "--td", "0.064", *choosing, ENERGY)
+    before, behind = json.loads(page.data[0])["command"]
+    assert (before, sorted(shlex.split(behind))) == ("d2rpick suggest --td ", sorted([*choosing, ENERGY]))
+    about_output = {
+        *("td", "td_window", "limit", "history", "plot", "report", "min_quality", "output_format", "exit_zero"),
+        *("output_file", "overwrite", "quiet", "verbose", "show_settings", "debug"),
+        *("solver", "merge", "swset", "step_cap", "node", "end", "name"),
+    }
+    assert {str(option.name) for option in suggest.command.params} == {*about_output, *options._ASKING}
 
 
 def test_a_time_that_no_card_can_hold_costs_the_card_only(tmp_path: Path) -> None:
