@@ -59,6 +59,17 @@ def with_recommended(run: Run, options: dict[str, Any], settings: Settings, mode
     return {**options, "part": tuple(map(str, recommended_parts(run, settings, model)))}
 
 
+def with_springs(run: Run, options: dict[str, Any], model: CostModel | None) -> dict[str, Any]:
+    """Add the numbers of the parts that the deck, or their energies, show to be springs: their energy is no level."""
+    if model is None:
+        return options
+    from d2rpick.deck.inventory.model import DISCRETE
+
+    counts = model.inventory.counts
+    springs = {part.id for part in run.springs} | {part for part, kinds in counts.items() if {*kinds} <= DISCRETE}
+    return {**options, "springs": tuple(map(str, sorted(springs)))}
+
+
 def with_cost(settings: Settings, history: History, model: CostModel | None) -> tuple[Settings, tuple[Caution, ...]]:
     """Take the cost share of the parts of a history from the deck, and say so where it stays unknown."""
     if model is None or settings.cost_share is not None:

@@ -201,7 +201,10 @@ def selection(options: dict[str, Any]) -> Selection:
     parts = options.get("part", ())
     if options["energy"] and parts:
         raise click.UsageError("--energy and --part exclude each other: give columns or parts")
-    return Selection(options["time"], options["energy"], parts, options["flying"], _channels(options["channel"]))
+    return Selection(
+        options["time"], options["energy"], parts, options["flying"], _channels(options["channel"]),
+        options.get("springs"),
+    )  # fmt: skip
 
 
 def _channels(given: tuple[str, ...]) -> tuple[tuple[str, str], ...]:

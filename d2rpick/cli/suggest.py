@@ -87,6 +87,7 @@ def command(
         output = Output.of(options, *run.sources)
         model = deck_cost.model_of(options)
         options = deck_cost.with_recommended(run, options, settings, model)
+        options = deck_cost.with_springs(run, options, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
         settings, unknown = deck_cost.with_cost(settings, reference.history, model)
     answer = suggest_of(reference, td_window if td is None else td, settings)

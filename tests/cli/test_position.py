@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
 import pytest
 
+from d2rpick.cli.deck_cost import model_of, with_springs
 from tests.cli.test_output import check_by_schema
 from tests.command import answer, run
-from tests.shared import shared
+from tests.shared import shared, shared_bytes
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def car() -> str:
     return str(shared("openradioss/car_drop/carT01.gz"))
+
+
+def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(tmp_path: Path) -> None:
+    deck = tmp_path / "CAR_0000.rad"
+    deck.write_bytes(shared_bytes("openradioss/car_drop/decks/CAR_0000.rad.gz"))
+    model = model_of({"deck": str(deck), "weights": None})
+    silent: Any = SimpleNamespace(springs=())
+    assert with_springs(silent, {}, model)["springs"] == ("15", "16", "17")
+    assert with_springs(silent, {"part": ()}, None) == {"part": ()}
+    asked = ("suggest", "--td", "0.1464", "--part", "12-17", car())
+    alone, told = answer(*asked), answer(*asked, "--deck", str(deck))
+    assert alone["history"]["channel"] == told["history"]["channel"] == "internal energy of engine, battery, wheels"
 
 
 def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
