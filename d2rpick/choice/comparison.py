@@ -98,26 +98,17 @@ def compare_runs(
     tr, td = pair
     end = min(end, float(reference.time[-1]), float(switched.time[-1]))
     after, reference_after = switched.between(td, end)[1], reference.between(td, end)[1]
-    if min(after.size, reference_after.size) < 3:
-        short = min(reference, switched, key=lambda history: history.time[-1])
-        found = f"fewer than 3 states from td {td:g} to {end:g}"
-        raise RangeError(f"{', '.join(short.source)}: {found}; too few to compare the runs")
+    _refuse_few(reference, switched, min(after.size, reference_after.size), td, end)
     before, rest = switched.energy[switched.time < td], switched.between(td, np.inf)[1]
     if before.size and after[0] == before[-1] and _reported_wrong(before[-1], rest[1:]):
         after, rest = after[1:], rest[1:]  # the switch comes at the first step from td on: this state was still rigid
     frozen, wanted = float(after[0]), reference.energy_at(td)
     notes = tuple(note for note in switched.notes if note not in reference.notes)
     error, rigid = _relative(*momenta, td, end), _rigid_window(switched, tr, td)
-    objections = [*_not_rigid(switched, rigid, tr, td), *(_not_of_tr(reference, tr, frozen) if known else ())]
-    level_error = measures.level_error(frozen, wanted) if known else None
-    if level_error is not None and level_error > tolerance:
-        objections.append(
-            f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {wanted:.6g}"
-        )
-    if error is not None and error > MOST_MOMENTUM_ERROR:
-        objections.append(
-            f"the switched run's momentum after td is off by {error:.1%}: its motion differs from the reference"
-        )
+    objections = [*_not_rigid(switched, rigid, tr, td)]
+    if known:
+        objections += [*_not_of_tr(reference, tr, frozen), *_not_of_td(frozen, wanted, tolerance)]
+    objections += _moved_otherwise(error)
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -135,6 +126,14 @@ def compare_runs(
         objections=tuple(objections),
         notes=(*notes, *(_reported(float(before[-1]), rest) if before.size else ())),
     )
+
+
+def _refuse_few(reference: History, switched: History, states: int, td: float, end: float) -> None:
+    """RangeError where a run holds too few states after td."""
+    if states < 3:
+        short = min(reference, switched, key=lambda history: history.time[-1])
+        found = f"fewer than 3 states from td {td:g} to {end:g}"
+        raise RangeError(f"{', '.join(short.source)}: {found}; too few to compare the runs")
 
 
 def _rigid_window(switched: History, tr: float, td: float) -> tuple[float, float] | None:
@@ -170,6 +169,19 @@ def _not_of_tr(reference: History, tr: float, frozen: float) -> Iterator[str]:
             f"the energy that came back, {frozen:.6g}, is not that of the reference at tr {tr:g}, "
             f"{reference.energy_at(tr):.6g}: was it switched at another time?"
         )
+
+
+def _not_of_td(frozen: float, wanted: float, tolerance: float) -> Iterator[str]:
+    """Object when the energy that came back is not that of the reference at td."""
+    level_error = measures.level_error(frozen, wanted)
+    if level_error is not None and level_error > tolerance:
+        yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {wanted:.6g}"
+
+
+def _moved_otherwise(error: float | None) -> Iterator[str]:
+    """Object when the momentum after td is another one."""
+    if error is not None and error > MOST_MOMENTUM_ERROR:
+        yield f"the switched run's momentum after td is off by {error:.1%}: its motion differs from the reference"
 
 
 def _reported_wrong(rigid: float, after: Samples) -> bool:

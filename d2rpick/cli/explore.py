@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli import typed
 from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
 from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
@@ -99,6 +100,6 @@ def _page(found: TradeOff, run: Run, options: dict[str, Any]) -> str:
     from d2rpick.report.trade_off_page import as_page, drawn
 
     request = card_request(run, options, found.situation.history)
-    pair, judging = found.suggestion.recommended, shared.judging(options)
+    pair, judging = found.suggestion.recommended, typed.judging(options)
     card = input_for(found.suggestion.situation, pair.tr, request) if pair else None
-    return as_page(found, PageContext(run, shared.repeat(), judging, drawn(found), card, explorer=explorer_of([found])))
+    return as_page(found, PageContext(run, typed.repeat(), judging, drawn(found), card, explorer=explorer_of([found])))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.cli import options as shared
+from d2rpick.cli import typed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -18,4 +18,4 @@ def explorer_of(found: Iterable[TradeOff | None]) -> Explorer | None:
     from d2rpick.report.explorer import Explorer
 
     trade_offs = tuple(one for one in found if one)
-    return Explorer(trade_offs, shared.asking()) if trade_offs else None
+    return Explorer(trade_offs, typed.asking()) if trade_offs else None

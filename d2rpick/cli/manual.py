@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def manual() -> str:
     """Write the page of the whole program in roff, with a section for each command."""
-    context = click.Context(d2rpick, info_name="d2rpick")
+    context = click.Context(d2rpick, info_name="d2rpick", **d2rpick.context_settings)
     assert isinstance(d2rpick, click.Group)
     lines = [
         f'.TH D2RPICK 1 "" "d2rpick {__version__}"',

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from d2rpick.cli import values
+from d2rpick.cli.typed import JUDGING, dashed, judging
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,15 +62,6 @@ _CHANNEL = click.option(
 )  # fmt: skip
 _FLYING = click.option(
     "--flying", metavar="IDS", multiple=True, type=PARTS, help="Parts that fly together with the switched parts."
-)
-
-
-# What of them says how to read a history and how to judge by it.
-_JUDGING = ("input_format", "time", "energy", "flying", "channel", "after", "margin", "tolerance")
-# What of the options of ``suggest`` a td is judged by.
-_ASKING = (
-    *("part", *_JUDGING, "max_kinetic_share", "max_residual", "stiffness", "mass", "frame_mass", "beta", "alpha", "v0"),
-    *("fit_window", "no_verify", "strict", "cost_share", "step_ratio", "deck", "weights"),
 )
 
 
@@ -261,68 +252,14 @@ def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
     """Open what the options of ``reference_options`` name; UsageError when they say how to judge but not by what."""
     if not options["history"]:
         source = click.get_current_context().get_parameter_source
-        lost = [name for name in _JUDGING if source(name) is not click.core.ParameterSource.DEFAULT]
+        lost = [name for name in JUDGING if source(name) is not click.core.ParameterSource.DEFAULT]
         if lost:
-            raise click.UsageError(f"--{_dashed(lost[0])} needs an energy history; give one with --history")
+            raise click.UsageError(f"--{dashed(lost[0])} needs an energy history; give one with --history")
         return None
     from d2rpick.choice.settings import Settings
 
     judging = Settings(after=options["after"], margin=options["margin"], tolerance=options["tolerance"])
     return Reading.of({**options, "part": ()}).open(), judging
-
-
-def judging(options: dict[str, Any]) -> list[str]:
-    """Give the options of ``reference_options`` that judge by the history that ``history_options`` named."""
-    names = [*_JUDGING, *(["part"] if options["part"] else [])]
-    context = click.get_current_context()
-    given = [name for name in names if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT]
-    pairs = [(name, value) for name in ("history", *given) for value in _each(options[name])]
-    return [text for name, value in pairs for text in (f"--{_dashed(name)}", str(value))]
-
-
-def asking() -> tuple[list[str], list[str]]:
-    """Give the command line that asks for the pair of a td by the same history, in front of td and behind it."""
-    context = click.get_current_context()
-    given = [
-        text
-        for option in context.command.params
-        if option.name in _ASKING
-        and context.get_parameter_source(option.name) is not click.core.ParameterSource.DEFAULT
-        for text in _typed(option, context.params[option.name])
-    ]
-    return ["d2rpick", "suggest", "--td"], [*given, *context.params["history"]]
-
-
-def _typed(option: click.Parameter, value: Any) -> list[str]:
-    """Write an option with its value as it would be typed."""
-    name = max(option.opts, key=len)
-    if value is True:
-        return [name]
-    given = value if option.multiple else [value]
-    return [text for one in given for text in (name, *map(str, _each(one)))]
-
-
-def repeat() -> list[str]:
-    """Give the command line that was typed, and before it the environment variables that set options.
-
-    It may replace the files that it has written, so that it can be typed again.
-    """
-    context = click.get_current_context()
-    source = click.core.ParameterSource.ENVIRONMENT
-    names = [
-        f"{context.auto_envvar_prefix}_{name.upper()}"
-        for name in context.params
-        if context.get_parameter_source(name) is source
-    ]
-    variables = [f"{name}={os.environ[name]}" for name in names]
-    words = list(context.meta["d2rpick.command"])
-    if not context.params["overwrite"] and any(context.params.get(name) for name in _WRITTEN):
-        words.insert(words.index("--") if "--" in words else len(words), "--overwrite")
-    return [*(["env", *variables] if variables else []), "d2rpick", *words]
-
-
-# Options that write files, which the same command would find the next time.
-_WRITTEN = ("output_file", "plot", "report", "write_deck")
 
 
 def oscillator(options: dict[str, Any]) -> Oscillator | None:
@@ -336,7 +273,7 @@ def oscillator(options: dict[str, Any]) -> Oscillator | None:
     missing = [name for name in names if options[name] is None]
     if missing:
         raise click.UsageError(
-            f"--{_dashed(given[0])} needs --{_dashed(missing[0])} too: give all parameters of the oscillator"
+            f"--{dashed(given[0])} needs --{dashed(missing[0])} too: give all parameters of the oscillator"
         )
     if (options["frame_mass"] is None) == (options["beta"] is None):
         raise click.UsageError("the oscillator needs either --frame-mass or --beta")
@@ -381,14 +318,6 @@ def falls_short(quality: Quality | None, wanted: str | None) -> bool:
     from d2rpick.choice.quality import GRADES
 
     return GRADES.index(quality.grade) < GRADES.index(wanted)
-
-
-def _each(value: Any) -> tuple[Any, ...]:
-    return value if isinstance(value, tuple) else (value,)
-
-
-def _dashed(name: str) -> str:
-    return name.replace("_", "-")
 
 
 def _remember(name: str) -> Callable[[click.Context, click.Parameter, bool], None]:

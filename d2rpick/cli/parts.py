@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli import typed
 from d2rpick.cli.deck_cost import cost_options, model_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
@@ -73,7 +74,7 @@ def command(
     if options["report"]:
         from d2rpick.report.parts_page import as_page
 
-        output.write(options["report"], text_bytes(with_options(as_page(found, shared.repeat()))))
+        output.write(options["report"], text_bytes(with_options(as_page(found, typed.repeat()))))
     text = write("parts", output_format, found, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))
     return finish(ctx, objection=model is not None and found.recommended is None, exit_zero=exit_zero)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from d2rpick.cli import deck_cost, plan_deck
+from d2rpick.cli import deck_cost, plan_deck, typed
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.explorer import explorer_of
@@ -138,7 +138,7 @@ def _beside(plan: Plan, reference: Reference, options: dict[str, Any], output: O
         found = _judged(plan, reference, options, every=False)
         card = found[0].text if found else None
         explorer = explorer_of(explored_flights(reference, plan))
-        output.write(options["report"], text_bytes(as_page(plan, reference.run, shared.repeat(), card, explorer)))
+        output.write(options["report"], text_bytes(as_page(plan, reference.run, typed.repeat(), card, explorer)))
 
 
 def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool) -> tuple[str, bool]:

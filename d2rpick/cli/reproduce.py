@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli import typed
 from d2rpick.cli.output import Output, finish
 from d2rpick.report.formats import FORMATS
 
@@ -82,7 +83,7 @@ def command(
     if report:
         from d2rpick.report.reproduction_page import as_page
 
-        output.write(report, as_page(answer.rows, answer.exhibits, shared.repeat()).encode())
+        output.write(report, as_page(answer.rows, answer.exhibits, typed.repeat()).encode())
     answer = answer._replace(files=files)
     output.result(write("reproduction", output_format, answer, Shown(ctx.meta["d2rpick.command"])))
     output.notes([f"{len(files)} files in {output_dir}"], ())

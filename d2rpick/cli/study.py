@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli import typed
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import counting
 from d2rpick.cli.wording import in_words, with_options
@@ -185,7 +186,7 @@ def _write_files(answer: Study, plot: str | None, report: str | None, output: Ou
         from d2rpick.report.study_page import as_page
 
         drawing = figures.both_widths(figures_study.draw_study, answer, "runs")
-        output.write(report, text_bytes(with_options(as_page(answer, shared.repeat(), drawing))))
+        output.write(report, text_bytes(with_options(as_page(answer, typed.repeat(), drawing))))
 
 
 def _rows(question: Question, sources: Sequence[str], work: Work, *, quiet: bool) -> Iterator[StudyRow]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from d2rpick.cli import deck_cost
+from d2rpick.cli import deck_cost, typed
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
 from d2rpick.cli.explorer import explorer_of
@@ -135,8 +135,8 @@ def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> 
     request, pair = card_request(run, options, answer.situation.history), answer.recommended
     card = input_for(answer.situation, pair.tr, request) if pair else None
     explorer = explorer_of([explored_around(reference, answer.situation, answer.td_window)])
-    judging = shared.judging(options)
-    return as_page(answer, PageContext(run, shared.repeat(), judging, drawn(answer), card, explorer=explorer))
+    judging = typed.judging(options)
+    return as_page(answer, PageContext(run, typed.repeat(), judging, drawn(answer), card, explorer=explorer))
 
 
 def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:

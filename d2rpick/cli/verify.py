@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from d2rpick.cli import deck_cost
+from d2rpick.cli import deck_cost, typed
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
 from d2rpick.cli.explorer import explorer_of
@@ -109,5 +109,5 @@ def _page(answer: Verdict, reference: Reference, switched: Run | None, options: 
     request = card_request(run, options, answer.situation.history)
     card = input_for(answer.situation, answer.candidate.tr, request) if answer.verified else None
     explorer = explorer_of([explored_around(reference, answer.situation)])
-    judging = shared.judging(options)
-    return as_page(answer, PageContext(run, shared.repeat(), judging, drawn(answer), card, switched, explorer))
+    judging = typed.judging(options)
+    return as_page(answer, PageContext(run, typed.repeat(), judging, drawn(answer), card, switched, explorer))

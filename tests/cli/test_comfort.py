@@ -147,6 +147,11 @@ def test_the_command_on_a_page_can_be_pasted(tmp_path: Path) -> None:
     assert page.read_text("utf-8") == first
 
 
+def test_the_manual_leaves_the_short_name_of_help_as_it_is() -> None:
+    assert r"\-h, \-\-help" in manual()
+    assert run("rule", "-h").stdout == run("rule", "--help").stdout
+
+
 def test_the_manual_holds_every_command_and_option() -> None:
     page = manual()
     for name in COMMANDS:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.cli import options, suggest
+from d2rpick.cli import suggest, typed
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROOT, run
 from tests.shared import shared
 
@@ -241,7 +241,7 @@ def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_
         *("output_file", "overwrite", "quiet", "verbose", "show_settings", "debug"),
         *("solver", "merge", "swset", "step_cap", "node", "end", "name"),
     }
-    assert {str(option.name) for option in suggest.command.params} == {*about_output, *options._ASKING}
+    assert {str(option.name) for option in suggest.command.params} == {*about_output, *typed.ASKING}
 
 
 def test_a_time_that_no_card_can_hold_costs_the_card_only(tmp_path: Path) -> None:

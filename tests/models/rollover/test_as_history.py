@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.models.rollover.as_history import suggestion_for
+from tests.faults import thirds
 from tests.rehearsals import SETS, rehearse
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 MESH, INTERVAL, EVERY = 4, 3e-4, 18
 
 
-@pytest.mark.parametrize("number", range(len(SETS)))
+@pytest.mark.parametrize("number", thirds(range(len(SETS))))
 def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_announced(
     number: int, tmp_path: Path
 ) -> None:
