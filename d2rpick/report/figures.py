@@ -119,9 +119,11 @@ def show_span(axes: Axes, span: tuple[float, float], scale: Scale, cut: tuple[st
     axes.set_ylim(scale.low, scale.high)
     what, highest = cut
     if what and highest > scale.high:
+        early = what == "load"  # it stands on the left, a landing on the right
         axes.annotate(
-            f"{what}, up to {highest:.4g} \N{UPWARDS ARROW}", (1, 1), xycoords="axes fraction", xytext=(-6, -6),
-            textcoords="offset points", ha="right", va="top", fontsize="small",
+            f"{what}, up to {highest:.4g} \N{UPWARDS ARROW}", (0 if early else 1, 1), xycoords="axes fraction",
+            xytext=(6 if early else -6, -6), textcoords="offset points", ha="left" if early else "right", va="top",
+            fontsize="small",
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
         )  # fmt: skip
 
