@@ -45,6 +45,12 @@ def find_flights(history: History, settings: Settings = _PLAIN) -> tuple[Flight,
         if found and found[-1].start is not None and td > found[-1].start:
             continue
         situation = examine(history, td, settings)
-        if situation.in_flight and not situation.flight.refusal:
-            found.append(situation.flight)
+        flight = situation.flight
+        if situation.in_flight and not flight.refusal and not (found and _overlap(flight, found[-1])):
+            found.append(flight)
     return tuple(reversed(found))
+
+
+def _overlap(earlier: Flight, later: Flight) -> bool:
+    """Say whether a flight lasts into a later one: it misses the load before that one, so its end is not known."""
+    return earlier.end is None or later.start is None or earlier.end > later.start

@@ -23,7 +23,7 @@ def read_weights(path: str) -> Weights:
     """
     try:
         found = tomllib.loads(Path(path).read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ConfigurationError(f"{path}: cannot be read ({reason}), a TOML file of weights was expected") from None
     if unknown := [key for key in found if key not in _KEYS]:

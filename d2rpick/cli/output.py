@@ -113,8 +113,9 @@ class Output(NamedTuple):
                 _replace(path.resolve(), content)
         except BrokenPipeError:
             raise
-        except OSError as error:
-            raise D2RPickError(f"{name}: cannot be written ({error.strerror}); give another file") from error
+        except (OSError, RuntimeError) as error:  # Python before 3.13 tells a loop of links by RuntimeError
+            reason = getattr(error, "strerror", None) or "a loop of symbolic links"
+            raise D2RPickError(f"{name}: cannot be written ({reason}); give another file") from error
 
 
 def text_bytes(text: str) -> bytes:

@@ -102,5 +102,5 @@ def _names(table: Mapping[str, object], key: str, source: str) -> tuple[str, ...
 def _load(path: Path) -> dict[str, object]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {error}; valid TOML was expected") from None

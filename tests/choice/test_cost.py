@@ -121,6 +121,7 @@ def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
         ("[per_element]\nBT = 0", "no weight is above 0"), ("element_share = 2\n[per_element]\nBT = 1", "up to 1"),
         ("elementshare = 1\n[per_element]\nBT = 1", "not a key"), ("= 1", "cannot be read"),
         ("[per_element]\nBT = nan", "at least 0"), ("[per_element]\nBT = true", "BT is True"),
+        ("a = " + "[" * 100_000, "cannot be read"),
     ],
 )  # fmt: skip
 def test_weights_that_make_no_sense_are_refused_with_the_file(tmp_path: Path, text: str, told: str) -> None:

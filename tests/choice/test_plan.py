@@ -197,3 +197,16 @@ def test_the_switched_car_landed_as_computed() -> None:
     found = plan_of(read(legs), PLAIN, done=[(0.0496, 0.1464)], before=real("carT01.gz"))
     (moved,) = (row.done.moved for row in found.rows if row.done)
     assert moved == pytest.approx(0.5e-3, abs=1.5e-4)
+
+
+def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) -> None:
+    """One window was offered for two flights that lay in each other, as the energy before and after a load tells."""
+    record = drop(tilt=35.0)
+    rows = zip(record.time.tolist(), record.internal_energy[:, 0].tolist(), strict=True)
+    table = tmp_path / "energy.csv"
+    table.write_text("time,internal_energy\n" + "".join(f"{t!r},{energy!r}\n" for t, energy in rows))
+    found = plan_of(read([str(table)]), PLAIN)
+    assert len(found.rows) == 3
+    assert all(one.end < other.start for one, other in pairwise(found.rows))
+    windows = found.windows(every=True)
+    assert all(one[1] < other[0] for one, other in pairwise(windows))

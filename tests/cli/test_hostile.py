@@ -205,3 +205,9 @@ def test_lines_of_another_state_are_refused() -> None:
     refused = run("suggest", "--td", "0.064", "-", stdin=broken)
     assert refused.exit_code == 2
     assert "'internal energy' is missing, cut or doubled" in refused.stderr
+
+
+def test_a_loop_of_links_in_place_of_a_file_to_write_is_told(tmp_path: Path) -> None:
+    loop = tmp_path / "loop.csv"
+    loop.symlink_to(loop)
+    assert f"{loop}: cannot be written" in one_line(child('d2rpick extract "$@"', ENERGY, "-o", loop))

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.errors import RangeError
+
 if TYPE_CHECKING:
     from d2rpick.models.rollover.model import Plane, Values
     from d2rpick.models.rollover.motion import Motion
@@ -112,8 +114,12 @@ class Recorder:
         self._next += 1
 
     def record(self) -> Record:
-        """Give what was collected."""
+        """Give what was collected; RangeError where a number is not finite."""
         motion, real, plane = self._motion, self._reals.T, self._planes.T
+        if not (np.isfinite(real).all() and np.isfinite(plane).all()):
+            raise RangeError(
+                "the motion of the box becomes infinite: these parameters are beyond what the model can do"
+            )
         return Record(
             time=real[0],
             centre=plane[0],

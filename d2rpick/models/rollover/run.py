@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from d2rpick.errors import RangeError
 from d2rpick.models.rollover.motion import Motion
 from d2rpick.models.rollover.record import Recorder
@@ -54,21 +56,25 @@ def simulate(parameters: Parameters, t_end: float, *windows: RigidWindow, interv
 
 
 def proceed(motion: Motion, t_end: float, *windows: RigidWindow) -> Record:
-    """Go on with ``motion`` to ``t_end`` [s], switching at the first step at or after the times of ``windows``."""
+    """Go on with ``motion`` to ``t_end`` [s], switching at the first step at or after the times of ``windows``.
+
+    RangeError when its numbers become infinite.
+    """
     last = motion.every * (motion.step_at(t_end) // motion.every)
     rigid, deformable = {motion.step_at(one.tr) for one in windows}, {motion.step_at(one.td) for one in windows}
-    recorder = Recorder(motion, last)
-    while True:
-        if motion.count in rigid:
-            motion.make_rigid()
-        if motion.count in deformable:
-            motion.make_deformable()
-        mean = motion.advance()
-        if motion.count % motion.every == 0:
-            recorder.note(mean)
-        if motion.count >= last:
-            return recorder.record()
-        motion.move()
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # the record tells whether it went well
+        recorder = Recorder(motion, last)
+        while True:
+            if motion.count in rigid:
+                motion.make_rigid()
+            if motion.count in deformable:
+                motion.make_deformable()
+            mean = motion.advance()
+            if motion.count % motion.every == 0:
+                recorder.note(mean)
+            if motion.count >= last:
+                return recorder.record()
+            motion.move()
 
 
 def run_to(motion: Motion, time: float) -> None:
