@@ -73,12 +73,17 @@ def asked_of(
 
 def selection_for(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
     """Add the parts to the columns that were named when the run was read."""
-    if not hasattr(run, "files"):
-        raise TypeError(f"run is {run!r}, what read() or from_frame() gives was expected")
+    check_run(run)
     names = arguments.part_names("parts", parts)
     if names and run.chosen.energy:
         raise ValueError("parts and the energy that was named when the run was read exclude each other")
     return run.chosen._replace(parts=names, flying=arguments.part_names("flying", flying))
+
+
+def check_run(run: Run) -> None:
+    """Raise TypeError for what is not a run that was read."""
+    if not hasattr(run, "files"):
+        raise TypeError(f"run is {run!r}, what read() or from_frame() gives was expected")
 
 
 def model_of(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.library import arguments
 from d2rpick.library.answers import written
-from d2rpick.library.asked import model_of
+from d2rpick.library.asked import check_run, model_of
 from d2rpick.library.frames import frame_of
 from d2rpick.library.repeat import options_of
 
@@ -125,6 +125,7 @@ def parts(
     from d2rpick.histories.printed_steps import printed_steps
     from d2rpick.histories.selection import select_parts
 
+    check_run(run)
     settings = arguments.settings(choosing, with_deck=True)
     times = _times(tr, td)
     names = arguments.part_names("given", given)
