@@ -19,10 +19,24 @@ from d2rpick.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-COMMANDS: Final = (
-    "suggest", "explore", "plan", "parts", "calibrate", "verify", "replay", "info", "extract", "card", "check", "rule",
-    "study", "reproduce", "rollover",
-)  # fmt: skip
+# Each command in a line, for the help: that does without the modules behind them.
+COMMANDS: Final = {
+    "suggest": "Choose tr for a td, or both times.",
+    "explore": "Show what each td costs.",
+    "plan": "Plan the rigid windows of all flights of a run.",
+    "parts": "Say which parts may be switched, and what that saves.",
+    "calibrate": "Fit the cost of elements to runs of a site.",
+    "verify": "Judge a pair of times, or a finished switched run.",
+    "replay": "Compute the floating oscillator in closed form.",
+    "info": "Show what is in the files of a run.",
+    "extract": "Write the chosen energy as csv or hdf5.",
+    "card": "Print solver input for switching windows.",
+    "check": "Check the switches of decks, also against a run.",
+    "rule": "Explain a rule of check, or list all.",
+    "study": "Choose tr for many runs, and one tr for all.",
+    "reproduce": "Reproduce the published results.",
+    "rollover": "Compute a box that trips or falls, flies and lands.",
+}
 COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
@@ -44,6 +58,10 @@ class _Group(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  click's signature
         return list(COMMANDS)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:

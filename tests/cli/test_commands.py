@@ -318,6 +318,12 @@ def test_every_help_ends_with_examples_that_run(command: str, tmp_path: Path, mo
         assert (call, result.exit_code) in [(call, 0), (call, 1)], result.stderr
 
 
+def test_the_help_names_each_command_in_a_line() -> None:
+    shown = run("--help").stdout.split("Commands:\n")[1].split("\n\n")[0].split("\n")
+    assert shown == [f"  {name:9}  {line}" for name, line in COMMANDS.items()]
+    assert max(map(len, shown)) <= 80
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_is_the_same_by_its_short_name_and_explains_every_option(command: str) -> None:
     text = run(command, "--help").stdout

@@ -81,6 +81,9 @@ class Branch:
         names = {name for group in self._states.groups for name in group.layout.variables}
         if late := sorted(names - self.common):
             notes.append(f"{self.source} has {listing(late)} in some states only")
+        if self._changing:
+            changing = listing(self._changing)
+            notes.append(f"{self.source} has {changing} of another type in some states: damaged there, and left out")
         if self and not states.numbers.size:
             notes.append(f"{self.source} holds no state yet")
         return tuple(notes)
@@ -90,6 +93,12 @@ class Branch:
         """Variables that all states hold."""
         held = [frozenset(group.layout.variables) for group in self._states.groups]
         return frozenset.intersection(*held) if held else frozenset()
+
+    @cached_property
+    def _changing(self) -> list[str]:
+        """Variables that are numbers of one kind in some states, and of another in others."""
+        layouts = [group.layout.variables for group in self._states.groups]
+        return sorted(name for name in self.common if len({layout[name].dtype.kind for layout in layouts}) > 1)
 
     @cached_property
     def scalars(self) -> tuple[str, ...]:

@@ -162,6 +162,15 @@ def test_any_byte_of_a_binouts_structure_may_be_wrong(flip: int, tenth: int) -> 
         data[place] ^= flip
 
 
+def test_a_variable_whose_type_changes_between_states_is_left_out_with_a_note() -> None:
+    name = b"\x10hourglass_energy"
+    data = bytearray(BINOUT.data)
+    data[data.index(name, data.index(b"/glstat/d000001")) - 1] = 3  # integers of four bytes
+    run = Binout([("binout", bytes(data))])
+    assert "hourglass_energy" not in run.channels
+    assert any("hourglass_energy of another type in some states" in note for note in run.notes)
+
+
 @pytest.mark.parametrize("tenth", range(10))
 @pytest.mark.parametrize("flip", [0x01, 0x02, 0x04, 0x08, 0x10, 0x20, 0x40, 0x80, 0xFF])
 def test_any_byte_of_a_time_historys_structure_may_be_wrong(flip: int, tenth: int) -> None:
