@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.deck.inventory.model import some_of
 from d2rpick.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ ELEMENT_SHARE: Final = 0.87
 # us per node of a rigid body and cycle, of the same legs.
 RIGID_NODE: Final = 0.05
 _SOURCE: Final = "OpenRadioss 2026-08, one thread"
+# Sums over all elements stay finite below this; no unit of time comes near.
+_LARGEST: Final = 1e100
 
 
 @dataclass(frozen=True)
@@ -51,16 +54,19 @@ class Weights:
     def __post_init__(self) -> None:
         """Raise ConfigurationError with the name of a number that makes no sense."""
         for name, value in self.per_element.items():
-            if not 0 <= value < float("inf"):
-                raise ConfigurationError(f"the weight of {name!r} is {value:g}, a number of at least 0 was expected")
+            _check(f"the weight of {name!r}", value)
         if not any(self.per_element.values()):
             raise ConfigurationError("no weight is above 0; give the cost of at least one formulation")
         if not 0 < self.element_share <= 1:
             raise ConfigurationError(
                 f"element_share is {self.element_share:g}, a number above 0 and up to 1 was expected"
             )
-        if not 0 <= self.rigid_node < float("inf"):
-            raise ConfigurationError(f"rigid_node is {self.rigid_node:g}, a number of at least 0 was expected")
+        _check("rigid_node", self.rigid_node)
+
+
+def _check(name: str, value: float) -> None:
+    if not 0 <= value <= _LARGEST:
+        raise ConfigurationError(f"{name} is {value:g}, a number of at least 0 and at most {_LARGEST:g} was expected")
 
 
 def saved_share(weights: Weights, total: float, rigid: float, nodes: int) -> float:
@@ -121,7 +127,9 @@ class CostModel:
         return self._share(own, own.cost / total.cost if total.cost else 0.0)
 
     def saved(self, parts: Collection[int]) -> Share:
-        """Share of a step that is saved while these parts are rigid, c above [-]."""
+        """Share of a step that is saved while these parts are rigid, c above [-]; unknown of parts beside the deck."""
+        if absent := sorted(set(parts) - self.inventory.parts.keys()):
+            return Share(None, f"part {some_of(absent)} is not in the deck")
         within = self.inventory.elements_within(parts)
         rigid = _sum(self._of(part, counts) for part, counts in within.items())
         total = self.total

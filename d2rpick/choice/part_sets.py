@@ -12,6 +12,7 @@ from d2rpick.choice.of_run import Reference, suggest_of, verify_of
 from d2rpick.choice.part_facts import facts_of
 from d2rpick.choice.part_steps import steps_of
 from d2rpick.choice.part_verdicts import rows_of
+from d2rpick.choice.same_model import doubts_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import FormatError, RangeError
 from d2rpick.histories.opening import Selection
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 _LIKE: Final = 0.01
 # The heaviest parts that together have this share of the mass of all that may be switched.
 _HEAVY: Final = 0.5
-_SEVERAL: Final = "several rigid bodies: how far each is out of place is not predicted"
+SEVERAL_BODIES: Final = "several rigid bodies: how far each is out of place is not predicted"
 _NO_ANGLE: Final = "no file of a run tells how its parts turn; the angle error is not known"
 
 
@@ -246,11 +247,12 @@ class _Comparison:
     def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
         """Find when the set may be rigid; RangeError with the reason where it may not."""
         reference = Reference.of(self.run, Selection(parts=tuple(map(str, one.parts))))
+        settings = replace(self.settings, one_body=len(one.bodies) <= 1)
         if isinstance(times, tuple):
-            situation = verify_of(reference, *times, self.settings).situation
+            situation = verify_of(reference, *times, settings).situation
             tr, td = times
         else:
-            answer = suggest_of(reference, times, self.settings, with_better=False)
+            answer = suggest_of(reference, times, settings, with_better=False)
             if answer.recommended is None:
                 why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
                 raise RangeError("; ".join(why) or "no tr can be recommended")
@@ -263,7 +265,7 @@ class _Comparison:
 def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
     """Add how far the body is out of place at td since its parts moved against each other before."""
     if len(one.bodies) > 1:
-        return replace(one, reasons=(_SEVERAL,))
+        return replace(one, reasons=(SEVERAL_BODIES,))
     drift, error = situation.drift, float(situation.position_errors(np.array([tr]))[0])
     if drift is None or np.isnan(error):
         return one
@@ -292,6 +294,7 @@ def _cautions(
     if model is None:
         yield Caution("no-deck", "without a deck the cost and most verdicts stay open; name the main deck of the run")
         return
+    yield from doubts_of((fact.part for fact in facts.parts.values()), model.inventory)
     for note in model.inventory.notes:
         yield Caution("deck-not-followed", note)
     if model.assumed:

@@ -71,7 +71,7 @@ def rows_of(facts: RunFacts, model: CostModel | None, steps: Steps) -> tuple[Par
     inventory = model.inventory if model else None
     ids = sorted({*facts.parts, *(inventory.parts if inventory else ())})
     rows = [_described(part, facts, model, steps) for part in ids]
-    alone = _landing_alone(rows)
+    alone = landing_alone(rows)
     judged = [_judged(row, facts, inventory, alone) for row in rows]
     return tuple(_merged(judged, inventory)) if inventory else tuple(judged)
 
@@ -183,7 +183,7 @@ def _to_switch(row: PartRow, fact: PartFacts | None, data: PartData | None) -> I
         yield "its energy is not written"
 
 
-def _landing_alone(rows: Sequence[PartRow]) -> int | None:
+def landing_alone(rows: Sequence[PartRow]) -> int | None:
     """Find the part that takes nearly all of the first energy of the landing after the longest flight."""
     taken = {row.id: row.flight.landing for row in rows if row.flight and row.flight.landing is not None}
     total = sum(value for value in taken.values() if value > 0)

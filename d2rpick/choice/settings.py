@@ -32,6 +32,7 @@ class Settings:
     the energy level alone.  ``strict``: accept no tr of a flight that is not certain.
     ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the step while rigid to that
     while deformable; without the first nothing is said of the run time.
+    ``one_body`` False: the parts become several rigid bodies, and none of them is predicted to be out of place.
     """
 
     after: float | None = None
@@ -45,6 +46,7 @@ class Settings:
     strict: bool = False
     cost_share: float | None = None
     step_ratio: float = 1.0
+    one_body: bool = True
 
     def __post_init__(self) -> None:
         """Raise ValueError with the name of an argument that is out of its range."""

@@ -78,7 +78,7 @@ class Situation:
     @cached_property
     def drift(self) -> Drift | None:
         """How the body that the parts to be switched become drifts in the flight; None where that is not known."""
-        if self.flight.parts is None:
+        if self.flight.parts is None or not self.settings.one_body:
             return None
         from d2rpick.flight.position_error import drift_in_flight  # not above: a table has no parts
 

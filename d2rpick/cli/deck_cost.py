@@ -36,50 +36,36 @@ def model_of(options: dict[str, Any]) -> CostModel | None:
         if options["weights"]:
             raise click.UsageError("--weights needs --deck, the deck whose elements are weighted")
         return None
-    from d2rpick.choice.cost import CostModel
-    from d2rpick.choice.weights_file import read_weights
-    from d2rpick.deck.inventory import read_inventory
+    from d2rpick.choice.by_deck import read_model
 
-    weights = read_weights(options["weights"]) if options["weights"] else None
-    return CostModel(read_inventory(options["deck"]), weights)
+    return read_model(options["deck"], options["weights"])
 
 
-def with_recommended(run: Run, options: dict[str, Any], settings: Settings, model: CostModel | None) -> dict[str, Any]:
-    """Replace ``--part recommended`` by the numbers of the set that ``parts`` recommends; UsageError without a deck."""
-    titles = {part.title.strip().casefold() for part in run.parts}
-    words = [text.strip().casefold() for text in options["part"]]
-    if "recommended" not in words or "recommended" in titles:
-        return options
-    if len(words) > 1:
-        raise click.UsageError("--part recommended stands for a whole set; leave the other --part out")
-    if model is None:
-        raise click.UsageError("--part recommended needs --deck, the main deck of the run")
-    from d2rpick.choice.part_sets import recommended_parts
+def with_deck(run: Run, options: dict[str, Any], settings: Settings, model: CostModel | None) -> dict[str, Any]:
+    """Replace ``--part recommended`` by the numbers of that set, and add those of springs; UsageError without a deck.
 
-    return {**options, "part": tuple(map(str, recommended_parts(run, settings, model)))}
+    The energy of springs is no level: they are the parts that the deck, or their energies, show to be springs.
+    """
+    from d2rpick.flight.flying_parts import asks_for_recommended
 
-
-def with_springs(run: Run, options: dict[str, Any], model: CostModel | None) -> dict[str, Any]:
-    """Add the numbers of the parts that the deck, or their energies, show to be springs: their energy is no level."""
+    if asks_for_recommended(options["part"], run):
+        if len(options["part"]) > 1:
+            raise click.UsageError("--part recommended stands for a whole set; leave the other --part out")
+        if model is None:
+            raise click.UsageError("--part recommended needs --deck, the main deck of the run")
     if model is None:
         return options
-    from d2rpick.deck.inventory.model import DISCRETE
+    from d2rpick.choice.by_deck import selected
+    from d2rpick.histories.selection import Selection
 
-    counts = model.inventory.counts
-    springs = {part.id for part in run.springs} | {part for part, kinds in counts.items() if {*kinds} <= DISCRETE}
-    return {**options, "springs": tuple(map(str, sorted(springs)))}
+    found = selected(run, Selection(parts=options["part"]), settings, model)
+    return {**options, "part": found.parts, "springs": found.springs}
 
 
 def with_cost(settings: Settings, history: History, model: CostModel | None) -> tuple[Settings, tuple[Caution, ...]]:
-    """Take the cost share of the parts of a history from the deck, and say so where it stays unknown."""
-    if model is None or settings.cost_share is not None:
+    """Let a deck tell what the parts of a history cost, and whether they are one body."""
+    if model is None:
         return settings, ()
-    from d2rpick.choice.part_sets import with_cost_of
-    from d2rpick.choice.warnings import Caution
+    from d2rpick.choice import by_deck
 
-    if not history.parts:
-        why = "no parts are named whose elements are saved; give them with `parts`"
-        return settings, (Caution("cost-unknown", f"the run time stays open: {why}"),)
-    found, share = with_cost_of(settings, model, [part.id for part in history.parts])
-    told = f"the run time stays open: {share.reason}"
-    return found, () if share.reason is None else (Caution("cost-unknown", told),)
+    return by_deck.with_deck(settings, history, model)

@@ -83,8 +83,7 @@ def command(
         run = asked.open()
         output = Output.of(options, *run.sources, *(name for name in (done, *before) if name not in (None, "-")))
         model = deck_cost.model_of(options)
-        options = deck_cost.with_recommended(run, options, settings, model)
-        options = deck_cost.with_springs(run, options, model)
+        options = deck_cost.with_deck(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
         settings, unknown = deck_cost.with_cost(settings, reference.history, model)
         earlier = reference.like(asked._replace(names=before).open(), asked.selection) if before else None

@@ -21,6 +21,7 @@ _LOOKBACK = 32  # bytes of the chunk before, so that what stands in front of a h
 _PGP = b"-----BEGIN PGP MESSAGE"
 _ANCHOR = _PGP.index(b"G")  # a letter that mesh data never holds: looking for it alone costs nothing
 _MARK = b"\xef\xbb\xbf"  # byte order mark of UTF-8
+_GZIP = b"\x1f\x8b\x08"
 _HEAD = 1024  # longest keyword line that is looked at
 _BEFORE = 4096  # how far back comments belonging to a keyword are looked for
 _SILENCE = re.compile(r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)", re.IGNORECASE)
@@ -94,7 +95,9 @@ class SourceFile:
                 base += count
 
     def _start(self, buffer: bytearray, end: int) -> None:
-        """Pass over a byte order mark; refuse lines that no reader of decks would see."""
+        """Pass over a byte order mark; refuse what no reader of decks would see: compressed files, ends in CR alone."""
+        if buffer.startswith(_GZIP, _LOOKBACK):
+            raise DeckError(f"{self.name}: compressed with gzip, a deck as its solver reads it was expected; unpack it")
         if buffer.startswith(_MARK, _LOOKBACK):
             buffer[_LOOKBACK : _LOOKBACK + len(_MARK)] = b"\n" * len(_MARK)
         if buffer.find(b"\r", _LOOKBACK, end) >= 0 > buffer.find(b"\n", _LOOKBACK, end):

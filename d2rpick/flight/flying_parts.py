@@ -12,7 +12,7 @@ from d2rpick.flight.flight import all_seen
 from d2rpick.histories.history import Given
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import History, Part
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 FLYING: Final = "flying"
 ALL: Final = "all"
+RECOMMENDED: Final = "recommended"
 
 
 def with_parts_by_number(run: Run, selection: Selection) -> Selection:
@@ -88,3 +89,9 @@ def _flights(run: Run, chosen: tuple[Part, ...]) -> list[FreeFlight]:
     history: History = run.history(Selection(parts=tuple(str(part.id) for part in chosen)))
     own = tuple(one for one in history.momenta if one.parts is not None)
     return [flight for _, flight in all_seen(replace(history, evidence=Given(own)))]
+
+
+def asks_for_recommended(parts: Sequence[str], run: Run) -> bool:
+    """Whether the parts hold the word "recommended", and no part of the run has it for its title."""
+    titles = {part.title.strip().casefold() for part in run.parts}
+    return RECOMMENDED in {text.strip().casefold() for text in parts} - titles

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.library import arguments
+from d2rpick.library.asked import asked_of
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import asking, command_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.choice import suggest as choice
     from d2rpick.choice import verify as judgement
     from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.cost import Weights
     from d2rpick.choice.health import Health
     from d2rpick.choice.judged_card import SolverInput
     from d2rpick.choice.quality import Quality
@@ -214,6 +215,8 @@ def suggest(
     td_window: tuple[float, float] | None = None,
     parts: Parts | None = None,
     flying: Parts | None = None,
+    deck: arguments.Path | None = None,
+    weights: Weights | arguments.Path | None = None,
     **choosing: Unpack[Choosing],
 ) -> Suggestion:
     """Choose tr for ``td``, or both times with td in ``td_window`` or the longest flight, as ``d2rpick suggest`` does.
@@ -231,6 +234,10 @@ def suggest(
         ``"all"`` all that have energy.
     flying : number, title or several, optional
         What flies together with them.
+    deck : path, optional
+        Main deck of the run: tells what the parts cost, which are springs, and the parts of ``"recommended"``.
+    weights : Weights or path, optional
+        Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     **choosing
         How to choose, see `Choosing`: ``after``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``,
         ``oscillator`` with ``v0``, ``fit_window``, ``replay``, ``strict``, ``cost_share``, ``step_ratio``.
@@ -254,23 +261,23 @@ def suggest(
     >>> f"{answer.recommended.tr:.6f} {answer.recommended.td:.6f}"
     '0.013587 0.068753'
     """
-    from d2rpick.choice.of_run import Reference, suggest_of
+    from d2rpick.choice.of_run import suggest_of
 
     if td is not None and td_window is not None:
         raise TypeError("td or td_window was expected, and not both")
     window = None if td_window is None else arguments.window("td_window", td_window)
-    asked = window if td is None else arguments.number("td", td)
-    settings = arguments.settings(choosing)
-    selection = selection_for(run, parts, flying)
-    core = suggest_of(Reference.of(run.files, selection), asked, settings)
-    times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked)) if asked else ()
+    wanted = window if td is None else arguments.number("td", td)
+    asked = asked_of(run, parts, flying, deck, weights, choosing)
+    core = suggest_of(asked.reference, wanted, asked.settings)
+    core = core._replace(cautions=(*core.cautions, *asked.cautions))
+    at = ("--td", repr(wanted)) if isinstance(wanted, float) else ("--td-window", *map(repr, wanted)) if wanted else ()
     return Suggestion(
         run=run,
         situation=core.situation,
         warnings=core.cautions,
         health=core.health,
-        command=command_line("suggest", times, run, selection, choosing),
-        _asking=asking(run, selection, choosing),
+        command=("suggest", *at, *asked.options),
+        _asking=asked.options,
         candidates=core.candidates,
         recommended=core.recommended,
         better_pair=core.better_pair,
@@ -286,6 +293,8 @@ def verify(
     switched: Run | None = None,
     parts: Parts | None = None,
     flying: Parts | None = None,
+    deck: arguments.Path | None = None,
+    weights: Weights | arguments.Path | None = None,
     **choosing: Unpack[Choosing],
 ) -> Verdict:
     """Judge one pair of switch times, as ``d2rpick verify`` does.
@@ -298,7 +307,7 @@ def verify(
         Switch times [time].
     switched : Run, optional
         A finished run with these switch times, to be compared with ``run``.
-    parts, flying, **choosing
+    parts, flying, deck, weights, **choosing
         As for `suggest`.
 
     Returns
@@ -319,24 +328,23 @@ def verify(
     >>> d2.verify(run, tr=0.0135867, td=0.0687534).verified
     True
     """
-    from d2rpick.choice.of_run import Reference, compare_with, verify_of
+    from d2rpick.choice.of_run import compare_with, verify_of
 
     pair = arguments.number("tr", tr), arguments.number("td", td)
-    settings = arguments.settings(choosing)
-    selection = selection_for(run, parts, flying)
-    reference = Reference.of(run.files, selection)
-    core = verify_of(reference, *pair, settings)
+    asked = asked_of(run, parts, flying, deck, weights, choosing)
+    core = verify_of(asked.reference, *pair, asked.settings)
     times = ["--tr", repr(pair[0]), "--td", repr(pair[1])]
     if switched is not None:
-        core = compare_with(core, reference, reference.like(switched.files, selection))
+        core = compare_with(core, asked.reference, asked.reference.like(switched.files, asked.selection))
         times += [text for name in switched.sources for text in ("--switched", name)]
+    core = core._replace(cautions=(*core.cautions, *asked.cautions))
     return Verdict(
         run=run,
         situation=core.situation,
         warnings=core.cautions,
         health=core.health,
-        command=command_line("verify", times, run, selection, choosing),
-        _asking=asking(run, selection, choosing),
+        command=("verify", *times, *asked.options),
+        _asking=asked.options,
         verified=core.verified,
         reasons=core.reasons,
         tr_ok=core.tr_ok,
@@ -344,16 +352,6 @@ def verify(
         candidate=core.candidate,
         _core=core,
     )
-
-
-def selection_for(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
-    """Add the parts to the columns that were named when the run was read."""
-    if not hasattr(run, "files"):
-        raise TypeError(f"run is {run!r}, what read() or from_frame() gives was expected")
-    names = arguments.part_names("parts", parts)
-    if names and run.chosen.energy:
-        raise ValueError("parts and the energy that was named when the run was read exclude each other")
-    return run.chosen._replace(parts=names, flying=arguments.part_names("flying", flying))
 
 
 def explorer_of(found: Iterable[TradeOff | None], asking: Sequence[str]) -> Explorer | None:

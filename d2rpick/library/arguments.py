@@ -134,8 +134,11 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
     return tuple(os.fsdecode(one) for one in listed)
 
 
-def settings(choosing: Choosing) -> Settings:
-    """Collect the arguments that say how to choose and judge; TypeError for one that does not exist."""
+def settings(choosing: Choosing, *, with_deck: bool = False) -> Settings:
+    """Collect the arguments that say how to choose and judge; TypeError for one that does not exist.
+
+    ``with_deck``: a deck tells the cost share, unless it is given.
+    """
     from d2rpick.choice.settings import Settings
     from d2rpick.vibration.replay import to_mode
 
@@ -155,8 +158,8 @@ def settings(choosing: Choosing) -> Settings:
     chosen = [name for name, value in ways.items() if value]
     if len(chosen) > 1:
         raise ValueError(f"{chosen[0]} and {chosen[1]} exclude each other")
-    if "step_ratio" in given and given.get("cost_share") is None:
-        raise ValueError("step_ratio needs cost_share too: the run time needs both")
+    if "step_ratio" in given and given.get("cost_share") is None and not with_deck:
+        raise ValueError("step_ratio needs cost_share or a deck too: the run time needs both")
     return Settings(**given, oscillator=to_mode(oscillator, v0) if oscillator else None)
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.library import arguments
-from d2rpick.library.answers import explorer_of, page_record, selection_for, written
+from d2rpick.library.answers import explorer_of, page_record, written
+from d2rpick.library.asked import selection_for
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
 from d2rpick.library.repeat import asking, command_line

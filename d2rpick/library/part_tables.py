@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.library import arguments
 from d2rpick.library.answers import written
+from d2rpick.library.asked import check_run, model_of
 from d2rpick.library.frames import frame_of
 from d2rpick.library.repeat import options_of
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from d2rpick.choice.cost import CostModel, Weights
+    from d2rpick.choice.cost import Weights
     from d2rpick.choice.part_sets import Parts as Core
     from d2rpick.choice.part_sets import PartSet
     from d2rpick.choice.part_verdicts import PartRow
@@ -124,34 +125,20 @@ def parts(
     from d2rpick.histories.printed_steps import printed_steps
     from d2rpick.histories.selection import select_parts
 
-    if weights is not None and deck is None:
-        raise ValueError("weights needs a deck, whose elements are weighted")
-    settings = arguments.settings({"cost_share": 0.0, **choosing})  # that of each set is from the deck
+    check_run(run)
+    settings = arguments.settings(choosing, with_deck=True)
     times = _times(tr, td)
     names = arguments.part_names("given", given)
-    decks = arguments.paths("deck", deck) if deck is not None else ()
-    model = _model(decks[0], weights) if decks else None
+    model, options = model_of(deck, weights)
     wanted = select_parts(names, run.parts, run.files.name) if names else ()
     core = parts_of(
         run.files, settings, model, given=[part.id for part in wanted], times=times,
-        printed=printed_steps(run.files, *decks),
+        printed=printed_steps(run.files, *options[1:2]),  # beside the deck
     )  # fmt: skip
-    asked = [("--deck", *decks)] if decks else []
-    asked += [("--weights", str(weights))] if isinstance(weights, str) else []
-    asked += [(f"--{name}", repr(value)) for name, value in (("tr", tr), ("td", td)) if value is not None]
-    options = [text for pair in asked for text in pair]
-    command = ("parts", *options, *options_of(run.chosen._replace(parts=names), choosing), *run.sources)
+    named = [(f"--{name}", repr(value)) for name, value in (("tr", tr), ("td", td)) if value is not None]
+    window = [text for pair in named for text in pair]
+    command = ("parts", *options, *window, *options_of(run.chosen._replace(parts=names), choosing), *run.sources)
     return PartTable(run, core.rows, core.sets, core.recommended, core.cautions, command, core)
-
-
-def _model(deck: str, weights: Weights | arguments.Path | None) -> CostModel:
-    from d2rpick.choice.cost import CostModel, Weights
-    from d2rpick.choice.weights_file import read_weights
-    from d2rpick.deck.inventory import read_inventory
-
-    if weights is not None and not isinstance(weights, Weights):
-        weights = read_weights(arguments.paths("weights", weights)[0])
-    return CostModel(read_inventory(deck), weights)
 
 
 def _times(tr: float | None, td: float | None) -> tuple[float, float] | float | None:

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.library import arguments
-from d2rpick.library.answers import explorer_of, selection_for, written
+from d2rpick.library.answers import explorer_of, written
+from d2rpick.library.asked import asked_of
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import asking, command_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from d2rpick.choice.cost import Weights
     from d2rpick.choice.plan import Plan as Core
     from d2rpick.choice.plan import Planned
     from d2rpick.choice.warnings import Caution
@@ -93,6 +94,8 @@ def plan(
     *,
     parts: Parts | None = None,
     flying: Parts | None = None,
+    deck: arguments.Path | None = None,
+    weights: Weights | arguments.Path | None = None,
     min_rigid: float | None = None,
     done: Iterable[tuple[float, float]] = (),
     before: Run | None = None,
@@ -104,7 +107,7 @@ def plan(
     ----------
     run : Run
         As `read` gives it: without switching, or switched in the windows that are ``done``.
-    parts, flying, **choosing
+    parts, flying, deck, weights, **choosing
         As for `suggest`.
     min_rigid : float, optional
         Leave shorter windows out [time].  Default: 5 % of the record.
@@ -131,20 +134,18 @@ def plan(
     >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
     [(0.097, 0.37)]
     """
-    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.plan import plan_of
     from d2rpick.deck.printing.common import check_windows
 
-    settings = arguments.settings(choosing)
     shortest = None if min_rigid is None else arguments.number("min_rigid", min_rigid, 0.0)
     pairs = [arguments.window(f"done[{number}]", list(pair)) for number, pair in enumerate(done)]
     if before is not None and not pairs:
         raise ValueError("before is a run, but done names no window that was planned from it")
-    selection = selection_for(run, parts, flying)
-    reference = Reference.of(run.files, selection)
-    earlier = reference.like(before.files, selection) if before is not None else None
+    asked = asked_of(run, parts, flying, deck, weights, choosing)
+    earlier = asked.reference.like(before.files, asked.selection) if before is not None else None
     windows = check_windows(pairs) if pairs else ()
-    core = plan_of(reference, settings, min_rigid=shortest, done=windows, before=earlier)
+    core = plan_of(asked.reference, asked.settings, min_rigid=shortest, done=windows, before=earlier)
+    core = core._replace(cautions=(*core.cautions, *asked.cautions))
     own = [] if shortest is None else ["--min-rigid", repr(shortest)]
     own += ["--done", "-"] if windows else []  # on its standard input, a line for each
     own += [text for name in (before.sources if before else ()) for text in ("--before", name)]
@@ -155,7 +156,7 @@ def plan(
         all_windows=core.windows(every=True),
         next_run=core.next_run(),
         warnings=core.cautions,
-        command=command_line("plan", own, run, selection, choosing),
-        _asking=asking(run, selection, choosing),
+        command=("plan", *own, *asked.options),
+        _asking=asked.options,
         _core=core,
     )

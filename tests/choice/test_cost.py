@@ -73,6 +73,11 @@ def test_a_deck_that_is_not_whole_leaves_the_cost_open() -> None:
     assert "mesh.k was not read" in str(share.reason)
 
 
+def test_a_part_that_the_deck_does_not_have_leaves_what_it_saves_open() -> None:
+    share = CostModel(inventory({1: 30, 2: 70})).saved([2, 3, 4])
+    assert (share.value, share.reason) == (None, "part 3, 4 is not in the deck")
+
+
 def test_formulations_that_were_not_measured_are_named() -> None:
     own = {1: QBAT, 2: Formulation("fully integrated (ELFORM 16)", "QBAT", measured=False)}
     found = inventory({1: 1, 2: 1}, formulations=own)
@@ -109,7 +114,7 @@ def test_classes_of_formulations(found: Formulation, cost: str | None) -> None:
 
 
 def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
-    weights = Weights({"BT": 0.3, 'a "strange" one': 2.5}, 0.9, 0.01, "site")
+    weights = Weights({"BT": 0.3, 'a "strange" one': 2.5, "träge \U0001f422": 1.0}, 0.9, 0.01, "site")
     (tmp_path / "site.toml").write_text(written(weights), "utf-8")
     assert read_weights(str(tmp_path / "site.toml")) == weights
 
@@ -118,6 +123,8 @@ def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
     ("text", "told"),
     [
         ("", "no table"), ("[per_element]\nBT = 'much'", "BT is 'much'"), ("[per_element]\nBT = -1", "at least 0"),
+        ("[per_element]\nBT = 1e308", "at most 1e+100"), (f"[per_element]\nBT = {'9' * 400}", "is inf"),
+        ("rigid_node = nan\n[per_element]\nBT = 1", "rigid_node is nan"),
         ("[per_element]\nBT = 0", "no weight is above 0"), ("element_share = 2\n[per_element]\nBT = 1", "up to 1"),
         ("elementshare = 1\n[per_element]\nBT = 1", "not a key"), ("= 1", "cannot be read"),
         ("[per_element]\nBT = nan", "at least 0"), ("[per_element]\nBT = true", "BT is True"),

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from d2rpick.choice.cost import CostModel
+from d2rpick.choice.cost import CostModel, Weights
+from d2rpick.choice.part_facts import InFlight, PartFacts, facts_of
 from d2rpick.choice.part_sets import Parts, parts_of, recommended_parts
 from d2rpick.choice.part_steps import Steps
+from d2rpick.choice.part_verdicts import PartRow, landing_alone, rows_of
 from d2rpick.choice.settings import Settings
 from d2rpick.deck.inventory import read_inventory
 from d2rpick.errors import FormatError
@@ -175,3 +178,49 @@ def test_where_the_car_comes_to_rest(car: Parts) -> None:
 def test_masses_that_are_written_come_before_those_of_the_deck(car: Parts) -> None:
     assert {row.mass_source for row in car.rows} == {"history"}
     assert np.isclose(sum(row.mass or 0.0 for row in car.rows if row.movable), 845.5, atol=0.2)
+
+
+def test_a_deck_whose_parts_have_other_titles_is_doubted(tmp_path: Path) -> None:
+    found = asked(BOX, variant(tmp_path, (STEP, STEP.replace("step", "skid"))))
+    (told,) = [caution.message for caution in found.cautions if caution.code == "deck-of-another-model"]
+    assert told == "part 2 is 'step' in the history and 'skid' in the deck: is this the deck of the run?"
+    same = asked(BOX, variant(tmp_path, (STEP, STEP.replace("step", "STEP  of the frame"))))
+    assert "deck-of-another-model" not in [caution.code for caution in same.cautions]
+
+
+def row(part: int, landing: float | None, cost: float | None) -> PartRow:
+    """A part by what it takes up at the beginning of the landing, and its share of the cost."""
+    return PartRow(
+        part, "", {"shell": 1}, (), "MAT", "deformable", 1.0, "deck", (), InFlight(True, 1.0, 0.0, 0.5, landing),
+        cost, None, None, (),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("rows", "alone"),
+    [
+        ([row(1, 1.0, 0.95), row(2, 19.0, 0.05)], 2),
+        ([row(1, 1.0, 0.85), row(2, 19.0, 0.15)], None),  # to leave it deformable costs too much
+        ([row(1, 3.0, 0.95), row(2, 17.0, 0.05)], None),  # another takes its share
+        ([row(1, -50.0, 0.95), row(2, 19.0, 0.05)], 2),  # what others give back is not what they take
+        ([row(1, 0.0, 0.95), row(2, 0.0, 0.05)], None),  # nothing is taken up
+        ([row(1, None, 0.95), row(2, None, 0.05)], None),  # the record ends in the flight
+        ([row(1, 1.0, None), row(2, 19.0, None)], None),  # no cost is known
+        ([row(1, 1.0, 0.95), replace(row(2, 19.0, 0.05), kind="spring")], None),
+    ],
+)
+def test_which_part_drives_the_landing_alone(rows: list[PartRow], alone: int | None) -> None:
+    assert landing_alone(rows) == alone
+
+
+def test_a_part_that_drives_the_landing_alone_is_kept() -> None:
+    model = CostModel(read_inventory(str(DECK)), Weights({"BT": 1.0, "QBAT": 0.1}))
+    facts = facts_of(open_run([BOX]), Settings())
+
+    def with_landing(part: PartFacts, landing: float) -> PartFacts:
+        return replace(part, flights=tuple(replace(one, landing=landing) for one in part.flights))
+
+    known = {1: with_landing(facts.parts[1], 0.01), 2: with_landing(facts.parts[2], 5.0)}
+    rows = rows_of(replace(facts, parts=known), model, Steps())
+    assert [one.verdict for one in rows] == ["switch", "keep", "keep"]
+    assert rows[1].reasons == ("drives the landing alone, at little cost",)

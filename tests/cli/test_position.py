@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from d2rpick.cli.deck_cost import model_of, with_springs
+from d2rpick.choice.by_deck import selected
+from d2rpick.choice.settings import Settings
+from d2rpick.cli.deck_cost import model_of
+from d2rpick.histories.selection import Selection
 from tests.cli.test_output import check_by_schema
 from tests.command import answer, run
+from tests.sample_deck import DECK
 from tests.shared import shared, shared_bytes
 
 if TYPE_CHECKING:
@@ -24,9 +28,9 @@ def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(tmp_path: 
     deck = tmp_path / "CAR_0000.rad"
     deck.write_bytes(shared_bytes("openradioss/car_drop/decks/CAR_0000.rad.gz"))
     model = model_of({"deck": str(deck), "weights": None})
-    silent: Any = SimpleNamespace(springs=())
-    assert with_springs(silent, {}, model)["springs"] == ("15", "16", "17")
-    assert with_springs(silent, {"part": ()}, None) == {"part": ()}
+    silent: Any = SimpleNamespace(springs=(), parts=())
+    assert model is not None
+    assert selected(silent, Selection(parts=("1",)), Settings(), model).springs == ("15", "16", "17")
     asked = ("suggest", "--td", "0.1464", "--part", "12-17", car())
     alone, told = answer(*asked), answer(*asked, "--deck", str(deck))
     assert alone["history"]["channel"] == told["history"]["channel"] == "internal energy of engine, battery, wheels"
@@ -68,3 +72,23 @@ def test_plan_gives_it_for_every_window() -> None:
     assert row["position_error"] == pytest.approx(2.5e-3, abs=1e-3)
     assert row["position_error_part"] == "engine"
     assert "off by 0.00" in run("plan", "-q", "--part", "1-17", car()).stdout
+
+
+def test_of_several_bodies_it_is_not_known(tmp_path: Path) -> None:
+    deck = tmp_path / "CAR_0000.rad"
+    deck.write_bytes(shared_bytes("openradioss/car_drop/decks/CAR_0000.rad.gz"))
+    asked = ("verify", "--tr", "0.0496", "--td", "0.1464", "--part", "12-14", car())
+    assert answer(*asked)["position_error"] is not None  # taken for one body
+    found = answer(*asked, "--deck", str(deck), "--cost-share", "0.1")
+    assert (found["position_error"], found["position_error_part"]) == (None, None)
+    assert "several-bodies" in {warning["code"] for warning in found["warnings"]}
+
+
+def test_a_deck_without_the_parts_leaves_the_run_time_open() -> None:
+    found = answer("suggest", "--td", "0.1464", "--part", "1-11", "--deck", str(DECK), car())
+    assert {one["run_time_share"] for one in found["candidates"]} == {None}
+    told = {warning["code"]: warning["message"] for warning in found["warnings"]}
+    assert "part 4, 5, 6, 7, 8, 9, 10, 11 is not in the deck" in told["cost-unknown"]
+    assert told["deck-of-another-model"].startswith(
+        "part 1 is 'floor' in the history and 'box' in the deck, and 2 more"
+    )

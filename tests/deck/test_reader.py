@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from typing import TYPE_CHECKING
 
 import pytest
@@ -223,6 +224,13 @@ def test_includes_that_multiply_are_an_error(tmp_path: Path, monkeypatch: pytest
     files = {f"{n}.k": f"*INCLUDE\n{n + 1}.k\n{n + 1}.k\n" for n in range(20)} | {"20.k": ""}
     with pytest.raises(DeckError, match="more than"):
         read(tmp_path, "*INCLUDE\n0.k\n", files)
+
+
+def test_a_compressed_deck_is_named_as_such(tmp_path: Path) -> None:
+    for name in ("main.k", "RUN_0000.rad"):
+        (tmp_path / name).write_bytes(gzip.compress(b"*KEYWORD\n*END\n"))
+        with pytest.raises(DeckError, match="compressed with gzip"):
+            read_deck(str(tmp_path / name))
 
 
 def test_lines_that_end_in_cr_alone_are_refused(tmp_path: Path) -> None:

@@ -14,7 +14,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import d2rpick as d2
+from d2rpick.choice.cost import Weights
 from tests.command import BOX, DECK, ENERGY, ROLLOVER, answer
+from tests.sample_deck import DECK as SAMPLE_DECK
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -63,6 +65,41 @@ def test_the_library_and_the_command_line_say_the_same(
 def test_arguments_mean_what_options_mean(arguments: dict[str, Any], options: tuple[str, ...]) -> None:
     found = d2.suggest(d2.read(BOX), td=0.37, **arguments)
     same(found.to_dict(), answer("suggest", "--td", "0.37", *options, BOX))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options"),
+    [
+        ({"parts": "recommended"}, ("--part", "recommended")),
+        ({"parts": [1, 2], "step_ratio": 2.0}, ("--part", "1", "--part", "2", "--step-ratio", "2")),
+        ({"parts": 1, "weights": "site.toml"}, ("--part", "1", "--weights", "site.toml")),
+        ({}, ()),  # the cost stays open
+    ],
+)
+def test_a_deck_means_what_it_means_on_the_command_line(
+    arguments: dict[str, Any], options: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("site.toml").write_text("[per_element]\nBT = 1\nQBAT = 2\n", "utf-8")
+    run, by_deck = d2.read(BOX), {"deck": SAMPLE_DECK, **arguments}
+    cost = ("--deck", str(SAMPLE_DECK), *options, BOX)
+    chosen = d2.suggest(run, td=0.37, **by_deck)
+    same(chosen.to_dict(), answer("suggest", "--td", "0.37", *cost))
+    same(d2.verify(run, 0.1, 0.37, **by_deck).to_dict(), answer("verify", "--tr", "0.1", "--td", "0.37", *cost))
+    planned = d2.plan(run, **by_deck)
+    same(planned.to_dict(), answer("plan", *cost))
+    for found in (chosen, planned):
+        same(found.to_dict(), answer(*found.command))
+    assert (planned.to_dict()["run_time_share"] is None) == (not arguments)
+
+
+def test_weights_in_memory_count_as_those_of_a_file() -> None:
+    cheap, dear = (
+        d2.suggest(d2.read(BOX), td=0.37, parts=1, deck=SAMPLE_DECK, weights=Weights({"BT": 1.0, "QBAT": other}))
+        for other in (0.1, 10.0)
+    )
+    found = [one.to_frame()["run_time_share"].min() for one in (cheap, dear)]
+    assert found[0] < found[1]  # the other part keeps what it costs
 
 
 def test_the_command_of_an_answer_asks_the_same() -> None:
@@ -171,6 +208,13 @@ def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(tmp_pa
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[1.5]), TypeError, "parts holds 1.5"),
         (lambda: loose.suggest(ENERGY, 0.06), TypeError, "run is .*, what read"),
         (lambda: loose.suggest(d2.read(ROLLOVER, energy="boxIE_J"), 0.3, parts=1), ValueError, "exclude each other"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, weights="a.toml"), ValueError, "weights needs a deck"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, deck=3), TypeError, "deck is 3"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, deck=["a.k", "b.k"]), ValueError, "deck names 2 files"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, deck="absent.k"), d2.DeckError, "absent.k"),
+        (lambda: loose.plan(d2.read(BOX), parts="recommended"), ValueError, "needs deck"),
+        (lambda: loose.plan(d2.read(BOX), parts=["recommended", 1]), ValueError, "a whole set"),
+        (lambda: loose.plan(d2.read(BOX), step_ratio=2), ValueError, "cost_share or a deck"),
         (lambda: loose.read(3), TypeError, "source is 3"),
         (lambda: loose.read([]), ValueError, "source is empty"),
         (lambda: loose.read(ENERGY, input_format="exel"), ValueError, "input_format is 'exel', one of auto, binout"),

@@ -46,3 +46,8 @@ def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
 def test_wrong_arguments_are_named(arguments: dict[str, object], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         d2.parts(d2.read(BOX), **arguments)  # type: ignore[arg-type]
+
+
+def test_what_is_not_a_run_is_named() -> None:
+    with pytest.raises(TypeError, match=r"run is 'box\.matsum', what read"):
+        d2.parts("box.matsum")  # type: ignore[arg-type]

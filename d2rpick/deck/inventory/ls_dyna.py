@@ -105,8 +105,11 @@ def _notes(deck: Deck, cards: Sequence[Card], elements: Sequence[Elements], part
     for block in deck.encrypted:
         yield f"{block.source.name}:{block.line}: elements may hide in an encrypted block"
     meshes = [*cards, *deck.named("NODE")]
-    for name in dict.fromkeys(card.file for card in meshes if card.block.end is None and is_cut(card.block)):
+    last = [card for card in meshes if card.block.end is None]
+    for name in dict.fromkeys(card.file for card in last if is_cut(card.block)):
         yield f"{name}: the file ends within a line of its mesh; is it cut?"
+    if any(card.file == deck.path and not is_cut(card.block) for card in last):
+        yield f"{deck.path}: the main deck ends within its mesh, without *END; is it cut?"
     unknown = sorted({int(part) for one in elements for part in np.unique(one.part)} - parts.materials.keys())
     if unknown:
         yield f"elements of part {some_of(unknown)}, which no *PART of the deck defines"

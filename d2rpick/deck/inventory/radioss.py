@@ -105,8 +105,11 @@ def _notes(
     for card, words in cards:
         if words and words[0] in _NOT_COUNTED:
             yield f"{card.file}:{card.line}: elements of /{'/'.join(words)} are not followed"
-        if words and words[0] in {*_KINDS, "NODE"} and card.block.end is None and is_cut(card.block):
-            yield f"{card.file}: the file ends within a line of its mesh; is it cut?"
+        if words and words[0] in {*_KINDS, "NODE"} and card.block.end is None:
+            if is_cut(card.block):
+                yield f"{card.file}: the file ends within a line of its mesh; is it cut?"
+            elif card.file == starter.sources[0].name:
+                yield f"{card.file}: the starter deck ends within its mesh, without /END; is it cut?"
     for unread in run.deck.unread:
         yield f"{unread.name.file}:{unread.name.line}: {unread.name.text} was not read: {unread.reason}"
     if starter.moved:

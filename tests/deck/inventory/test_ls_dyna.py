@@ -160,15 +160,19 @@ def test_large_ids_are_kept_apart_and_numbers_beyond_them_are_not_ids(tmp_path: 
     assert found.rigid_nodes([7]) == 7
 
 
-def test_a_deck_cut_at_any_byte_counts_what_is_whole_or_says_that_it_is_cut(tmp_path: Path) -> None:
+def test_a_deck_cut_at_any_byte_of_its_mesh_says_that_it_is_cut(tmp_path: Path) -> None:
     text = f"{HEAD}*NODE\n{nodes()}*ELEMENT_SHELL\n{SHELLS}"
     whole = {7: {"shell": 2}}
-    for end in range(text.index("*ELEMENT") + 16, len(text)):
+    for end in range(text.index("*ELEMENT") + 16, len(text) + 1):
         found = inventory(tmp_path, text[:end])
-        cut = text[end - 1] != "\n"
-        assert any("is it cut" in note for note in found.notes) == cut
+        assert sum("is it cut" in note for note in found.notes) == 1
         assert counted(found) in ({}, {7: {"shell": 1}}, whole)
-        assert found.complete != cut
+        assert not found.complete
+    found = inventory(tmp_path, f"{text}*END\n")
+    assert (counted(found), found.complete) == (whole, True)
+    (tmp_path / "mesh.k").write_text(text.removeprefix(HEAD), "utf-8")  # an include may do without *END
+    found = inventory(tmp_path, f"{HEAD}*INCLUDE\nmesh.k\n")
+    assert (counted(found), found.complete) == (whole, True)
 
 
 def test_a_deck_without_parts_is_refused(tmp_path: Path) -> None:

@@ -104,6 +104,17 @@ def test_rigid_elements_of_the_car_are_those_that_the_solver_put_off(tmp_path: P
         }
 
 
+def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> None:
+    text = f"{BEGIN}{PROPS}/PART/1\na\n{wide(1, 1)}{nodes(8)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{wide(2, 3, 4, 5, 6)}"
+    deck = tmp_path / "TEST_0000.rad"
+    for end in range(text.rindex("/SHELL/1") + 9, len(text) + 1):
+        deck.write_text(text[:end])
+        found = radioss.read(read_run(str(deck)))
+        assert (sum("is it cut" in note for note in found.notes), found.complete) == (1, False)
+    deck.write_text(f"{text}/END\n")
+    assert radioss.read(read_run(str(deck))).complete
+
+
 def test_a_real_deck_is_counted() -> None:
     found = read_inventory(str(shared("real/radioss-decks/IDEL8_0000.rad")))
     assert counted(found) == {1: {"solid": 24}, 2: {"shell": 350, "triangle": 8}}

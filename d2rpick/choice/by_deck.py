@@ -1,0 +1,74 @@
+"""What the deck of a run adds to a question about it: the recommended parts, which are springs, what they cost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from d2rpick.choice.cost import CostModel, Weights
+from d2rpick.choice.part_sets import SEVERAL_BODIES, recommended_parts, with_cost_of
+from d2rpick.choice.same_model import doubts_of
+from d2rpick.choice.warnings import Caution
+from d2rpick.deck.inventory import read_inventory
+from d2rpick.deck.inventory.model import DISCRETE
+from d2rpick.flight.flying_parts import asks_for_recommended
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.choice.settings import Settings
+    from d2rpick.histories.history import History, Part
+    from d2rpick.histories.run import Run
+    from d2rpick.histories.selection import Selection
+
+
+def read_model(deck: str, weights: Weights | str | None = None) -> CostModel:
+    """Read a main deck, and the file of weights where one is named.
+
+    Raises
+    ------
+    DeckError, ConfigurationError
+        If one of them cannot be read.
+    """
+    from d2rpick.choice.weights_file import read_weights
+
+    return CostModel(read_inventory(deck), read_weights(weights) if isinstance(weights, str) else weights)
+
+
+def selected(run: Run, selection: Selection, settings: Settings, model: CostModel) -> Selection:
+    """Complete a selection: the parts of the recommended set for that word, and the springs of deck and energies.
+
+    Raises
+    ------
+    FormatError
+        If no set can be recommended.
+    """
+    counts = model.inventory.counts
+    springs = {part.id for part in run.springs} | {part for part, kinds in counts.items() if {*kinds} <= DISCRETE}
+    parts = selection.parts
+    if asks_for_recommended(parts, run):
+        parts = tuple(map(str, recommended_parts(run, settings, model)))
+    return selection._replace(parts=parts, springs=tuple(map(str, sorted(springs))))
+
+
+def with_deck(settings: Settings, history: History, model: CostModel) -> tuple[Settings, tuple[Caution, ...]]:
+    """Let the deck tell the cost share of the parts of a history, unless it is given, and whether they are one body.
+
+    What stays unknown is in the cautions.
+    """
+    if not history.parts:
+        why = "no parts are named whose elements are saved; give them with `parts`"
+        told = () if settings.cost_share is not None else (Caution("cost-unknown", f"the run time stays open: {why}"),)
+        return settings, told
+    ids = [part.id for part in history.parts]
+    found, share = with_cost_of(settings, model, ids)
+    one_body = len(model.inventory.bodies(ids)) == 1
+    return replace(found, one_body=one_body), tuple(_cautions(share.reason, history.parts, model, one_body=one_body))
+
+
+def _cautions(unknown: str | None, parts: Sequence[Part], model: CostModel, *, one_body: bool) -> Iterator[Caution]:
+    yield from doubts_of(parts, model.inventory)
+    if unknown:
+        yield Caution("cost-unknown", f"the run time stays open: {unknown}")
+    if not one_body:
+        yield Caution("several-bodies", SEVERAL_BODIES)

@@ -1,0 +1,33 @@
+"""Whether a deck is that of the run whose history is at hand."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from d2rpick.choice.warnings import Caution
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from d2rpick.deck.inventory.model import Inventory
+    from d2rpick.histories.history import Part
+
+
+def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
+    """Say so where parts of a history have other titles in the deck: what it says may be of another model."""
+    other = [part for part in parts if part.id in inventory.parts and _differ(part.title, _title(part, inventory))]
+    if other:
+        first, more = other[0], f", and {len(other) - 1} more" if len(other) > 1 else ""
+        named = f"part {first.id} is {first.title!r} in the history and {_title(first, inventory)!r} in the deck{more}"
+        yield Caution("deck-of-another-model", f"{named}: is this the deck of the run?")
+
+
+def _title(part: Part, inventory: Inventory) -> str:
+    return inventory.parts[part.id].title
+
+
+def _differ(one: str, other: str) -> bool:
+    """Whether two titles are there and differ, but for blanks, capitals, and where a format cuts them."""
+    first, second = (" ".join(title.split()).casefold() for title in (one, other))
+    shorter = min(len(first), len(second))
+    return first[:shorter] != second[:shorter]
