@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import os
 import re
+import stat
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
@@ -107,10 +109,14 @@ class SourceFile:
         if self._content is not None:
             return io.BytesIO(self._content)
         try:
-            return Path(self.name).open("rb")
+            stream = Path(self.name).open("rb")  # noqa: SIM115  it is given back
         except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
             reason = getattr(error, "strerror", None) or error
             raise DeckError(f"{self.name}: {reason}, a readable deck was expected") from None
+        if stat.S_ISCHR(os.fstat(stream.fileno()).st_mode) and not stream.isatty():  # /dev/zero never ends
+            stream.close()
+            raise DeckError(f"{self.name}: this is a device, a readable deck was expected")
+        return stream
 
 
 def _starred(buffer: bytearray, end: int) -> Iterator[int]:

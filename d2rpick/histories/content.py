@@ -222,10 +222,12 @@ def stored(name: str) -> bytes | OnDisk:
     Raises
     ------
     FormatError
-        If a small file changes all the time.
+        If a small file changes all the time, or it is a device.
     """
     with open(name, "rb", buffering=0) as file:  # noqa: PTH123
         found = os.fstat(file.fileno())
+        if stat.S_ISCHR(found.st_mode) and not file.isatty():  # /dev/zero and /dev/full never end
+            raise FormatError(f"{name}: this is a device; a file, a pipe or a terminal was expected")
         if not stat.S_ISREG(found.st_mode):
             return file.read()
         if found.st_size > _HELD:

@@ -211,3 +211,13 @@ def test_a_loop_of_links_in_place_of_a_file_to_write_is_told(tmp_path: Path) -> 
     loop = tmp_path / "loop.csv"
     loop.symlink_to(loop)
     assert f"{loop}: cannot be written" in one_line(child('d2rpick extract "$@"', ENERGY, "-o", loop))
+
+
+@pytest.mark.parametrize("command", [("info",), ("suggest", "--td", "1"), ("check",), ("plan",)])
+@pytest.mark.parametrize("device", ["/dev/zero", "/dev/full", "/dev/null"])
+def test_a_device_that_never_ends_is_refused(command: tuple[str, ...], device: str) -> None:
+    if not Path(device).exists():
+        pytest.skip(f"no {device} here")
+    result = run(*command, device)
+    assert result.exit_code == 2
+    assert f"{device}: this is a device" in result.stderr
