@@ -224,15 +224,17 @@ class Candidates(Sequence[Candidate]):
         )
 
 
-def find_candidates(situation: Situation) -> Candidates:
+def find_candidates(situation: Situation, *, in_flight: bool = False) -> Candidates:
     """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order.
 
-    Where nothing vibrates in the flight, its start alone.
+    Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
+    acceptable, may be left out: noise in a long record makes tens of thousands.
     """
     start = situation.earliest_tr
     if start is not None and situation.at_rest:
         return judge(situation, [Moment(max(start, float(situation.history.time[0])), "start", None)])
-    found = situation.vibration.moments(situation.settings.tolerance)
+    since = start if in_flight and start is not None else -np.inf
+    found = situation.vibration.moments(situation.settings.tolerance, since)
     matches = [one for one in found if one.kind == "match"]
     if matches:
         of_level = np.array([one.tr for one in found if one.kind != "match"])

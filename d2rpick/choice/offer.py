@@ -53,7 +53,9 @@ class Offer:
 
 def offer_of(situation: Situation, *, peak: bool) -> Offer:
     """Give what ``suggest`` says of a td; ``peak`` tells whether the energy peaks there."""
-    answer = suggest_at(situation, with_better=False)
+    answer = suggest_at(situation, with_better=False, in_flight=True)
+    if answer.chosen is None:  # the reason tells of all candidates
+        answer = suggest_at(situation, with_better=False)
     best = answer.chosen
     return Offer(
         td=situation.td,

@@ -114,9 +114,12 @@ def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     return suggest_at(examine(history, td, settings))
 
 
-def suggest_at(situation: Situation, *, with_better: bool = True) -> Suggestion:
-    """Rank the candidates for tr in a situation that is known, and recommend one; look for a better td too."""
-    candidates = rank(find_candidates(situation))
+def suggest_at(situation: Situation, *, with_better: bool = True, in_flight: bool = False) -> Suggestion:
+    """Rank the candidates for tr in a situation that is known, and recommend one; look for a better td too.
+
+    With ``in_flight`` candidates before the flight may be left out.
+    """
+    candidates = rank(find_candidates(situation, in_flight=in_flight))
     best = best_of(situation, candidates)
     if best:
         candidates = candidates.recommending(best.rank - 1)
@@ -149,7 +152,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
         there = situation.at(td)
         if there.vibration.doubts:
             continue
-        best = best_of(there, rank(find_candidates(there)))
+        best = best_of(there, rank(find_candidates(there, in_flight=True)))
         if best and not best.same_swing:
             if _verifies(situation, best.tr, td):
                 return Pair(best.tr, td, best.residual)

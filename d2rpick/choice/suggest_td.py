@@ -185,7 +185,7 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
 
 def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
-    found = ((there, best_of(there, rank(find_candidates(there)))) for there in situations)
+    found = ((there, best_of(there, rank(find_candidates(there, in_flight=True)))) for there in situations)
     return [(there, best) for there, best in found if best and not best.same_swing]
 
 

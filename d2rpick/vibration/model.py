@@ -80,8 +80,11 @@ class Vibration(Protocol):
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
         """Times in (start, end], ascending, where the energy peaks [time]."""
 
-    def moments(self, tolerance: float) -> Sequence[Moment]:
-        """Times before td that may serve as tr; standstills only where their error is within the tolerance."""
+    def moments(self, tolerance: float, since: float = -np.inf) -> Sequence[Moment]:
+        """Times before td that may serve as tr; standstills only where their error is within the tolerance.
+
+        Those before ``since`` [time] may be left out.
+        """
 
     def measured(self, times: Samples) -> Sequence[Measured | None]:
         """Measures of each time as tr, None where its deformation cannot be compared with that at td."""

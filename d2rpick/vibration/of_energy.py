@@ -60,15 +60,15 @@ class OfEnergy:
         peaks = self.history.peaks
         return tuple(peaks[(start < peaks) & (peaks <= end)].tolist())
 
-    def moments(self, tolerance: float) -> list[Moment]:
-        """Crossings of the level at td, and samples where the energy turns near it."""
+    def moments(self, tolerance: float, since: float = -np.inf) -> list[Moment]:
+        """Crossings of the level at td, and samples where the energy turns near it, none before ``since``."""
         time, energy = sampled_before(self.history, self.td, level := self.energy(self.td))
         times, rising = passages(time, energy, level)
-        earlier, turns = times < self.td, find_turns(energy)[0]
+        asked, turns = (since <= times) & (times < self.td), find_turns(energy)[0]
         near = time[turns[measures.level_errors(energy[turns], level) <= tolerance]]
         return [
-            *map(Moment, times[earlier].tolist(), repeat("crossing"), rising[earlier].tolist()),
-            *(Moment(t, "extremum", None) for t in near.tolist()),
+            *map(Moment, times[asked].tolist(), repeat("crossing"), rising[asked].tolist()),
+            *(Moment(t, "extremum", None) for t in near[near >= since].tolist()),
         ]
 
     def measured(self, times: Samples) -> list[None]:

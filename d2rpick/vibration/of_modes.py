@@ -89,7 +89,7 @@ class OfModes:
         """Times in (start, end], within the span, where the energy of the mode peaks [time]."""
         return self.mode.peaks(max(start, self.span.start), min(end, self.span.end))
 
-    def moments(self, tolerance: float) -> list[Moment]:
+    def moments(self, tolerance: float, since: float = -np.inf) -> list[Moment]:  # noqa: ARG002  they are few
         """Crossings of the level at td, standstills near it and closest matches."""
         turns = np.array(self.standstills())
         near = measures.lock_in_error(self.mode, turns, self.td) <= tolerance

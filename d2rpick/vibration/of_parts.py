@@ -97,7 +97,7 @@ class OfParts:
         time = self.parts.parts.time
         return Profile.of(self.parts, time[time >= self._comparable[0]], self.td)
 
-    def moments(self, tolerance: float) -> list[Moment]:
+    def moments(self, tolerance: float, since: float = -np.inf) -> list[Moment]:  # noqa: ARG002  they are few
         """Crossings and standstills of the whole, and closest matches of the parts."""
         matches = [Moment(t, "match", None) for t in self.profile.minima()]
         if not isinstance(self.whole, OfModes):

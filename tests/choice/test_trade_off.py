@@ -11,7 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from d2rpick.choice.candidates import find_candidates
+from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import Reference, read
+from d2rpick.choice.ranking import best_of, rank
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.trade_off import explore_of
@@ -50,7 +53,7 @@ def check(found: TradeOff, history: History, asked: Settings, offers: list[Offer
         assert one.windows == alone.windows
         assert one.expected == alone.expected
         assert one.quality == alone.quality
-        assert (one.reason is None) == (alone.recommended is not None)
+        assert (one.reason or "") == "; ".join(it.message for it in alone.cautions if it.code == "no-candidate")
     assert all(low.td < high.td for low, high in pairwise(found.offers))
     unbeaten(found)
 
@@ -106,3 +109,15 @@ def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     assert found.asked is not None
     assert found.asked.td == td
     check(found, history, asked, [found.asked, *found.offers[::6]])
+
+
+@settings(max_examples=20, deadline=None)
+@given(histories(), st.floats(0.5, 0.9), st.floats(0.1, 0.45), st.booleans())
+def test_candidates_before_the_flight_never_change_what_is_best(
+    history: History, td: float, after: float, replay: bool
+) -> None:
+    situation = examine(history, td, Settings(after=after, replay=replay))
+    every, flying = (rank(find_candidates(situation, in_flight=one)) for one in (False, True))
+    assert best_of(situation, flying) == best_of(situation, every)
+    if situation.basis == "energy":
+        assert sorted(flying.tr) == sorted(every.tr[every.tr >= after])
