@@ -102,7 +102,7 @@ def _brief(value: float) -> float:
 
 def error_name(offers: Sequence[Offer]) -> str:
     """Name what offers are compared by."""
-    return "error of the level at td" if all(one.basis == "energy" for one in offers) else "residual"
+    return "shortfall of the level at td" if all(one.basis == "energy" for one in offers) else "residual"
 
 
 def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.trade_off import TradeOff
 
 _SIZES: Final = {False: (10.0, 7.0), True: (4.2, 7.5)}
-_ERRORS: Final = {True: "shortfall at td", False: "residual"}
+_ERRORS: Final = {True: "shortfall of the level", False: "residual"}
 
 
 def draw_trade_off(found: TradeOff, *, narrow: bool = False) -> Figure:

@@ -152,7 +152,7 @@ def _error(one: Offer) -> str:
     if one.error is None:
         return "a level above twice the mean energy"
     if one.basis == "energy":
-        return f"error {tables.measure(one.error)} (by that the level at td is short of all vibration)"
+        return f"error {tables.measure(one.error)} (shortfall of the level at td)"
     return f"residual {tables.measure(one.error)}"
 
 
