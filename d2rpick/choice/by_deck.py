@@ -11,6 +11,7 @@ from d2rpick.choice.same_model import doubts_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.inventory import read_inventory
 from d2rpick.deck.inventory.model import DISCRETE
+from d2rpick.deck.inventory.placement import Placement
 from d2rpick.flight.flying_parts import asks_for_recommended
 
 if TYPE_CHECKING:
@@ -63,7 +64,8 @@ def with_deck(settings: Settings, history: History, model: CostModel) -> tuple[S
     ids = [part.id for part in history.parts]
     found, share = with_cost_of(settings, model, ids)
     one_body = len(model.inventory.bodies(ids)) == 1
-    return replace(found, one_body=one_body), tuple(_cautions(share.reason, history.parts, model, one_body=one_body))
+    found = replace(found, one_body=one_body, placement=Placement(model.inventory))
+    return found, tuple(_cautions(share.reason, history.parts, model, one_body=one_body))
 
 
 def _cautions(unknown: str | None, parts: Sequence[Part], model: CostModel, *, one_body: bool) -> Iterator[Caution]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from d2rpick.choice.part_steps import steps_of
 from d2rpick.choice.part_verdicts import rows_of
 from d2rpick.choice.same_model import doubts_of
 from d2rpick.choice.warnings import Caution
+from d2rpick.deck.inventory.placement import Placement
 from d2rpick.errors import FormatError, RangeError
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.measures import run_time_share
@@ -37,7 +39,7 @@ _LIKE: Final = 0.01
 # The heaviest parts that together have this share of the mass of all that may be switched.
 _HEAVY: Final = 0.5
 SEVERAL_BODIES: Final = "several rigid bodies: how far each is out of place is not predicted"
-_NO_ANGLE: Final = "no file of a run tells how its parts turn; the angle error is not known"
+_NO_ANGLE: Final = "the momenta of the parts do not tell how a body of them turns; the angle error is not known"
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class PartSet:
     ``bodies`` are the rigid bodies that its parts make, ``cost_share`` is what they save of a step [-].
     ``step_growth`` is how much the step may grow then [-], infinite where nothing deformable keeps it; predictions
     take that of the settings.  ``window`` is (tr, td) in the longest flight [time], ``rigid_fraction`` its share of
-    the record [-].
+    the record [-].  ``angle_error`` is by how much a body is turned at td from where it should be [degrees].
     """
 
     name: str
@@ -208,6 +210,11 @@ class _Comparison:
     rows: Sequence[PartRow]
     steps: Steps
 
+    @cached_property
+    def placement(self) -> Placement | None:
+        """Where the deck puts the parts."""
+        return Placement(self.model.inventory) if self.model else None
+
     def of(self, one: PartSet, times: Times | float | None) -> PartSet:
         """Complete a set, in a window, or in that for a td."""
         share = self.model.saved(one.parts) if self.model else Share(None)
@@ -247,7 +254,7 @@ class _Comparison:
     def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
         """Find when the set may be rigid; RangeError with the reason where it may not."""
         reference = Reference.of(self.run, Selection(parts=tuple(map(str, one.parts))))
-        settings = replace(self.settings, one_body=len(one.bodies) <= 1)
+        settings = replace(self.settings, one_body=len(one.bodies) <= 1, placement=self.placement)
         if isinstance(times, tuple):
             situation = verify_of(reference, *times, settings).situation
             tr, td = times
@@ -269,7 +276,11 @@ def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
     drift, error = situation.drift, float(situation.position_errors(np.array([tr]))[0])
     if drift is None or np.isnan(error):
         return one
-    return replace(one, position_error=error, position_limit=drift.limit, position_part=drift.part)
+    angle = float(drift.angles(np.array([tr]), situation.td)[0])
+    return replace(
+        one, position_error=error, position_limit=drift.limit, position_part=drift.part,
+        angle_error=None if np.isnan(angle) else angle,
+    )  # fmt: skip
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
@@ -308,5 +319,5 @@ def _cautions(
         yield Caution("nothing-to-switch", "no part may be switched; the reasons are listed in the rows")
     elif not any(one.recommended for one in sets):
         yield Caution("no-set", "no set of parts can be recommended; the reasons are listed with the sets")
-    if sets:
+    if sets and all(one.angle_error is None for one in sets):
         yield Caution("no-angle", _NO_ANGLE)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from d2rpick.deck.inventory.placement import Placement
     from d2rpick.vibration.one_mode import Mode
 
 # What an argument may be.  A tolerance of 1 accepts a tr that locks in nothing at all.
@@ -33,6 +34,7 @@ class Settings:
     ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the step while rigid to that
     while deformable; without the first nothing is said of the run time.
     ``one_body`` False: the parts become several rigid bodies, and none of them is predicted to be out of place.
+    ``placement``: where the deck puts the parts, or None without one.
     """
 
     after: float | None = None
@@ -47,6 +49,7 @@ class Settings:
     cost_share: float | None = None
     step_ratio: float = 1.0
     one_body: bool = True
+    placement: Placement | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Raise ValueError with the name of an argument that is out of its range."""

@@ -82,7 +82,10 @@ class Situation:
             return None
         from d2rpick.flight.position_error import drift_in_flight  # not above: a table has no parts
 
-        return self.fits.once(("drift", *self.flight[:2]), lambda: drift_in_flight(self.history, self.flight))
+        placement = self.settings.placement
+        return self.fits.once(
+            ("drift", *self.flight[:2]), lambda: drift_in_flight(self.history, self.flight, placement=placement)
+        )
 
     def position_errors(self, times: Samples) -> Samples:
         """How far the body is out of place at td when it is frozen at each of ``times`` [length]; NaN where unknown."""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Transform:
     """What ``*INCLUDE_TRANSFORM`` does to a file: offsets of its ids, factor of its times.
 
-    ``scaled``: any unit of the file is another one.
+    ``scaled``: any unit of the file is another one; ``moved``: its nodes are moved.
     """
 
     node: int = 0
@@ -28,6 +28,7 @@ class Transform:
     rest: int = 0
     time: float = 1.0
     scaled: bool = False
+    moved: bool = False
 
     def inside(self, outer: Transform) -> Transform:
         """Return this transform of a file that is itself included by a transformed one."""
@@ -39,6 +40,7 @@ class Transform:
             self.rest + outer.rest,
             self.time * outer.time,
             self.scaled or outer.scaled,
+            self.moved or outer.moved,
         )
 
 

@@ -15,15 +15,18 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.flight.rotation import least_rests, least_ways, off_the_circle, steady_rotation
+from d2rpick.flight.turning import Rigid, turning_in_flight
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import integral, window
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
+    from d2rpick.deck.inventory.placement import Placement
     from d2rpick.flight.flight import Flight
+    from d2rpick.flight.turning import Turning
     from d2rpick.histories.history import History, Momenta, Part, Samples
 
     Places = NDArray[np.intp]
@@ -62,16 +65,35 @@ class Drift:
         The part that moves against the others, of several the one with most effect.
     doubt : float
         What may be wrong with the differences, since the others are not one rigid body either [length].
+    turning : Turning or None
+        How the body turns, where a deck places its parts.
     """
 
-    def __init__(self, time: Samples, place: Samples, path: Samples, part: Part, doubt: float) -> None:
+    def __init__(
+        self, time: Samples, place: Samples, path: Samples, part: Part, doubt: float, turning: Turning | None = None
+    ) -> None:
         self.time, self.place, self.path, self.part, self.doubt = time, place, path, part, doubt
+        self.turning = turning
 
     def errors(self, tr: Samples, td: float) -> Samples:
-        """Distances of the body at td from where it should be, for times tr (k,) [length]; NaN outside the flight."""
+        """Distances of the body at td from where it should be, for times tr (k,) [length]; NaN outside the flight.
+
+        Where the deck tells how it turns, at the nodes of the body that the run watches, else at its centre of mass.
+        """
+        if self.turning:
+            return self._inside(tr, td, self.turning.offsets(tr, td))
         there = np.stack([np.interp([*tr.tolist(), td], self.time, axis) for axis in self.place.T], axis=1)
+        return self._inside(tr, td, there[:-1] - there[-1])
+
+    def angles(self, tr: Samples, td: float) -> Samples:
+        """By how much the body is turned at td from where it should be, for times tr (k,) [degrees]; NaN if unknown."""
+        turned = np.full((tr.size, 3), np.nan) if self.turning is None else self.turning.angles(tr, td)
+        return np.degrees(self._inside(tr, td, turned))
+
+    def _inside(self, tr: Samples, td: float, vectors: Samples) -> Samples:
+        """Lengths of vectors (k, 3), NaN outside the flight."""
         inside = (tr >= self.time[0]) & (tr <= self.time[-1]) & (self.time[0] <= td <= self.time[-1])
-        return np.where(inside, np.linalg.norm(there[:-1] - there[-1], axis=1), np.nan)
+        return np.where(inside, np.linalg.norm(vectors, axis=1), np.nan)
 
     @property
     def name(self) -> str:
@@ -84,7 +106,14 @@ class Drift:
         return MOST_OF_PATH * float(self.path[-1])
 
 
-def drift_of(momenta: Momenta, masses: Samples, members: Sequence[int], flight: tuple[float, float]) -> Drift | None:
+def drift_of(
+    momenta: Momenta,
+    masses: Samples,
+    members: Sequence[int],
+    flight: tuple[float, float],
+    flying: Collection[int] = (),
+    placement: Placement | None = None,
+) -> Drift | None:
     """Find how the body drifts in flight against where a rigid one would be.
 
     The parts that move against the others are those without which the others are most nearly one rigid body that
@@ -100,6 +129,10 @@ def drift_of(momenta: Momenta, masses: Samples, members: Sequence[int], flight: 
         Places of the parts that become one rigid body.
     flight : (float, float)
         When they fly freely [time].
+    flying : collection of int, optional
+        Places of all parts that fly with them, which what moves in the body pushes off too.  Default: no others.
+    placement : Placement, optional
+        Where the deck puts the parts: how the body turns is known too then.
 
     Returns
     -------
@@ -122,12 +155,18 @@ def drift_of(momenta: Momenta, masses: Samples, members: Sequence[int], flight: 
     moving, rate, rest = _apart(time[::stride], ways[::stride], mass)
     if not moving:
         return None
-    share = float(mass[moving].sum() / mass.sum())
+    whole = float(np.nansum(masses[sorted({*flying, *members})]))  # unknown ones left out: no error is told too small
+    share = float(mass[moving].sum()) / whole
     path = integral(time, np.linalg.norm(centre, axis=1))
-    doubt = share * float(np.sqrt(rest / (mass.sum() * (1 - share) * -(-time.size // stride))))
-    offsets = _offsets(time, ways, mass, moving, rate)
+    left = float(mass.sum() - mass[moving].sum())
+    doubt = share * float(np.sqrt(rest / (left * -(-time.size // stride))))
+    offsets = _offsets(time, ways, mass, moving, rate) * float(mass.sum()) / whole
     part = momenta.parts[members[moving[int(np.argmax(np.square(offsets).sum(axis=(0, 2))))]]]
-    found = Drift(time, offsets.sum(axis=1), path, part, doubt)
+    turning = None
+    if placement:
+        against = [members[i] for i in moving]
+        turning = turning_in_flight(momenta, masses, Rigid(members, against), flying, flight, placement)
+    found = Drift(time, offsets.sum(axis=1), path, part, doubt, turning)
     return found if doubt <= found.limit else None
 
 
@@ -203,18 +242,21 @@ def _shows_rotation(mass: Samples) -> bool:
     return all(_may_leave(mass, places, part) for part in heavy.tolist())
 
 
-def drift_in_flight(history: History, flight: Flight, parts: Sequence[Part] | None = None) -> Drift | None:
+def drift_in_flight(
+    history: History, flight: Flight, parts: Sequence[Part] | None = None, placement: Placement | None = None
+) -> Drift | None:
     """Find the drift of the body that ``parts``, or those to be switched, become in a flight.
 
-    None also where the momentum of single parts does not show the flight.
+    None also where the momentum of single parts does not show the flight.  ``placement`` is that of the deck.
     """
     momenta, masses = next((one for one in history.momenta if one.parts is not None), None), history.masses
     if momenta is None or momenta.parts is None or masses is None or flight.parts is None or flight.refusal:
         return None
-    flying = {part.id for part in flight.parts}
+    ids = {part.id for part in flight.parts}
     wanted = {momenta.parts[i].id for i in momenta.chosen} if parts is None else {part.id for part in parts}
-    members = [i for i in momenta.moving if momenta.parts[i].id in flying & wanted]  # the ground does not fly
+    flying = [i for i in momenta.moving if momenta.parts[i].id in ids]  # the ground does not fly
+    members = [i for i in flying if momenta.parts[i].id in wanted]
     start, end = (
         bound if seen is None else seen for bound, seen in zip(momenta.time[[0, -1]], flight[:2], strict=True)
     )
-    return drift_of(momenta, masses, members, (float(start), float(end)))
+    return drift_of(momenta, masses, members, (float(start), float(end)), flying, placement)

@@ -12,7 +12,7 @@ import numpy as np
 
 from d2rpick.deck.inventory import formulations
 from d2rpick.deck.inventory.columns import is_cut, layout, lines_of
-from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, some_of
+from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of, some_of
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.rows import LONG
 from d2rpick.deck.sections import NOT_TURNED
@@ -91,8 +91,26 @@ def read(deck: Deck) -> Inventory:
     notes = tuple(_notes(deck, cards, elements, parts, lost=len(beyond)))
     return Inventory(
         "ls-dyna", _parts(deck, parts, elements), elements, np.concatenate([coordinates, beyond]), notes,
-        complete=parts.all_known and not notes,
+        parts.all_known and not notes, watched=places_of(_watched(deck), table), moved=_moves_nodes(deck),
     )  # fmt: skip
+
+
+def _watched(deck: Deck) -> Integers:
+    """Ids of the nodes of *DATABASE_HISTORY_NODE, eight in a line or, with a title each, one."""
+    ids = [np.empty(0, np.int64)]
+    for card in deck.named("DATABASE_HISTORY_NODE"):
+        options = card.name.removeprefix("DATABASE_HISTORY_NODE").split("_")[1:]
+        if set(options) <= {"ID", "LOCAL"}:
+            fields: Layout = layout(*[20 if card.width == LONG else 10] * (1 if options else 8))
+            found = [lines.integers(fields).ravel() for lines in lines_of(card) if len(lines)]
+            ids += [one[one > 0] + card.transform.node for one in found]
+    return np.unique(np.concatenate(ids))
+
+
+def _moves_nodes(deck: Deck) -> bool:
+    """Whether the deck moves nodes away from their coordinates."""
+    moving = (*deck.named("NODE_TRANSFORM"), *deck.named("PART_MOVE"))
+    return bool(moving) or any(card.transform.moved for card in deck.named("NODE"))
 
 
 def _notes(deck: Deck, cards: Sequence[Card], elements: Sequence[Elements], parts: Parts, lost: int) -> Iterator[str]:

@@ -96,7 +96,8 @@ class Inventory:
     """All parts and elements of a deck; ``solver`` is "ls-dyna" or "radioss".
 
     ``coordinates`` is (nodes, 3), NaN for a node that the deck does not place.  ``notes`` say what was not followed;
-    ``complete`` is False where elements or parts may be missing because of it.
+    ``complete`` is False where elements or parts may be missing because of it.  ``watched`` are the places of nodes
+    whose motion the run writes.  ``moved``: something moves nodes away from the coordinates of the deck.
     """
 
     solver: str
@@ -105,6 +106,8 @@ class Inventory:
     coordinates: Reals
     notes: tuple[str, ...] = ()
     complete: bool = True
+    watched: Places = field(default_factory=lambda: np.empty(0, np.int64))
+    moved: bool = False
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:
@@ -218,6 +221,20 @@ def _distinct(values: Places) -> Places:
     """Give the distinct values, ascending; by sorting, which is quicker here than by a table of hashes."""
     ordered = np.sort(values, axis=None)
     return ordered[np.append(True, ordered[1:] != ordered[:-1])] if ordered.size else ordered
+
+
+def places_of(ids: Places, table: Places) -> Places:
+    """Places in a table of node ids; ids that it does not have are left out.
+
+    Examples
+    --------
+    >>> places_of(np.array([7, 9]), np.array([3, 7, 5])).tolist()
+    [1]
+    """
+    order = np.argsort(table, kind="stable")
+    at = np.minimum(np.searchsorted(table[order], ids), max(table.size - 1, 0))
+    found = order[at] if table.size else order
+    return np.asarray(found[table[found] == ids] if table.size else found)
 
 
 def _used(wanted: Sequence[Places]) -> Places:

@@ -12,7 +12,7 @@ import numpy as np
 from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.inventory import formulations
 from d2rpick.deck.inventory.columns import is_cut, layout, lines_of
-from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, some_of
+from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of, some_of
 from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
 from d2rpick.deck.radioss.legs import find_run_windows
 from d2rpick.deck.radioss.starter import WITHOUT_FRAME
@@ -95,7 +95,17 @@ def read(run: Run) -> Inventory:
     beyond = np.full((table.size - ids.size, 3), np.nan)
     notes = tuple(_notes(run, worded, elements, starter, len(beyond)))
     parts = _parts(run, worded, elements)
-    return Inventory("radioss", parts, elements, np.concatenate([coordinates, beyond]), notes, complete=not notes)
+    return Inventory(
+        "radioss", parts, elements, np.concatenate([coordinates, beyond]), notes, not notes,
+        watched=places_of(_watched(worded), table), moved=any(words[:1] == ("TRANSFORM",) for _, words in worded),
+    )  # fmt: skip
+
+
+def _watched(cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Integers:
+    """Ids of the nodes of /TH/NODE, below a line of a title and one of variables."""
+    rows = [row for card, words in cards if words[:2] == ("TH", "NODE") for row in card.rows if not row.blank]
+    ids = [_whole_number(row.text[:_WIDTH]) for row in rows]
+    return np.unique(np.array([one for one in ids if one], np.int64))
 
 
 def _notes(
@@ -254,6 +264,11 @@ def _flags(card: Card, row: int) -> list[int]:
 
 def _at(rows: Sequence[str], row: int, start: int) -> float | None:
     return _positive(rows[row][start : start + _REAL]) if row < len(rows) else None
+
+
+def _whole_number(text: str) -> int:
+    """Read an id, 0 for what is none: a title, names of variables."""
+    return int(text) if text.strip().isdecimal() else 0
 
 
 def _positive(text: str) -> float | None:

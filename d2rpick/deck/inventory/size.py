@@ -51,7 +51,7 @@ def masses_and_steps(inventory: Inventory) -> dict[int, tuple[float | None, floa
     """
     measured: dict[int, list[_Measured]] = {}
     for elements in inventory.elements:
-        sizes, lengths = _in_pieces(elements.kind, elements.nodes, inventory.coordinates)
+        sizes, lengths = sizes_and_lengths(elements.kind, elements.nodes, inventory.coordinates)
         order = np.argsort(elements.part, kind="stable")
         parts, starts, counts = np.unique(elements.part[order], return_index=True, return_counts=True)
         sums, lows = np.add.reduceat(sizes[order], starts), np.minimum.reduceat(lengths[order], starts)
@@ -107,8 +107,9 @@ def _wave_speed(kind: str, material: Material | None) -> float | None:
     return None
 
 
-def _in_pieces(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
-    """Sizes of many elements, so many at once that they stay in the processor's cache."""
+def sizes_and_lengths(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
+    """Size of each element [length, area or volume], and the length that a wave has to cross; NaN where unknown."""
+    # so many at once that they stay in the processor's cache
     pieces = [_sizes(kind, nodes[at : at + _PIECE], coordinates) for at in range(0, len(nodes), _PIECE)]
     return np.concatenate([size for size, _ in pieces]), np.concatenate([length for _, length in pieces])
 

@@ -1,0 +1,255 @@
+"""How a body that is rigid from tr to td turns away from the one that is not.
+
+Both keep their angular momentum L.  In the frame of the body, with the places y of its parts about the centre of mass
+of all that flies, the tensor of inertia I and w = I^-1 L,
+
+    deformable:  w = I(t)^-1 (L - h),  h = sum m y x dy/dt        rigid:  w = I(tr)^-1 L.
+
+To first order in their difference psi, an angle,
+
+    dpsi/dt + w x psi + I^-1 (psi x L) = I^-1 [(I(t) - I(tr)) w + h],
+
+where of I(t) - I(tr) and h only the parts count that become rigid.  It is linear, so that one pass over the flight
+serves every tr and td.  Parts are points with an inertia of their own that turns with the body: a part that rocks on
+its mounts is not seen.  Places come from where the deck puts the parts, and their momenta since.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.histories.samples import integral, window
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from d2rpick.deck.inventory.placement import Placement
+    from d2rpick.histories.history import Momenta, Samples
+
+# Parts of the body may be this far from the places that one rotation of the deck gives them, as a share of the size
+# across: a body that is bent more, or lies elsewhere than the deck says, has no orientation to a tenth of a degree.
+_MOST_BENT: Final = 0.05
+# On so many states at most; between them places are straight lines, and the vibration of a body hardly turns it.
+_STATES: Final = 2000
+# Parts that hang together make the frame where they have half of the mass of the body; else all that stand still do.
+_MOST: Final = 0.5
+
+
+class Turning(NamedTuple):
+    """What a pass over a flight leaves: arrays over ``time`` (n,), in the frame of the body.
+
+    ``place`` (n, 3): of the body against the centre of mass of all that flies, as far as parts that become rigid push
+    it; ``arm`` (n, 3) from there to where errors are looked at [length]; ``inertia`` (n, 3, 3) of those parts;
+    ``carried`` (n, 3, 3), ``pushed`` (n, 3) and ``kept`` (n, 3, 3, 3) solve the equation of psi.
+    """
+
+    time: Samples
+    place: Samples
+    arm: Samples
+    inertia: Samples
+    carried: Samples
+    pushed: Samples
+    kept: Samples
+
+    def angles(self, tr: Samples, td: float) -> Samples:
+        """By what a body that is rigid from each of ``tr`` (k,) is turned at td: psi, (k, 3) [rad]."""
+        pushed, kept = (
+            _at(self.time, one, np.array([td])) - _at(self.time, one, tr) for one in (self.pushed, self.kept)
+        )
+        turned = pushed - np.einsum("kaij,kij->ka", kept, _at(self.time, self.inertia, tr))
+        return np.asarray(turned @ _at(self.time, self.carried, np.array([td]))[0].T)
+
+    def offsets(self, tr: Samples, td: float) -> Samples:
+        """By how much it is out of place then, (k, 3) in its own frame [length]."""
+        there = np.array([td])
+        slid = _at(self.time, self.place, there) - _at(self.time, self.place, tr)
+        return np.asarray(slid + np.cross(self.angles(tr, td), _at(self.time, self.arm, there)))
+
+
+class Parts(NamedTuple):
+    """All parts that fly: ``where`` each is (n, parts, 3) [length] and its ``mass`` (parts,).
+
+    ``centre`` (parts, 3) and ``spread`` (parts, 3, 3), second moments over the mass [length^2], are by the deck;
+    ``body`` are the indices of the parts that make the frame, ``rigid`` of all that become rigid.
+    """
+
+    where: Samples
+    mass: Samples
+    centre: Samples
+    spread: Samples
+    body: Sequence[int]
+    rigid: Sequence[int]
+
+
+class Rigid(NamedTuple):
+    """Places of the parts that become one rigid body, and of those of them that move against the others."""
+
+    members: Sequence[int]
+    moving: Sequence[int]
+
+
+def turning_in_flight(
+    momenta: Momenta,
+    masses: Samples,
+    rigid: Rigid,
+    flying: Collection[int],
+    flight: tuple[float, float],
+    placement: Placement,
+) -> Turning | None:
+    """Follow the orientation of the body that parts become, from where the deck puts all parts that fly.
+
+    None where a mass or a place is not known, or the record does not begin with the run; arguments as of `drift_of`.
+    """
+    assert momenta.parts is not None
+    every = sorted(i for i in {*flying, *rigid.members} if masses[i] != 0)
+    placed = {i: placement.parts.get(momenta.parts[i].id) for i in every}
+    known = [one for one in placed.values() if one]
+    time, mass = momenta.time, masses[every]
+    if len(known) < len(every) or not np.isfinite(mass).all() or time[0] > time[1] - time[0]:
+        return None
+    velocity = momenta.values[:, every] / mass[:, np.newaxis]
+    centre = np.stack([one.centre for one in known])
+    since = integral(time, velocity.reshape(time.size, -1)).reshape(velocity.shape)
+    inside = window(time, *flight)
+    stride = -(-(inside.stop - inside.start) // _STATES)
+    body = _frame_of(momenta, masses, rigid, placement)
+    where = (centre + velocity[0] * time[0] + since)[inside][::stride]
+    at = {i: place for place, i in enumerate(every)}
+    parts = Parts(
+        where, mass, centre, np.stack([one.spread for one in known]), [at[i] for i in body],
+        [at[i] for i in rigid.members],
+    )  # fmt: skip
+    return turning_of(time[inside][::stride], parts, placement.watched_centre(momenta.parts[i].id for i in body))
+
+
+def _frame_of(momenta: Momenta, masses: Samples, rigid: Rigid, placement: Placement) -> Sequence[int]:
+    """Parts that make the frame of the body: those that hang together and do not move against each other."""
+    assert momenta.parts is not None
+    still = [i for i in rigid.members if i not in rigid.moving]
+    together = placement.hanging_together([momenta.parts[i].id for i in still])
+    main = [i for i in still if momenta.parts[i].id in together]
+    return main if masses[main].sum() >= _MOST * masses[list(rigid.members)].sum() else still
+
+
+def turning_of(time: Samples, parts: Parts, looked_at: Samples | None) -> Turning | None:
+    """Follow the orientation of a body through a flight.
+
+    Parameters
+    ----------
+    time : array of shape (n,)
+        Of the states in flight [time].
+    parts : Parts
+    looked_at : array of shape (3,) or None
+        Where errors are looked at, by the deck [length]; None: at the centre of mass of the body.
+
+    Returns
+    -------
+    Turning or None
+        None where the parts of the body do not tell its orientation.
+    """
+    body, rigid, mass = list(parts.body), list(parts.rigid), parts.mass
+    where = parts.where - _mean(parts.where, mass)[:, np.newaxis]
+    home = _mean(parts.centre[body], mass[body])
+    shape, middle = parts.centre[body] - home, _mean(where[:, body], mass[body])
+    frames = _orientations(shape, where[:, body] - middle[:, np.newaxis], mass[body])
+    places, middle = where @ frames, np.einsum("ni,nij->nj", middle, frames)
+    if _bent(shape, places[:, body] - middle[:, np.newaxis], mass[body]) > _MOST_BENT:
+        return None
+    own = _inertia(np.einsum("p,pij->ij", mass, parts.spread))
+    inertia, spin = _inertia(_second(places, mass)) + own, _spin(places, mass)
+    moving = _inertia(_second(places[:, rigid], mass[rigid]))
+    solved = _solved(time, frames, (inertia, spin), (moving, _spin(places[:, rigid], mass[rigid])))
+    place = np.einsum("p,npi->ni", mass[rigid], places[:, rigid] - middle[:, np.newaxis]) / mass.sum()
+    return Turning(time, place, middle + (0.0 if looked_at is None else looked_at - home), moving, *solved)
+
+
+def _solved(
+    time: Samples, frames: Samples, whole: tuple[Samples, Samples], moving: tuple[Samples, Samples]
+) -> tuple[Samples, Samples, Samples]:
+    """Solve the equation of psi: a matrix that carries it, what pushes it, and what the inertia at tr takes off."""
+    (inertia, spin), steps = whole, np.diff(time)
+    swept = np.einsum("nij,nj->ni", _halves(inertia), _turns(frames)) + spin
+    kept = np.einsum("nij,nj->i", _halves(frames), swept) / steps.sum()  # L at rest
+    momentum = kept @ frames  # in the frame of the body
+    light = np.linalg.inv(inertia.mean(axis=0))
+    rate = momentum @ light
+    carried = _carried(time, light @ _across(momentum) - _across(rate))
+    back = _halves(np.asarray(np.linalg.inv(carried), dtype=np.float64)) @ light
+    dragged = np.einsum("nij,nj->ni", _halves(moving[0]), _halves(rate)) * steps[:, np.newaxis] + moving[1]
+    pushed = np.einsum("nij,nj->ni", back, dragged)
+    per_inertia = back[..., np.newaxis] * (_halves(rate) * steps[:, np.newaxis])[:, np.newaxis, np.newaxis]
+    return carried, _running(pushed), _running(per_inertia)
+
+
+def _carried(time: Samples, slope: Samples) -> Samples:
+    """Solution (n, 3, 3) of X' = slope X from the unit matrix on."""
+    found, unit = [np.eye(3)], np.eye(3)
+    for step in _halves(slope) * np.diff(time)[:, np.newaxis, np.newaxis]:
+        found.append((unit + step + step @ step / 2) @ found[-1])
+    return np.stack(found)
+
+
+def _orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
+    """Rotations (n, 3, 3) that bring a shape (parts, 3) nearest to each of ``where`` (n, parts, 3)."""
+    left, _, right = np.linalg.svd(np.einsum("p,npi,pj->nij", mass, where, shape))
+    mirrored = np.linalg.det(left @ right) < 0
+    left[mirrored, :, 2] *= -1
+    return np.asarray(left @ right)
+
+
+def _bent(shape: Samples, places: Samples, mass: Samples) -> float:
+    """How far parts are from their shape, over its size across its longest axis; infinite for parts on a line."""
+    across = np.sqrt(np.linalg.eigvalsh(_second(shape[np.newaxis], mass)[0])[:2].sum() / mass.sum())
+    off = np.sqrt(np.einsum("p,npi->", mass, (places - shape) ** 2) / (len(places) * mass.sum()))
+    return float(off / across) if across > 0 else np.inf
+
+
+def _turns(frames: Samples) -> Samples:
+    """Rotation from each frame to the next, (n - 1, 3) [rad]; small ones."""
+    between = frames[:-1].transpose(0, 2, 1) @ frames[1:]
+    odd = (between - between.transpose(0, 2, 1)) / 2
+    sine = np.stack([odd[:, 2, 1], odd[:, 0, 2], odd[:, 1, 0]], axis=1)
+    size = np.linalg.norm(sine, axis=1, keepdims=True)
+    return np.asarray(sine * np.where(size > 0, np.arcsin(np.minimum(size, 1.0)) / np.where(size > 0, size, 1.0), 1.0))
+
+
+def _mean(values: Samples, mass: Samples) -> Samples:
+    return np.asarray(np.einsum("p,...pi->...i", mass, values) / mass.sum())
+
+
+def _second(places: Samples, mass: Samples) -> Samples:
+    return np.asarray(np.einsum("p,npi,npj->nij", mass, places, places))
+
+
+def _inertia(second: Samples) -> Samples:
+    """Tensor of inertia by the second moments (..., 3, 3)."""
+    return np.asarray(np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3) - second)
+
+
+def _spin(places: Samples, mass: Samples) -> Samples:
+    """Integral of the angular momentum of parts against the frame over each step, (n - 1, 3): twice swept areas."""
+    return np.asarray(np.einsum("p,npi->ni", mass, np.cross(places[:-1], places[1:])))
+
+
+def _across(vectors: Samples) -> Samples:
+    """Matrices (n, 3, 3) whose product with a vector is the cross product of ``vectors`` (n, 3) with it."""
+    return np.asarray(np.cross(vectors[:, np.newaxis], np.eye(3)).transpose(0, 2, 1))
+
+
+def _halves(values: Samples) -> Samples:
+    """Values in the middle of the steps."""
+    return np.asarray((values[1:] + values[:-1]) / 2)
+
+
+def _running(steps: Samples) -> Samples:
+    return np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
+
+
+def _at(time: Samples, values: Samples, when: Samples) -> Samples:
+    """Values (n, ...) at times (k,), between samples on straight lines."""
+    after = np.clip(np.searchsorted(time, when), 1, time.size - 1)
+    share = (when - time[after - 1]) / (time[after] - time[after - 1])
+    share = share.reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(values[after - 1] * (1 - share) + values[after] * share)
