@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.cost import CostModel, Weights
-from d2rpick.choice.part_sets import SEVERAL_BODIES, recommended_parts, with_cost_of
+from d2rpick.choice.part_sets import recommended_parts, with_cost_of
+from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.same_model import doubts_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.inventory import read_inventory
@@ -52,7 +53,7 @@ def selected(run: Run, selection: Selection, settings: Settings, model: CostMode
 
 
 def with_deck(settings: Settings, history: History, model: CostModel) -> tuple[Settings, tuple[Caution, ...]]:
-    """Let the deck tell the cost share of the parts of a history, unless it is given, and whether they are one body.
+    """Let the deck tell the cost share of the parts of a history, unless it is given, and which bodies they become.
 
     What stays unknown is in the cautions.
     """
@@ -62,13 +63,11 @@ def with_deck(settings: Settings, history: History, model: CostModel) -> tuple[S
         return settings, told
     ids = [part.id for part in history.parts]
     found, share = with_cost_of(settings, model, ids)
-    one_body = len(model.inventory.bodies(ids)) == 1
-    return replace(found, one_body=one_body), tuple(_cautions(share.reason, history.parts, model, one_body=one_body))
+    found = replace(found, bodies=bodies_of(model.inventory, ids))
+    return found, tuple(_cautions(share.reason, history.parts, model))
 
 
-def _cautions(unknown: str | None, parts: Sequence[Part], model: CostModel, *, one_body: bool) -> Iterator[Caution]:
+def _cautions(unknown: str | None, parts: Sequence[Part], model: CostModel) -> Iterator[Caution]:
     yield from doubts_of(parts, model.inventory)
     if unknown:
         yield Caution("cost-unknown", f"the run time stays open: {unknown}")
-    if not one_body:
-        yield Caution("several-bodies", SEVERAL_BODIES)
