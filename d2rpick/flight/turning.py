@@ -201,7 +201,8 @@ def _orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
 
 def _bent(shape: Samples, places: Samples, mass: Samples) -> float:
     """How far parts are from their shape, over its size across its longest axis; infinite for parts on a line."""
-    across = np.sqrt(np.linalg.eigvalsh(_second(shape[np.newaxis], mass)[0])[:2].sum() / mass.sum())
+    least = np.linalg.eigvalsh(_second(shape[np.newaxis], mass)[0])[:2].sum() / mass.sum()
+    across = np.sqrt(max(0.0, float(least)))
     off = np.sqrt(np.einsum("p,npi->", mass, (places - shape) ** 2) / (len(places) * mass.sum()))
     return float(off / across) if across > 0 else np.inf
 

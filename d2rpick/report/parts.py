@@ -35,7 +35,7 @@ PART = (
 SET = (
     "name", "recommended", "parts", "bodies", "elements", "element_fraction", "mass_fraction", "cost_share",
     "step_growth", "step_free", "tr", "td", "rigid_fraction", "run_time_share", "saving", "position_error",
-    "position_limit", "position_part", "angle_error", "reasons",
+    "position_limit", "position_part", "position_body", "position_assumes", "angle_error", "reasons",
 )  # fmt: skip
 _MOST_SHOWN = 6
 
@@ -166,6 +166,8 @@ def set_(one: PartSet) -> dict[str, Any]:
         "position_error": one.position_error,
         "position_limit": one.position_limit,
         "position_part": keys.of_parts((one.position_part,)) if one.position_part else None,
+        "position_body": list(one.position_body) if one.position_body else None,
+        "position_assumes": one.position_assumes,
         "angle_error": one.angle_error,
         "reasons": list(one.reasons),
     }
@@ -229,10 +231,15 @@ def set_rows(found: Parts) -> list[list[tables.Cell]]:
             one.window[1] if one.window else None,
             _percent(one.run_time_share),
             _percent(one.saving),
-            _short(one.position_error),
+            _position(one),
         ]
         for one in found.sets
     ]
+
+
+def _position(one: PartSet) -> str | None:
+    """How far a set is out of place, and what that takes for granted."""
+    return f"{_short(one.position_error)} if one body" if one.position_assumes else _short(one.position_error)
 
 
 def verdict(row: PartRow) -> str:
@@ -250,7 +257,9 @@ def outlook(found: Parts) -> list[tuple[str, str]]:
         bodies = "one rigid body" if len(best.bodies) == 1 else f"{len(best.bodies)} rigid bodies"
         ids = ",".join(map(str, best.parts))
         lines.append(("recommended", f"{best.name}: --part {ids} ({bodies})"))
-        lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's"))
+        flights = len(found.facts.flights)
+        where = f", rigid in the longest of {flights} flights alone" if flights > 1 else ""
+        lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's{where}"))
         if best.step_growth is not None and best.step_growth > 1:
             much = "without limit" if isinf(best.step_growth) else f"{best.step_growth:.2g} times"
             lines.append(("step", f"may grow {much} while rigid, which saves more (--step-ratio); cap it (--step-cap)"))

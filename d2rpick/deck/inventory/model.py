@@ -157,11 +157,32 @@ class Inventory:
 
         The parts of a car with an engine on its mounts are one body; an engine, a battery and wheels alone are several.
         """
-        groups = self.groups(parts)
+        rigid = [part for part in parts if not self._discrete(part)] or parts
+        groups = self.groups(rigid)
         largest = max((self.rigid_nodes(group) for group in groups), default=0)
-        if len(groups) > 1 and largest >= _ONE_BODY * self.rigid_nodes(parts):
+        if len(rigid) > 1 and (len(groups) == 1 or largest >= _ONE_BODY * self.rigid_nodes(rigid)):
             return (tuple(sorted(parts)),)
         return groups
+
+    def _discrete(self, part: int) -> bool:
+        """Whether a part has springs alone: these hold no rigid body together, and move with it."""
+        return part in self.counts and set(self.counts[part]) <= DISCRETE
+
+    def pieces(self, part: int) -> int:
+        """Number of pieces of a part that share no nodes; none without elements."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        nodes = self.nodes_by_part.get(part, np.empty(0, np.int64))
+        rows, columns = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+        for one in (elements.of(part) for elements in self.elements):
+            at, other = np.nonzero(one != NO_NODE)
+            first = np.repeat(one[:, :1], one.shape[1], axis=1)
+            rows.append(np.searchsorted(nodes, first[at, other]))
+            columns.append(np.searchsorted(nodes, one[at, other]))
+        joined = np.concatenate(rows), np.concatenate(columns)
+        links = coo_array((np.ones(joined[0].size, bool), joined), shape=(nodes.size, nodes.size))
+        return int(connected_components(links, directed=False, return_labels=False))
 
     def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
         """Groups of these parts that share nodes, directly or not."""

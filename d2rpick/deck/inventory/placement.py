@@ -77,6 +77,7 @@ def _shares(elements: Elements, coordinates: Reals) -> Iterable[tuple[int, _Shar
     middles = _middles(elements.nodes, coordinates)
     parts, at = np.unique(elements.part, return_inverse=True)
     total = np.bincount(at, sizes)
+    total[total == 0] = np.nan  # elements without any size do not tell where their part is
     first = np.stack([np.bincount(at, sizes * axis) for axis in middles.T], axis=1)
     from_middle = middles - (first / total[:, np.newaxis])[at]  # not from a far origin, where digits would be lost
     second = np.array([[np.bincount(at, sizes * a * b) for a in from_middle.T] for b in from_middle.T])
