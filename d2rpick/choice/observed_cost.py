@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.choice.calibrate import Observation
+from d2rpick.choice.cost import POINT
 from d2rpick.deck import find_windows, read_deck, read_parts, read_switching
 from d2rpick.deck.folder import main_decks
 from d2rpick.deck.inventory import ls_dyna, radioss
@@ -120,22 +120,26 @@ def _of_zones(zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_Rigid]) -
 
 
 def _computed(inventory: Inventory, lasting: Mapping[int, float]) -> tuple[dict[str, float], float]:
-    """Deformable elements by class, and nodes of rigid bodies, each on the average of a leg."""
-    found: Counter[str] = Counter()
+    """Deformable elements by class, with their further points, and nodes of rigid bodies, on the average of a leg."""
     always = {part for part, data in inventory.parts.items() if data.material and data.material.kind == "rigid"}
-    for part, counts in inventory.counts.items():
-        for kind, count in counts.items():
-            cost = inventory.formulation(part, kind).cost
-            if cost is not None and part not in always:
-                found[cost] += count
-    computed = {name: float(count) for name, count in found.items()}
+    computed: dict[str, float] = {}
+    _count(computed, inventory, {part: one for part, one in inventory.counts.items() if part not in always}, 1.0)
     nodes = 0.0
     for fraction in sorted(set(lasting.values())):
         parts = [part for part, value in lasting.items() if value == fraction]
         nodes += fraction * inventory.rigid_nodes(parts)
-        for part, counts in inventory.elements_within(parts).items():
-            for kind, count in counts.items():
-                cost = inventory.formulation(part, kind).cost
-                if cost is not None and part not in always:
-                    computed[cost] -= fraction * count
+        within = inventory.elements_within(parts)
+        _count(computed, inventory, {part: one for part, one in within.items() if part not in always}, -fraction)
     return computed, nodes
+
+
+def _count(into: dict[str, float], inventory: Inventory, counts: Mapping[int, Mapping[str, int]], times: float) -> None:
+    """Add elements of known cost by their class, so many times."""
+    for part, kinds in counts.items():
+        for kind, count in kinds.items():
+            cost = inventory.formulation(part, kind).cost
+            further = inventory.further_points(part, kind)
+            if cost is not None:
+                into[cost] = into.get(cost, 0.0) + times * count
+            if cost is not None and further:
+                into[POINT] = into.get(POINT, 0.0) + times * count * further

@@ -46,8 +46,8 @@ def written(weights: Weights) -> str:
     --------
     >>> print(written(Weights({"BT": 0.3}, source="a run")))
     source = "a run"
-    element_share = 0.87
-    rigid_node = 0.05
+    element_share = 0.91
+    rigid_node = 0.04
     <BLANKLINE>
     [per_element]
     "BT" = 0.3

@@ -23,7 +23,7 @@ HEAD = (
 )  # fmt: skip
 SET_HEAD = (
     "", "set", "parts", "elements", "mass", "saved of a step", "step grows", "tr", "td", "run time", "saved",
-    "out of place",
+    "out of place", "turned [deg]",
 )  # fmt: skip
 
 # Keys of a part in JSON, and columns of the csv.
@@ -232,6 +232,7 @@ def set_rows(found: Parts) -> list[list[tables.Cell]]:
             _percent(one.run_time_share),
             _percent(one.saving),
             _position(one),
+            _short(one.angle_error),
         ]
         for one in found.sets
     ]

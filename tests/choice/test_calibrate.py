@@ -44,7 +44,7 @@ def test_weights_of_a_made_site_are_found(elements: bool) -> None:
 
 
 def test_what_one_run_does_not_tell_apart_keeps_its_ratio() -> None:
-    found = calibrate([leg(ALL, 0)])
+    found = calibrate([leg({"QBAT": 400.0, "BT": 1000.0, "solid": 180.0}, 0)])
     ratios = {found.weights.per_element[name] / MEASURED[name] for name in ALL}
     assert max(ratios) / min(ratios) == pytest.approx(1, rel=0.02)
     assert "solid" not in found.told
@@ -80,11 +80,12 @@ def run_folder(folder: Path) -> Path:
 
 def test_legs_of_radioss_are_read_with_what_is_rigid_in_them(tmp_path: Path) -> None:
     free, rigid = observations_of(str(run_folder(tmp_path)))
-    assert (free.counts, free.rigid_nodes) == ({"QEPH": 2.0}, 0.0)
+    assert (free.counts, free.rigid_nodes) == ({"QEPH": 2.0, "point": 4.0}, 0.0)
     assert [free.elements, free.total] == pytest.approx([8.0, 10.0])
-    assert (rigid.counts, rigid.rigid_nodes) == ({"QEPH": 1.0}, 4.0)
+    assert (rigid.counts, rigid.rigid_nodes) == ({"QEPH": 1.0, "point": 2.0}, 4.0)
     assert [rigid.elements, rigid.total] == pytest.approx([4.0, 7.0])
-    assert calibrate([free, rigid]).weights.per_element["QEPH"] == pytest.approx(4.0, rel=0.02)
+    found = calibrate([free, rigid]).weights.per_element
+    assert found["QEPH"] + 2 * found["point"] == pytest.approx(4.0, rel=0.02)  # an element of three layers
 
 
 def test_a_glstat_tells_by_its_time_per_zone_cycle(tmp_path: Path) -> None:
@@ -103,8 +104,8 @@ def test_a_glstat_tells_by_its_time_per_zone_cycle(tmp_path: Path) -> None:
     )
     (tmp_path / "glstat").write_text(states)
     free, rigid = observations_of(str(tmp_path))
-    assert (free.counts, free.elements) == ({"BT": 2.0}, None)
-    assert (rigid.counts, rigid.rigid_nodes) == ({"BT": 1.0}, 4.0)
+    assert (free.counts, free.elements) == ({"BT": 2.0, "point": 2.0}, None)
+    assert (rigid.counts, rigid.rigid_nodes) == ({"BT": 1.0, "point": 1.0}, 4.0)
     assert [free.total, rigid.total] == pytest.approx([10.0, 6.0])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,8 +50,22 @@ def inventory(
 def test_shares_of_parts_of_one_formulation_are_those_of_their_elements() -> None:
     model = CostModel(inventory({1: 30, 2: 70}), Weights(rigid_node=0.0))
     assert [model.share_of(part).value for part in (1, 2)] == pytest.approx([0.3, 0.7])
-    assert model.saved([2]).value == pytest.approx(0.7 * 0.87)
-    assert model.saved([1, 2]).value == pytest.approx(0.87)
+    assert model.saved([2]).value == pytest.approx(0.7 * 0.91)
+    assert model.saved([1, 2]).value == pytest.approx(0.91)
+
+
+@pytest.mark.parametrize(("layers", "extra"), [(1, 0), (3, 8), (5, 16), (None, 8)])
+def test_shells_cost_more_with_more_integration_points(layers: int | None, extra: int) -> None:
+    """Four points in each layer, of which 3 are assumed; without a weight for points none counts."""
+    of_deck = radioss("shell", 12, 0, 0)
+    assert of_deck is not None
+    found = inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
+    parts = {1: replace(found.parts[1], section=Section({"shell": of_deck}, layers=layers)), 2: found.parts[2]}
+    found = replace(found, parts=parts)
+    assert found.further_points(1, "shell") == extra
+    model = CostModel(found, Weights({"QBAT": 1.0, "strange": 1.0, "point": 0.5}))
+    assert model.of_part(1).cost == 30 * (1 + 0.5 * extra)
+    assert CostModel(found, Weights({"QBAT": 1.0, "strange": 1.0})).of_part(1).cost == 30
 
 
 def test_elements_that_are_rigid_from_the_start_cost_nothing() -> None:

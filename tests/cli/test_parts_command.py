@@ -154,6 +154,6 @@ def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
     site = tmp_path / "site.toml"
     assert run("calibrate", "-f", "toml", "-o", str(site), folder).exit_code == 0
     result = run("parts", "-q", "-f", "json", "--weights", str(site), "--exit-zero", *WITH_DECK)
-    assert json.loads(result.stdout)["weights"]["per_element"].keys() == {"QEPH"}
+    assert json.loads(result.stdout)["weights"]["per_element"].keys() == {"QEPH", "point"}
     (tmp_path / "empty").mkdir()
     assert run("calibrate", str(tmp_path / "empty")).exit_code == 2

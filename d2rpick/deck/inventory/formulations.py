@@ -11,6 +11,8 @@ from typing import Final
 from d2rpick.deck.inventory.model import Formulation
 
 BT, QEPH, QBAT, BEAM, SOLID, SPRING = "BT", "QEPH", "QBAT", "beam", "solid", "spring"
+# Integration points in each layer of a shell, by class.
+_IN_PLANE: Final = {BT: 1, QEPH: 1, QBAT: 4}
 
 # Radioss, Ishell of quadrilaterals (Altair's public help for /PROP/TYPE1).
 _ISHELL: Final = {
@@ -50,9 +52,9 @@ _ELFORM_SHELL: Final = {
 def radioss(kind: str, shell: int, triangle: int, solid: int) -> Formulation | None:
     """How Radioss computes elements of a kind with these flags of their property; None for what is not known."""
     if kind == "shell":
-        return _ISHELL.get(shell, Formulation(f"Ishell {shell}", None, measured=False))
+        return _layered(_ISHELL.get(shell, Formulation(f"Ishell {shell}", None, measured=False)))
     if kind == "triangle":
-        return _ISH3N.get(triangle, Formulation(f"Ish3n {triangle}", None, measured=False))
+        return _layered(_ISH3N.get(triangle, Formulation(f"Ish3n {triangle}", None, measured=False)))
     if kind == "solid":
         return Formulation(_ISOLID.get(solid, f"Isolid {solid}"), SOLID, measured=solid in _ISOLID_MEASURED)
     return _plain(kind, measured=True)
@@ -62,10 +64,14 @@ def ls_dyna(kind: str, elform: int) -> Formulation | None:
     """How LS-DYNA computes elements of a kind with this ELFORM; None for what is not known."""
     if kind == "shell":
         name, cost = _ELFORM_SHELL.get(elform, ("shell", None))
-        return Formulation(f"{name} (ELFORM {elform})", cost, measured=False)
+        return _layered(Formulation(f"{name} (ELFORM {elform})", cost, measured=False))
     if kind in ("solid", "thick shell"):
         return Formulation(f"{kind} (ELFORM {elform})", SOLID, measured=False)
     return _plain(kind, measured=False)
+
+
+def _layered(shell: Formulation) -> Formulation:
+    return shell._replace(in_plane=_IN_PLANE.get(shell.cost or "", 0))
 
 
 def _plain(kind: str, *, measured: bool) -> Formulation | None:

@@ -242,11 +242,12 @@ def _parts(deck: Deck, parts: Parts, elements: Sequence[Elements]) -> dict[int, 
 
 
 class _Raw(NamedTuple):
-    """A *SECTION as written: its kind, ELFORM, and the first number of its second line."""
+    """A *SECTION as written: its kind, ELFORM, the first number of its second line, points through the thickness."""
 
     kind: str
     elform: int
     first: float | None
+    layers: int | None
 
 
 def _sections(deck: Deck) -> Iterator[tuple[int, _Raw]]:
@@ -263,7 +264,9 @@ def _sections(deck: Deck) -> Iterator[tuple[int, _Raw]]:
             number, elform = card.integer(rows[at], 0), card.integer(rows[at], 1, 1 if kind == "SOLID" else 2)
             if not number.problem:
                 second = rows[at + 1] if per_section > 1 and at + 1 < len(rows) else None
-                raw = _Raw(kind, 0 if elform.problem else elform.value, _number(card, second, 0))
+                layers = card.integer(rows[at], 3, 2) if kind == "SHELL" else None
+                through = (layers.value or 2) if layers and not layers.problem else None
+                raw = _Raw(kind, 0 if elform.problem else elform.value, _number(card, second, 0), through)
                 yield number.value + card.transform.rest, raw
 
 
@@ -278,7 +281,7 @@ def _section(raw: _Raw | None, kinds: set[str], material: Material | None) -> Se
         return Section(found, damped=damped)
     area = raw.first if raw.kind == "BEAM" and raw.elform in (2, 3, 12) else None
     turns = not (raw.kind == "SOLID" and raw.elform in NOT_TURNED)
-    return Section(found, raw.first if raw.kind == "SHELL" else None, area, damped, None, turns)
+    return Section(found, raw.first if raw.kind == "SHELL" else None, area, damped, None, turns, raw.layers)
 
 
 def _materials(deck: Deck, parts: Parts) -> Iterator[tuple[str, Material]]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 NO_NODE: Final = -1
 _ONE_BODY: Final = 0.75  # share of the nodes of some parts from which on one group of them is the body
+_LAYERS: Final = 3  # points through the thickness where the deck does not tell: most shells have 2 to 5
 _DENSE: Final = 50_000_000  # up to this id a table of all ids is small enough
 DISCRETE: Final = frozenset({"spring", "seatbelt"})  # kinds of elements that are not switched by part
 
@@ -30,12 +31,14 @@ class Formulation(NamedTuple):
     """How the elements of a part are computed: what to call it, and the class by which their cost is known.
 
     ``cost`` is a key of the weights, or None where nothing is known; ``measured`` tells whether the weight of its
-    class was measured for this formulation, or is taken over from one alike.
+    class was measured for this formulation, or is taken over from one alike.  ``in_plane`` are the integration points
+    in each layer of a shell.
     """
 
     name: str
     cost: str | None
     measured: bool = True
+    in_plane: int = 0
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ class Section:
     """Section of a part: formulations by kind of element, thickness of shells, area of beams, damping of springs.
 
     ``turns`` False: stresses of its solids do not turn with a rigid body.  ``damped`` is None where it is not known;
-    ``mass`` is that of one spring.
+    ``mass`` is that of one spring, ``layers`` are integration points through the thickness of shells.
     """
 
     formulations: Mapping[str, Formulation] = field(default_factory=dict)
@@ -66,6 +69,7 @@ class Section:
     damped: bool | None = None
     mass: float | None = None
     turns: bool = True
+    layers: int | None = None
 
 
 @dataclass(frozen=True)
@@ -123,6 +127,12 @@ class Inventory:
         data = self.parts.get(part)
         found = data.section.formulations.get(kind) if data else None
         return found or Formulation(kind, None, measured=False)
+
+    def further_points(self, part: int, kind: str) -> int:
+        """Integration points of an element of a part beside those of one layer; of shells alone."""
+        data = self.parts.get(part)
+        layers = _LAYERS if data is None or data.section.layers is None else data.section.layers
+        return self.formulation(part, kind).in_plane * max(layers - 1, 0)
 
     @cached_property
     def nodes_by_part(self) -> Mapping[int, Places]:

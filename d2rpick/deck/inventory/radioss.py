@@ -227,7 +227,7 @@ def _properties(cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Iterator[tuple
         if words[1] in _SHELLS:
             found = _Property(
                 words[1], flags[0] or shell or _DEFAULT_SHELL, flags[2] or triangle or _DEFAULT_TRIANGLE,
-                section=Section(thickness=_at(rows, 3, 20) if words[1] in _PLAIN_SHELLS else None),
+                section=_of_plain_shells(rows) if words[1] in _PLAIN_SHELLS else Section(),
             )  # fmt: skip
         elif words[1] in _SOLIDS:
             isolid, iframe = flags[0] or solid or _DEFAULT_SOLID, flags[7]
@@ -253,7 +253,13 @@ def _section(prop: _Property | None, kinds: set[str], *, turns: bool) -> Section
         if one:
             found[kind] = one
     own = prop.section
-    return Section(found, own.thickness, own.area, own.damped, own.mass, own.turns and turns)
+    return Section(found, own.thickness, own.area, own.damped, own.mass, own.turns and turns, own.layers)
+
+
+def _of_plain_shells(rows: Sequence[str]) -> Section:
+    """Thickness and integration points through it; 0 points stand for global integration, which is one."""
+    layers = _whole_number(rows[3][:_WIDTH]) if len(rows) > 3 else None
+    return Section(thickness=_at(rows, 3, 20), layers=None if layers is None else max(layers, 1))
 
 
 def _flags(card: Card, row: int) -> list[int]:
