@@ -79,7 +79,7 @@ def car(parts: str) -> tuple[History, Flight]:
 
 
 def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> None:
-    """Six bodies: the solver found the car 0.16 mm off; taken for one body it would be 3.3 mm."""
+    """Six bodies: the solver found the car 0.16 mm off; taken for one body it would be 1.8 mm."""
     with shared("openradioss/car_drop/car_runs.csv").open() as table:
         (run,) = [row for row in csv.DictReader(table) if row["run"] == "car_b_heavy"]
     tr, td = np.array([float(run["tr_s"])]), float(run["td_s"])

@@ -103,7 +103,8 @@ def read(run: Run) -> Inventory:
 
 def _watched(cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Integers:
     """Ids of the nodes of /TH/NODE, below a line of a title and one of variables."""
-    rows = [row for card, words in cards if words[:2] == ("TH", "NODE") for row in card.rows if not row.blank]
+    watching = [card for card, words in cards if words[:2] == ("TH", "NODE")]
+    rows = [row for card in watching for row in card.rows[1:] if not row.blank]
     ids = [_whole_number(row.text[:_WIDTH]) for row in rows]
     return np.unique(np.array([one for one in ids if one], np.int64))
 
