@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share
-from d2rpick.choice.deck_doubts import doubts_of, doubts_of_cost
+from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
 from d2rpick.choice.part_facts import facts_of
 from d2rpick.choice.part_steps import steps_of
@@ -304,6 +304,7 @@ def _cautions(
         yield Caution("no-deck", "without a deck the cost and most verdicts stay open; name the main deck of the run")
         return
     yield from doubts_of((fact.part for fact in facts.parts.values()), model.inventory)
+    yield from doubts_of_bodies([row.id for row in rows if row.movable], model.inventory)
     yield from doubts_of_cost(model)
     if missing := [row.id for row in rows if row.elements is None and row.id in facts.parts]:
         yield Caution("parts-not-in-deck", f"part {', '.join(map(str, missing))} of the history is not in the deck")

@@ -13,14 +13,17 @@ if TYPE_CHECKING:
 
 
 def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, ...] | None:
-    """Give the rigid bodies that these parts become; None where not all elements of the deck are known.
+    """Give the rigid bodies that these parts become; None where not all elements, or ties between bodies, are known.
 
     A part whose elements do not hang together is one body all the same in LS-DYNA, which switches parts; in Radioss,
     where a body is a set of nodes, each piece may have a body of its own.
     """
     if not inventory.complete:
         return None
-    return tuple(RigidBody(body, _whole(inventory, body)) for body in inventory.bodies(parts))
+    bodies = inventory.bodies(parts)
+    if len(bodies) > 1 and inventory.ties:
+        return None
+    return tuple(RigidBody(body, _whole(inventory, body)) for body in bodies)
 
 
 def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:

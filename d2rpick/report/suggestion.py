@@ -171,7 +171,7 @@ def position(best: Candidate) -> str:
     assert best.position_error is not None
     taken = f" if {best.position_error_assumes} (`deck` tells which do)" if best.position_error_assumes else ""
     if best.position_error_part is None:
-        return f"in place at td{taken}: no part moves against the others of its rigid body"
+        return f"in place at td{taken}, as far as parts tell: none moves against the others of its rigid body"
     body = f", the body of part {best.position_error_body}" if best.position_error_body else ""
     return f"off by {best.position_error:.2g} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
 
