@@ -62,7 +62,10 @@ def with_deck(settings: Settings, history: History, model: CostModel) -> tuple[S
     ids = [part.id for part in history.parts]
     found, share = with_cost_of(settings, model, ids)
     found = replace(found, bodies=bodies_of(model.inventory, ids))
-    doubts = [*doubts_of(history.parts, model.inventory), *doubts_of_cost(model, used=settings.cost_share is None)]
+    doubts = [
+        *doubts_of(history.parts, model.inventory),
+        *doubts_of_cost(model, used=settings.cost_share is None and share.value is not None),
+    ]
     doubts += doubts_of_bodies(ids, model.inventory)
     if share.reason:
         doubts.append(Caution("cost-unknown", f"the run time stays open: {share.reason}"))

@@ -128,3 +128,12 @@ def test_a_deck_without_the_parts_leaves_the_run_time_open() -> None:
     assert told["deck-of-another-model"].startswith(
         "part 1 is 'floor' in the history and 'box' in the deck, and 2 more"
     )
+
+
+def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_deck() -> None:
+    asked = ("--td", "0.1464", "--part", "12-14", "--deck", str(DECK), car())
+    found = answer("suggest", *asked)
+    best = next(one for one in found["candidates"] if one["recommended"])
+    assert best["position_error_assumes"] == ONE_BODY
+    told = run("suggest", "-q", *asked).stdout
+    assert "at td if the parts become one rigid body: engine is frozen elsewhere" in told
