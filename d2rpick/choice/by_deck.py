@@ -58,7 +58,7 @@ def with_deck(settings: Settings, history: History, model: CostModel) -> tuple[S
     if not history.parts:
         why = "no parts are named whose elements are saved; give them with `parts`"
         told = () if settings.cost_share is not None else (Caution("cost-unknown", f"the run time stays open: {why}"),)
-        return settings, told
+        return replace(settings, bodies=()), told
     ids = [part.id for part in history.parts]
     found, share = with_cost_of(settings, model, ids)
     found = replace(found, bodies=bodies_of(model.inventory, ids))

@@ -239,8 +239,8 @@ def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
         tr, td = row.window or (0.0, 0.0)
         own = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, flight {behind.number} for {behind.rigid_time:.3g}"
         why = f"{own}: a run supports only one window that locks in energy"
-        cure = f"with `min_rigid` below {rigid:.6g} this one comes first, and the longer one from the run switched so"
-        yield replace(row, status="left-out", reason=f"{why}; {cure}")
+        cure = f"with `min_rigid` below {rigid:.6g} this one comes first"
+        yield replace(row, status="left-out", reason=f"{why}; {cure}, and the other waits for the run switched so")
 
 
 def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Planned]:
