@@ -179,3 +179,11 @@ def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(asked: tuple[str,
     if asked[0] != "parts":
         assert "cost-unknown" in doubts
         assert "weights-by-analogy" not in codes("--cost-share", "0.5", *WITH_DECK)
+
+
+def test_the_deck_that_a_plan_writes_merges_what_parts_merges(tmp_path: Path) -> None:
+    """Else `check` finds nodes that two rigid bodies own, D2R108."""
+    result = run("plan", "-q", "--part", "recommended", "--write-deck", str(tmp_path / "next"), *WITH_DECK)
+    assert result.exit_code == 0
+    assert "0 errors, 0 warnings" in result.stdout
+    assert "\n         2         1      PART\n" in (tmp_path / "next" / "switches.k").read_text()
