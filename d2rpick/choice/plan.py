@@ -21,10 +21,11 @@ from d2rpick.choice.suggest_td import bounds, flights_of
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.energy_alone import round_off
+from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.settings import Settings
@@ -179,16 +180,24 @@ def plan_of(
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
     history, found, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
-    flights = flights_of(history, settings)
+    fits = Fits()
+    flights = flights_of(history, settings, fits)
     earlier = before and flights_of(switched_history(before, ())[0], settings)  # it may have been switched itself
     known = done_windows(history, flights, found, earlier)
-    found_rows = list(_rows(reference, flights, settings, shortest, known))
-    rows = tuple(_with_status(found_rows if min_rigid is not None else list(_without_short(found_rows)), known))
+    judged: Iterable[Planned] = _rows(reference, flights, settings, shortest, known, fits)
+    if min_rigid is None:
+        judged = _without_short(list(judged))
+    rows = tuple(_with_status(list(judged), known))
     return Plan(history, settings, shortest, rows, (*cautions, *_cautions(rows, known)), found)
 
 
 def _rows(
-    reference: Reference, flights: Sequence[Flight], settings: Settings, shortest: float, known: Sequence[Done]
+    reference: Reference,
+    flights: Sequence[Flight],
+    settings: Settings,
+    shortest: float,
+    known: Sequence[Done],
+    fits: Fits,
 ) -> Iterator[Planned]:
     """Give every flight with its window, as if each were the first."""
     last = max((one.td for one in known), default=None)
@@ -207,13 +216,14 @@ def _rows(
         elif end - margin.time - start < shortest:
             yield replace(row, reason=_too_short(end - margin.time - start, shortest, margin))
         else:
-            yield _asked(reference, row, settings, shortest)
+            yield _asked(reference, row, settings, shortest, fits)
 
 
-def _asked(reference: Reference, row: Planned, settings: Settings, shortest: float) -> Planned:
+def _asked(reference: Reference, row: Planned, settings: Settings, shortest: float, fits: Fits) -> Planned:
     """Ask ``suggest`` for the window of a flight."""
     own = settings.after is not None and row.start <= settings.after <= row.end
-    answer = suggest_of(reference, (row.start, row.end), settings if own else replace(settings, after=None))
+    asked = settings if own else replace(settings, after=None)
+    answer = suggest_of(reference, (row.start, row.end), asked, fits=fits)
     row = replace(row, answer=answer)
     if answer.recommended is None:
         why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
