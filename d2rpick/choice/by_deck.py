@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.cost import CostModel, Weights
-from d2rpick.choice.deck_doubts import doubts_of, doubts_of_cost
+from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost
 from d2rpick.choice.part_sets import recommended_parts, with_cost_of
 from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.warnings import Caution
@@ -59,11 +59,15 @@ def with_deck(settings: Settings, history: History, model: CostModel) -> tuple[S
     if not history.parts:
         why = "no parts are named whose elements are saved; give them with `parts`"
         told = () if settings.cost_share is not None else (Caution("cost-unknown", f"the run time stays open: {why}"),)
-        return settings, told
+        return replace(settings, bodies=()), told
     ids = [part.id for part in history.parts]
     found, share = with_cost_of(settings, model, ids)
     found = replace(found, bodies=bodies_of(model.inventory, ids), placement=Placement(model.inventory))
-    doubts = [*doubts_of(history.parts, model.inventory), *doubts_of_cost(model, used=settings.cost_share is None)]
+    doubts = [
+        *doubts_of(history.parts, model.inventory),
+        *doubts_of_cost(model, used=settings.cost_share is None and share.value is not None),
+    ]
+    doubts += doubts_of_bodies(ids, model.inventory)
     if share.reason:
         doubts.append(Caution("cost-unknown", f"the run time stays open: {share.reason}"))
     return found, tuple(doubts)

@@ -10,7 +10,7 @@ import numpy as np
 
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share
-from d2rpick.choice.deck_doubts import doubts_of, doubts_of_cost
+from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
 from d2rpick.choice.part_facts import facts_of
 from d2rpick.choice.part_steps import steps_of
@@ -156,7 +156,8 @@ def recommended_parts(run: Run, settings: Settings, model: CostModel) -> tuple[i
     """Give the parts of the recommended set; FormatError where none can be recommended."""
     found = parts_of(run, settings, model)
     if found.recommended is None:
-        why = "; ".join(dict.fromkeys(reason for one in found.sets for reason in one.reasons))
+        absent = [one.message for one in found.cautions if one.code in ("no-part-history", "parts-not-in-deck")]
+        why = "; ".join(dict.fromkeys([*absent, *(reason for one in found.sets for reason in one.reasons)]))
         raise FormatError(
             f"{run.name}: no set of parts can be recommended ({why or 'no part may be switched'}); name the parts"
         )
@@ -315,6 +316,7 @@ def _cautions(
         yield Caution("no-deck", "without a deck the cost and most verdicts stay open; name the main deck of the run")
         return
     yield from doubts_of((fact.part for fact in facts.parts.values()), model.inventory)
+    yield from doubts_of_bodies([row.id for row in rows if row.movable], model.inventory)
     yield from doubts_of_cost(model)
     if missing := [row.id for row in rows if row.elements is None and row.id in facts.parts]:
         yield Caution("parts-not-in-deck", f"part {', '.join(map(str, missing))} of the history is not in the deck")

@@ -25,7 +25,7 @@ from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.settings import Settings
@@ -184,8 +184,10 @@ def plan_of(
     flights = flights_of(history, settings, fits)
     earlier = before and flights_of(switched_history(before, ())[0], settings)  # it may have been switched itself
     known = done_windows(history, flights, found, earlier)
-    found_rows = list(_rows(reference, flights, settings, shortest, known, fits))
-    rows = tuple(_with_status(found_rows if min_rigid is not None else list(_without_short(found_rows)), known))
+    judged: Iterable[Planned] = _rows(reference, flights, settings, shortest, known, fits)
+    if min_rigid is None:
+        judged = _without_short(list(judged))
+    rows = tuple(_with_status(list(judged), known))
     return Plan(history, settings, shortest, rows, (*cautions, *_cautions(rows, known)), found)
 
 
@@ -247,8 +249,8 @@ def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
         tr, td = row.window or (0.0, 0.0)
         own = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, flight {behind.number} for {behind.rigid_time:.3g}"
         why = f"{own}: a run supports only one window that locks in energy"
-        cure = f"with `min_rigid` below {rigid:.6g} this one comes first, and the longer one from the run switched so"
-        yield replace(row, status="left-out", reason=f"{why}; {cure}")
+        cure = f"with `min_rigid` below {rigid:.6g} this one comes first"
+        yield replace(row, status="left-out", reason=f"{why}; {cure}, and the other waits for the run switched so")
 
 
 def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Planned]:

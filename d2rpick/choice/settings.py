@@ -34,7 +34,8 @@ class Settings:
     the energy level alone.  ``strict``: accept no tr of a flight that is not certain.
     ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the step while rigid to that
     while deformable; without the first nothing is said of the run time.
-    ``bodies``: what the parts become while they are rigid, by a deck; without it one body is assumed.
+    ``bodies``: what the parts become while they are rigid, by a deck; None without one, empty where it does not tell.
+    Then one body is assumed.
     ``placement``: where the deck puts the parts, or None without one.
     """
 

@@ -85,7 +85,7 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
     bodies = situation.bodies
     if bodies is None:
         return
-    if bodies.told and len(bodies.told) > 1 and bodies.unknown:
+    if len(bodies.told) > 1 and bodies.unknown:
         yield Caution("several-bodies", _not_predicted(bodies.told, bodies.unknown))
     worst = bodies.worst(tr, situation.td)
     if worst is None or worst.error <= bodies.limit:
@@ -94,14 +94,15 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
     share, last = worst.error / float(drift.path[-1]), float(drift.time[-1] - drift.time[0])
     found = f"{drift.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
     off = f"there the body{which} is off by {worst.error:.3g}, {share:.1%} of its path in the flight"
-    taken = "; this holds if the parts become one rigid body, which `deck` tells" if worst.assumed else ""
+    taken = "; this holds if the parts become one rigid body" if worst.assumed else ""
+    taken += ", which `deck` tells" if worst.assumed and situation.settings.bodies is None else ""
     yield Caution("out-of-place", f"{found}: {off}; the next contact may move by {share * last:.2g}{taken}")
 
 
 def _not_predicted(told: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> str:
     """Name the first body whose error is not known, and why."""
     first, more = unknown[0], f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
-    why = "" if first.whole else "; its pieces do not hang together, or are not in the deck"
+    why = "" if first.whole else "; its pieces do not hang together"
     return f"{len(told)} rigid bodies: how far that of {_named(first)}{more} is out of place is not predicted{why}"
 
 

@@ -53,16 +53,16 @@ class Off(NamedTuple):
 
 
 class Bodies:
-    """Rigid bodies of a flight, each with its drift; ``told`` are those of a deck, None where one body is assumed.
+    """Rigid bodies of a flight, each with its drift; ``told`` are those of a deck, none where one body is assumed.
 
     Where the drift of one of them is not known, no error is: it may be the largest.
     """
 
     def __init__(self, drifts: Sequence[Drift | None], told: Sequence[RigidBody] | None) -> None:
-        self.told = None if told is None else tuple(told)
+        self.told = tuple(told or ())
         self._known = tuple(one for one in drifts if one)
         self._complete = len(self._known) == len(drifts) > 0
-        self.unknown = tuple(body for body, one in zip(told or (), drifts, strict=False) if one is None)
+        self.unknown = tuple(body for body, one in zip(self.told, drifts, strict=False) if one is None)
 
     def errors(self, tr: Samples, td: float) -> Samples:
         """How far the body that is off most will be at td, for times tr (k,) [length]; NaN outside the flight."""
@@ -79,8 +79,8 @@ class Bodies:
         if np.isnan(found).any():
             return None
         at = int(np.argmax(found))
-        several = self.told is not None and len(self.told) > 1
-        return Off(float(found[at]), self._known[at], self.told[at] if several and self.told else None, not self.told)
+        body = self.told[at] if len(self.told) > 1 else None
+        return Off(float(found[at]), self._known[at], body, not self.told)
 
     def _each(self, tr: Samples, td: float) -> Samples:
         """Errors by body, shape (bodies, k) [length]."""
@@ -98,11 +98,11 @@ def bodies_in_flight(
     flight : Flight
         With the parts that fly in it.
     told : sequence of RigidBody or None
-        By a deck; without it the parts are taken for one body.
+        By a deck; without them the parts are taken for one body.
     placement : Placement, optional
         Where the deck puts the parts.
     """
-    if told is None:
+    if not told:
         return Bodies([drift_in_flight(history, flight, placement=placement)], None)
     return Bodies([_drift(history, flight, body, placement) for body in told], told)
 

@@ -177,12 +177,12 @@ def heading(found: Parts) -> list[str]:
     """What was read."""
     run, deck = found.run, found.inventory
     formats = " + ".join(one.format for one in run.databases)
-    lines = [f"history  {', '.join(run.sources)}: {formats}, {len(run.parts)} parts"]
+    lines = [f"history  {', '.join(run.sources)}: {formats}, {_number(len(run.parts), 'part')}"]
     if deck is None:
         lines.append("deck     none")
     else:
         number = sum(sum(counts.values()) for counts in deck.counts.values())
-        lines.append(f"deck     {deck.solver}, {len(deck.parts)} parts, {number} elements")
+        lines.append(f"deck     {deck.solver}, {_number(len(deck.parts), 'part')}, {_number(number, 'element')}")
     longest = found.facts.longest
     if longest is not None:
         start, end = found.facts.flights[longest]
@@ -266,6 +266,10 @@ def outlook(found: Parts) -> list[tuple[str, str]]:
             lines.append(("step", f"may grow {much} while rigid, which saves more (--step-ratio); cap it (--step-cap)"))
     lines += [(one.name, reason) for one in found.sets for reason in one.reasons]
     return lines
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
 
 
 def _counted(row: PartRow) -> str | None:

@@ -125,7 +125,8 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
         lines.append(("run time", f"about {plan.run_time_share:.0%} of the reference's"))
     lines += [(f"flight {row.number}", given_up(row)) for row in supported if row.answer and row.answer.longer]
     if any(row.candidate and row.candidate.position_error_assumes for row in plan.rows):
-        lines.append(("off by", "holds if the parts become one rigid body; `deck` tells which do"))
+        told = "; `deck` tells which do" if plan.settings.bodies is None else ""
+        lines.append(("off by", f"holds if the parts become one rigid body{told}"))
     if waiting or plan.done:
         what = "with those that are done and these" if plan.done else "with these windows"
         after = ", and plan the others from that run (--done)" if waiting else ""

@@ -101,7 +101,7 @@ def test_of_several_bodies_each_counts_for_itself(deck: str) -> None:
     assert [found[key] for key in keys] == [0.0, None, None, None]  # the solver found 0.16 mm
     check_by_schema(found)
     table = run("suggest", "-q", "--td", "0.1464", "--part", "12-14", "--deck", deck, car()).stdout
-    assert "in place at td: no part moves against the others of its rigid body" in table
+    assert "in place at td, as far as parts tell: none moves against the others of its rigid body" in table
 
 
 def test_a_body_that_is_not_known_is_named(deck: str) -> None:
@@ -128,3 +128,33 @@ def test_a_deck_without_the_parts_leaves_the_run_time_open() -> None:
     assert told["deck-of-another-model"].startswith(
         "part 1 is 'floor' in the history and 'box' in the deck, and 2 more"
     )
+
+
+def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_deck() -> None:
+    asked = ("--td", "0.1464", "--part", "12-14", "--deck", str(DECK), car())
+    found = answer("suggest", *asked)
+    best = next(one for one in found["candidates"] if one["recommended"])
+    assert best["position_error_assumes"] == ONE_BODY
+    told = run("suggest", "-q", *asked).stdout
+    assert "at td if the parts become one rigid body: engine is frozen elsewhere" in told
+
+
+def test_a_lead_part_makes_one_body_with_a_deck_and_without(deck: str, tmp_path: Path) -> None:
+    """What the card merges is the body whose error is given: engine, battery and wheels as one are 3.6 mm off."""
+    merged = ("--merge", "12", "--solver", "ls-dyna", "--report", str(tmp_path / "page.html"), "--overwrite")
+    for with_deck in ((), ("--deck", deck)):
+        found = answer("suggest", "--td", "0.1464", "--part", "12-14", *merged, *with_deck, car())
+        best = next(one for one in found["candidates"] if one["recommended"])
+        assert best["position_error"] == pytest.approx(3.6e-3, abs=1e-4)
+        assert best["position_error_assumes"] is None
+
+
+def test_cards_merge_the_bodies_of_the_deck(deck: str) -> None:
+    asked = ("suggest", "-q", "--td", "0.1464", "-f", "card", "--solver", "ls-dyna", "--deck", deck, car())
+    apart = run(*asked, "--part", "12-14").stdout
+    assert "        12         0      PART\n        13         0      PART\n        14         0      PART" in apart
+    assert "--merge" not in apart
+    one = run(*asked, "--part", "1-14").stdout
+    assert "         1         0      PART\n         2         1      PART" in one
+    assert one.count("         1      PART") == 14  # led by part 1, and its own row to switch back
+    assert "14 parts are one rigid body by the deck, led by part 1 (LRB)" in one

@@ -95,13 +95,22 @@ class Elements:
         return np.asarray(self.nodes[self.part == part])
 
 
+class Joint(NamedTuple):
+    """A weld, tie or nodal rigid body: ``kind`` is what to call it; places of its nodes, and parts that it names."""
+
+    kind: str
+    nodes: Places
+    parts: frozenset[int]
+
+
 @dataclass(frozen=True, eq=False)
 class Inventory:
     """All parts and elements of a deck; ``solver`` is "ls-dyna" or "radioss".
 
     ``coordinates`` is (nodes, 3), NaN for a node that the deck does not place.  ``notes`` say what was not followed;
-    ``complete`` is False where elements or parts may be missing because of it.  ``watched`` are the places of nodes
-    whose motion the run writes.  ``moved``: something moves nodes away from the coordinates of the deck.
+    ``complete`` is False where elements or parts may be missing because of it.  ``joints`` hold parts together that
+    share no nodes; ``ties`` do too, but it is not known which.  ``watched`` are the places of nodes whose motion is
+    written.  ``moved``: something moves nodes away from the coordinates of the deck.
     """
 
     solver: str
@@ -110,6 +119,8 @@ class Inventory:
     coordinates: Reals
     notes: tuple[str, ...] = ()
     complete: bool = True
+    joints: tuple[Joint, ...] = ()
+    ties: tuple[str, ...] = ()
     watched: Places = field(default_factory=lambda: np.empty(0, np.int64))
     moved: bool = False
 
@@ -162,6 +173,24 @@ class Inventory:
                 found[part].update(other for other in together if other != part)
         return {part: frozenset(others) for part, others in found.items()}
 
+    @cached_property
+    def joined(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
+        """By part the others that welds, ties or nodal rigid bodies join to it, and what these are."""
+        wanted = np.zeros(len(self.coordinates), bool)
+        for _, nodes, _ in self.joints:
+            wanted[nodes] = True
+        owners: dict[int, set[int]] = {}
+        for part, nodes in self.nodes_by_part.items():
+            for node in nodes[wanted[nodes]].tolist():
+                owners.setdefault(node, set()).add(part)
+        found: dict[int, dict[int, frozenset[str]]] = {}
+        for kind, nodes, parts in self.joints:
+            together = parts.union(*(owners.get(node, ()) for node in nodes.tolist()))
+            for part in together:
+                own = found.setdefault(part, {})
+                own.update({other: own.get(other, frozenset()) | {kind} for other in together if other != part})
+        return found
+
     def bodies(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
         """Rigid bodies that these parts make: one where most of their nodes hang together, else a body per group.
 
@@ -195,7 +224,7 @@ class Inventory:
         return int(connected_components(links, directed=False, return_labels=False))
 
     def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
-        """Groups of these parts that share nodes, directly or not."""
+        """Groups of these parts that share nodes or are joined, directly or not."""
         left, found = set(parts), []
         while left:
             waiting, body = [min(left)], set[int]()
@@ -204,7 +233,7 @@ class Inventory:
                 if part in left:
                     left.discard(part)
                     body.add(part)
-                    waiting += self.neighbours.get(part, frozenset()) & left
+                    waiting += (self.neighbours.get(part, frozenset()) | self.joined.get(part, {}).keys()) & left
             found.append(tuple(sorted(body)))
         return tuple(sorted(found))
 
