@@ -65,6 +65,7 @@ MODELS: Final = {
         Model(
             "CAR3", "the same with all shells QBAT, on stiffer mounts, with a heavier battery", 1808, 0.24, 1e-4, 2e-5
         ),
+        Model("CAR4", "the same, heavier and faster, on softer wheels", 1808, 0.24, 1e-4, 2e-5),
         Model("DROP2", "shell box with a block on springs that falls on a corner and bounces", 535, 0.8, 2e-4, 5e-6),
         Model("DROP3", "the same from 0.25 m, tilted 20 and -40 degrees, springs of 40 kN/m", 535, 0.65, 2e-4, 5e-6),
         Model("DROP4", "the same from 0.5 m, tilted 45 and 10 degrees, springs of 160 kN/m", 535, 0.75, 2e-4, 5e-6),

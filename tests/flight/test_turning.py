@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+from functools import cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
@@ -10,14 +12,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.deck.inventory.placement import Placed
-from d2rpick.flight.position_error import Drift, drift_of
+from d2rpick.choice.of_run import read
+from d2rpick.deck.inventory import read_inventory
+from d2rpick.deck.inventory.placement import Placed, Placement
+from d2rpick.flight.flight import find_flight, seen_flight
+from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.histories.history import EXACT, Momenta, Part
+from d2rpick.histories.opening import Selection
+from tests.shared import shared, shared_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
+    from pathlib import Path
 
-    from d2rpick.deck.inventory.placement import Placement
     from d2rpick.histories.history import Samples
 
 TIME = np.linspace(0.0, 0.1, 401)
@@ -157,3 +164,31 @@ def test_what_flies_with_a_body_holds_it() -> None:
     assert without is not None
     expected = MASSES[ENGINE] / MASSES.sum() * 0.5 * 0.03
     assert without.errors(np.array([0.05]), 0.08)[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(tmp_path: Path) -> None:
+    """Centre and orientation of twelve nodes of the body: within 30 % or 1 mm, and 30 % or 0.1 degrees."""
+    deck = tmp_path / "CAR_0000.rad"
+    deck.write_bytes(shared_bytes("openradioss/car_drop/decks/CAR_0000.rad.gz"))
+    where = Placement(read_inventory(str(deck)))
+    with shared("openradioss/car_drop/car_runs.csv").open() as table:
+        rows = [row for row in csv.DictReader(table) if row["run"].startswith(("car_a", "car_b", "car_f", "car_td"))]
+    sets = {"car_b_notfirst": ("1-2", "4-14"), "car_b_stopped": ("1", "4", "5", "7", "11")}
+    judged = 0
+    for row in rows:
+        tr, td = np.array([float(row["tr_s"])]), float(row["td_s"])
+        if row["run"] != "car_b_heavy" and tr[0] > 0.0385 and td <= 0.1494:
+            found = of_the_car(sets.get(row["run"], ("1-14",)), where)
+            off, angle = float(row["dcentre_td_mm"]), float(row["dangle_td_deg"])
+            assert 1e3 * found.errors(tr, td)[0] == pytest.approx(off, rel=0.3, abs=1.0)
+            assert found.angles(tr, td)[0] == pytest.approx(angle, rel=0.3, abs=0.1)
+            judged += 1
+    assert judged == 17
+
+
+@cache
+def of_the_car(parts: tuple[str, ...], where: Placement) -> Drift:
+    history = read([str(shared("openradioss/car_drop/carT01.gz"))], Selection(parts=parts)).history
+    found = drift_in_flight(history, find_flight(history, 0.14, None, seen_flight(history, 0.14), None), None, where)
+    assert found is not None
+    return found

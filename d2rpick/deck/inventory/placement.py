@@ -79,8 +79,11 @@ def _shares(elements: Elements, coordinates: Reals) -> Iterable[tuple[int, _Shar
     total = np.bincount(at, sizes)
     total[total == 0] = np.nan  # elements without any size do not tell where their part is
     first = np.stack([np.bincount(at, sizes * axis) for axis in middles.T], axis=1)
-    from_middle = middles - (first / total[:, np.newaxis])[at]  # not from a far origin, where digits would be lost
-    second = np.array([[np.bincount(at, sizes * a * b) for a in from_middle.T] for b in from_middle.T])
+    x, y, z = (middles - (first / total[:, np.newaxis])[at]).T  # from there: far from the origin digits would be lost
+    xx, yy, zz, xy, yz, zx = (
+        np.bincount(at, sizes * a * b) for a, b in ((x, x), (y, y), (z, z), (x, y), (y, z), (z, x))
+    )
+    second = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
     return [
         (part, _Share(size, one, other))
         for part, size, one, other in zip(parts.tolist(), total.tolist(), first, second.transpose(2, 0, 1), strict=True)
@@ -89,10 +92,12 @@ def _shares(elements: Elements, coordinates: Reals) -> Iterable[tuple[int, _Shar
 
 def _middles(nodes: Places, coordinates: Reals) -> Reals:
     """Mean of the nodes of each element (n, 3)."""
-    real = (nodes != NO_NODE).astype(float)
-    summed = np.zeros((len(nodes), 3))
-    for column, there in zip(nodes.T, real.T, strict=True):
-        summed += np.where(there[:, np.newaxis] > 0, coordinates[column], 0.0)
+    if (nodes != NO_NODE).all():
+        return np.asarray(sum(coordinates[column] for column in nodes.T) / nodes.shape[1])
+    real = nodes != NO_NODE
+    summed = sum(
+        np.where(there[:, np.newaxis], coordinates[column], 0.0) for column, there in zip(nodes.T, real.T, strict=True)
+    )
     return np.asarray(summed / real.sum(axis=1)[:, np.newaxis])
 
 
@@ -101,6 +106,8 @@ def _placed(inventory: Inventory, part: int, shares: Sequence[_Share]) -> Placed
     centre = np.asarray(sum(one.first for one in shares) / size)
     apart = [(one, one.first / one.size - centre) for one in shares]
     spread = sum(one.second + one.size * np.outer(way, way) for one, way in apart) / size
-    nodes = np.intersect1d(inventory.watched, inventory.nodes_by_part[part])
-    watched = {place: inventory.coordinates[place] for place in nodes.tolist()}
+    nodes = inventory.nodes_by_part[part]  # ascending, and many more than those that are watched
+    at = np.minimum(np.searchsorted(nodes, inventory.watched), nodes.size - 1)
+    own = inventory.watched[nodes[at] == inventory.watched]
+    watched = {place: inventory.coordinates[place] for place in own.tolist()}
     return Placed(centre, np.asarray(spread), watched)
