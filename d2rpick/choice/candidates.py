@@ -81,7 +81,7 @@ class Candidate(NamedTuple):
         return np.inf if error is None else error
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
     """Candidates of one td in some order: columns of what decides, each of shape (n,), made for all of them at once.
 

@@ -28,7 +28,7 @@ _VELOCITIES = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
 _CENTRES = ("x_center", "y_center", "z_center")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """Databases of one run, one per format, those that say most of it first.
 

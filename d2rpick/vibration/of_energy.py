@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import SignedParts
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OfEnergy:
     """The samples of a record seen from ``td``; ``unknown`` says why no deformation is known."""
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from d2rpick.histories.crossings import find_crossings
 from d2rpick.vibration import measures
+from d2rpick.vibration.equivalent import replayed_residual
 from d2rpick.vibration.moments import Measured, Moment
 from d2rpick.vibration.of_energy import sampled_before
 from d2rpick.vibration.one_mode import Mode
-from d2rpick.vibration.replay import replayed_residual
 from d2rpick.vibration.second_mode import residual_bound
 from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
@@ -36,7 +36,7 @@ _DROWNED = 0.2
 _ZERO = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OfModes:
     """The ``mode`` of a ``fit``, or several, that describes a record within ``span``, seen from a ``td`` in it."""
 

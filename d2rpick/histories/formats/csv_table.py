@@ -169,8 +169,9 @@ class Table:
 
     def _values(self, column: int) -> Samples:
         if column not in self._read and self._plain:
-            # first what was asked for; who wants more mostly wants all
-            wanted = range(self._layout.columns) if self._read else sorted({*self._needed, column})
+            # first what was asked for; who wants more mostly wants all the others
+            others = {*range(self._layout.columns)} - self._read.keys()
+            wanted = sorted(others if self._read else {*self._needed, column})
             columns = plain_values(self._text, self._begin, self._layout, wanted)
             self._plain = columns is not None
             found = zip(wanted, columns or (), strict=self._plain)
