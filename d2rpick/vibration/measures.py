@@ -154,7 +154,7 @@ def timing_tolerance(mode: Mode, tr: Samples, td: float) -> Samples:
     ahead = mode.standstill_after(tr) + half * np.arange(3)[:, np.newaxis]
     behind = mode.standstill_after(tr) - half * np.arange(1, 4)[:, np.newaxis]
     distances = _leaving(mode, np.tile(tr, 2), np.hstack([ahead, behind]), wanted, np.tile(room, 2))
-    return np.minimum(distances.reshape(2, -1).min(axis=0), 2 * half)
+    return np.asarray(np.minimum(distances.reshape(2, -1).min(axis=0), 2 * half))
 
 
 def _leaving(mode: Mode, tr: Samples, turns: Samples, wanted: Samples, room: Samples) -> Samples:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.lock_in_profile import Profile
-    from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.span import Span
 
@@ -36,22 +34,25 @@ _DROWNED = 0.2
 _ZERO = 1e-9
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class OfModes:
     """The ``mode`` of a ``fit``, or several, that describes a record within ``span``, seen from a ``td`` in it."""
-
-    history: History
-    td: float
-    fit: Identification
-    mode: Mode | Modes
-    span: Span
-
-    doubts: tuple[str, ...] = ()
 
     basis = "oscillator"
     undescribed = "not described by the oscillator"
     unknown = estimated = None
     unsigned = signed = ()
+
+    def __init__(
+        self, history: History, td: float, fit: Identification, span: Span, doubts: tuple[str, ...] = ()
+    ) -> None:
+        assert fit.mode
+        self.history, self.td = history, td
+        self.fit, self.mode, self.span = fit, fit.mode, span
+        self.doubts = doubts
+
+    def doubting(self, doubts: tuple[str, ...]) -> OfModes:
+        """Give the same with these doubts."""
+        return OfModes(self.history, self.td, self.fit, self.span, doubts)
 
     @cached_property
     def sunk(self) -> str | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -24,16 +23,15 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import PartVibration, Unsigned
 
 
-@dataclass(frozen=True, eq=False)
 class OfParts:
     """Signed parts seen from the td of ``whole``, the model of their energy together."""
-
-    whole: OfModes | OfEnergy
-    parts: PartVibration
 
     basis = "parts"
     unknown = None
     undescribed = "the signs of the parts' deformations cannot be followed from here to td"
+
+    def __init__(self, whole: OfModes | OfEnergy, parts: PartVibration) -> None:
+        self.whole, self.parts = whole, parts
 
     @property
     def td(self) -> float:
