@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.objections import Objection
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.moments import Measured
+    from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.part_shares import PartMatch
 
 

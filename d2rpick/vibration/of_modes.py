@@ -10,7 +10,7 @@ import numpy as np
 from d2rpick.histories.crossings import find_crossings
 from d2rpick.vibration import measures
 from d2rpick.vibration.equivalent import replayed_residual
-from d2rpick.vibration.moments import Measured, Moment
+from d2rpick.vibration.moments import Moment
 from d2rpick.vibration.of_energy import sampled_before
 from d2rpick.vibration.one_mode import Mode
 from d2rpick.vibration.second_mode import residual_bound
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.lock_in_profile import Profile
+    from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.span import Span
 
@@ -131,17 +132,20 @@ class OfModes:
         tr = times[inside]
         if not tr.size:
             return [None] * times.size
-        lock_in = measures.lock_in_error(self.mode, tr, self.td)
         if isinstance(self.mode, Mode):
-            tolerance = measures.timing_tolerance(self.mode, tr, self.td).tolist()
+            tolerance = measures.timing_tolerance(self.mode, tr, self.td)
         else:
             assert self.profile is not None
-            tolerance = [self.profile.tolerance(*one) for one in zip(tr.tolist(), lock_in.tolist(), strict=True)]
+            lock_in = measures.lock_in_error(self.mode, tr, self.td)
+            tolerance = self.profile.tolerances(tr, lock_in)
         residual = replayed_residual(self.mode, tr, self.td)
         highest = residual_bound(residual, self.fit, tr, self.td)
-        signs = measures.sign_match(self.mode, tr, self.td).tolist()
-        rows = zip(signs, lock_in.tolist(), residual.tolist(), highest.tolist(), tolerance, strict=True)
-        found = (Measured(*row, part_mismatch=None) for row in rows)
+        found = iter(
+            measures.measured(
+                self.mode, tr, self.td,
+                residual=residual, residual_high=highest, timing_tolerance=tolerance, of_parts=False,
+            )
+        )  # fmt: skip
         return [next(found) if one else None for one in inside]
 
     def errors(self, times: Samples) -> Samples:
