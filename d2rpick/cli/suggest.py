@@ -9,7 +9,6 @@ import click
 from d2rpick.cli import deck_cost, typed
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
-from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.cli.wording import in_words, with_options
@@ -127,6 +126,7 @@ def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> 
     """Draw the figures, wide and narrow, explore the flight, and write the page around them."""
     from d2rpick.choice.explored import explored_around
     from d2rpick.choice.judged_card import input_for
+    from d2rpick.cli.explorer import explorer_of
     from d2rpick.report.page import PageContext
     from d2rpick.report.suggestion_page import as_page, drawn
 

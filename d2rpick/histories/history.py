@@ -61,15 +61,14 @@ class Precision(NamedTuple):
 EXACT = Precision()
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """A part of the model, by the number and the title that the solver gives it."""
 
     id: int
     title: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Momenta:
     """Momentum of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); None for parts: the whole model.
 
@@ -124,7 +123,7 @@ class Track(NamedTuple):
     values: Samples
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Balance:
     """Energies of the whole model at ``time``, arrays of shape (n,); None for what the files do not have.
 
@@ -178,7 +177,7 @@ class Given(NamedTuple):
 NO_EVIDENCE = Given()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class History:
     """Internal energy of the parts to switch, over time, in the run's own consistent units.
 

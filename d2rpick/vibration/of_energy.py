@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import TYPE_CHECKING
 
@@ -21,19 +20,17 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import SignedParts
 
 
-@dataclass(frozen=True, eq=False)
 class OfEnergy:
     """The samples of a record seen from ``td``; ``unknown`` says why no deformation is known."""
-
-    history: History
-    td: float
-    unknown: str
-    doubts: tuple[str, ...] = ()
 
     basis = "energy"
     undescribed = ""
     estimated = mode = kinetic_share = sunk = None
     unsigned = signed = ()
+
+    def __init__(self, history: History, td: float, unknown: str, doubts: tuple[str, ...] = ()) -> None:
+        self.history, self.td = history, td
+        self.unknown, self.doubts = unknown, doubts
 
     def without_parts(self, parts: SignedParts | None, *, sunk: bool) -> OfEnergy:
         """Say too why single parts do not tell the deformation: without a sign, or ``sunk`` at td."""
@@ -41,7 +38,7 @@ class OfEnergy:
         reasons += ["at td the vibration of the parts is below the error of a solver"] * sunk
         reasons += [f"{part.name}: {part.reason}" for part in (parts.unsigned if parts else ())]
         doubts = (SUNK, *(doubt for doubt in self.doubts if doubt != SUNK)) if sunk else self.doubts
-        return replace(self, unknown="; ".join(reasons), doubts=doubts)
+        return OfEnergy(self.history, self.td, "; ".join(reasons), doubts)
 
     def energy(self, time: float) -> float:
         """E of the samples, linear between them [energy]."""
