@@ -212,5 +212,15 @@ def _speed_up(command: Callable[[str], Sequence[str]], rounds: int) -> float | N
 
 
 def _output(*command: str) -> bytes:
-    clean = {name: value for name, value in os.environ.items() if not name.startswith("D2RPICK_")}
-    return subprocess.run([sys.executable, *command], check=True, capture_output=True, cwd=ROOT, env=clean).stdout
+    return subprocess.run(
+        [sys.executable, *command], check=True, capture_output=True, cwd=ROOT, env=environment()
+    ).stdout
+
+
+@cache
+def environment() -> dict[str, str]:
+    """Environment of the processes, for which the package is compiled: an installed one is, a working copy may not."""
+    own = "PYTHONDONTWRITEBYTECODE"
+    clean = {name: value for name, value in os.environ.items() if name != own and not name.startswith("D2RPICK_")}
+    subprocess.run([sys.executable, "-m", "compileall", "-q", "d2rpick"], check=True, cwd=ROOT, env=clean)
+    return clean
