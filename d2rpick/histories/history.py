@@ -101,6 +101,11 @@ class Momenta:
         return float((highest - lowest)[list(members)].max())
 
     @cached_property
+    def at_rest(self) -> bool:
+        """Whether nothing ever has any momentum."""
+        return not self.values.any()
+
+    @cached_property
     def moving(self) -> tuple[int, ...]:
         """Indices of the parts whose components are not all the same number."""
         lowest, highest = self._bounds
