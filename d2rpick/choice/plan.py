@@ -205,7 +205,9 @@ def _rows(
 def _asked(reference: Reference, row: Planned, settings: Settings, shortest: float) -> Planned:
     """Ask ``suggest`` for the window of a flight."""
     own = settings.after is not None and row.start <= settings.after <= row.end
-    answer = suggest_of(reference, (row.start, row.end), settings if own else replace(settings, after=None))
+    settings = settings if own else replace(settings, after=None)
+    # the energy alone shows another beginning to each td, and that of an earlier td may lie before this flight
+    answer = suggest_of(reference, (row.start, row.end), settings, since=row.start)
     row = replace(row, answer=answer)
     if answer.recommended is None:
         why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]

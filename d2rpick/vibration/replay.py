@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from d2rpick.errors import RangeError
-from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.one_mode import LARGEST_ENERGY, Mode
 from d2rpick.vibration.oscillator import Oscillator, State
 
 if TYPE_CHECKING:
@@ -96,7 +97,8 @@ def from_mode(mode: Mode, time: float) -> tuple[Oscillator, State]:
 def to_mode(oscillator: Oscillator, v0: float) -> Mode:
     """Give the energy mode of ``oscillator`` struck at time 0: frame velocity ``v0``, all else at rest (7).
 
-    RangeError when it is not underdamped: such a motion has no vibration to lock in.
+    RangeError when it is not underdamped: such a motion has no vibration to lock in; or when its energies are beyond
+    what can be squared.
     """
     omega = oscillator.omega_2
     if not omega > 0:
@@ -104,8 +106,10 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
             f"alpha {oscillator.alpha:g} overdamps the oscillator, whose rate is {oscillator.omega_0:g}, "
             f"less than {2 * oscillator.omega_0:g} was expected"
         )
-    sine = -v0 * np.sqrt(oscillator.stiffness / 2) / omega
-    return Mode(omega=omega, alpha=oscillator.alpha, cosine=0.0, sine=float(sine), origin=0.0)
+    sine = -v0 / omega * sqrt(oscillator.stiffness / 2)
+    if not abs(sine) <= sqrt(LARGEST_ENERGY):
+        raise RangeError(f"v0 is {v0:g}: it gives energies above {LARGEST_ENERGY:g}; choose units of moderate numbers")
+    return Mode(omega=omega, alpha=oscillator.alpha, cosine=0.0, sine=sine, origin=0.0)
 
 
 class Trajectory(NamedTuple):
@@ -126,8 +130,8 @@ def trajectory(
     written the same.
     """
     count = int(np.floor(t_end / dt * (1 + 1e-12))) + 1
-    time = np.round(dt * np.arange(count), 13 - int(np.floor(np.log10(t_end))))
     with np.errstate(all="ignore"):
+        time = np.round(dt * np.arange(count), 13 - int(np.floor(np.log10(t_end))))
         state = oscillator.free_on_grid(start, dt, count) if switched is None else switched.motion(time)
         motion = Trajectory(time, state, oscillator.internal_energy(state), oscillator.kinetic_energy(state))
     if not all(np.isfinite(column).all() for column in (time, *state, motion.internal_energy, motion.kinetic_energy)):
