@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import repeat
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.histories.crossings import find_turns, passages
+from d2rpick.histories.names import listing
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import SUNK, Moment
 from d2rpick.vibration.uncertainty import sampled_reach
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.part_signs import SignedParts
+
+
+_NAMED: Final = 3  # of the parts that have the same reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +43,10 @@ class OfEnergy:
         """Say too why single parts do not tell the deformation: without a sign, or ``sunk`` at td."""
         reasons = [self.unknown]
         reasons += ["at td the vibration of the parts is below the error of a solver"] * sunk
-        reasons += [f"{part.name}: {part.reason}" for part in (parts.unsigned if parts else ())]
+        alike: dict[str, list[str]] = {}
+        for part in parts.unsigned if parts else ():
+            alike.setdefault(part.reason, []).append(part.name)
+        reasons += [f"{listing(names, _NAMED)}: {reason}" for reason, names in alike.items()]
         doubts = (SUNK, *(doubt for doubt in self.doubts if doubt != SUNK)) if sunk else self.doubts
         return replace(self, unknown="; ".join(reasons), doubts=doubts)
 
