@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.flight.bodies import Off
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.moments import Measured
+    from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.part_shares import PartMatch
 
 
@@ -86,7 +86,7 @@ class Candidate(NamedTuple):
         return np.inf if error is None else error
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
     """Candidates of one td in some order: columns of what decides, each of shape (n,), made for all of them at once.
 

@@ -223,7 +223,8 @@ def _asked(reference: Reference, row: Planned, settings: Settings, shortest: flo
     """Ask ``suggest`` for the window of a flight."""
     own = settings.after is not None and row.start <= settings.after <= row.end
     asked = settings if own else replace(settings, after=None)
-    answer = suggest_of(reference, (row.start, row.end), asked, fits=fits)
+    # the energy alone shows another beginning to each td, and that of an earlier td may lie before this flight
+    answer = suggest_of(reference, (row.start, row.end), asked, since=row.start, fits=fits)
     row = replace(row, answer=answer)
     if answer.recommended is None:
         why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]

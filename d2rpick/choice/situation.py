@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.model import Vibration
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Situation:
     """A history seen from one td [time].
 
@@ -34,7 +34,7 @@ class Situation:
     settings: Settings
     flight: Flight
     evidence: Evidence
-    fits: Fits = field(default_factory=Fits, compare=False, repr=False)
+    fits: Fits = field(default_factory=Fits)
 
     @cached_property
     def vibration(self) -> Vibration:

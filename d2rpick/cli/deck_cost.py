@@ -47,6 +47,8 @@ def with_deck(run: Run, options: dict[str, Any], settings: Settings, model: Cost
 
     The energy of springs is no level: they are the parts that the deck, or their energies, show to be springs.
     """
+    if model is None and not options["part"]:
+        return options
     from d2rpick.flight.flying_parts import asks_for_recommended
 
     if asks_for_recommended(options["part"], run):
