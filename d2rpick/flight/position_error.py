@@ -148,30 +148,32 @@ def drift_of(
     mass = masses[members]
     if not _shows_rotation(mass):
         return None
-    velocity = momenta.values[inside][:, members] / mass[:, np.newaxis]
-    centre = np.average(velocity, axis=1, weights=mass)
-    ways = integral(time, (velocity - centre[:, np.newaxis]).reshape(time.size, -1)).reshape(velocity.shape)
+    ways, path = _ways(time, momenta.values[inside][:, members] / mass[:, np.newaxis], mass)
     stride = -(-time.size // _STATES)
     moving, rate, rest = _apart(time[::stride], ways[::stride], mass)
     if not moving:
         return None
     whole = float(np.nansum(masses[sorted({*flying, *members})]))  # unknown ones left out: no error is told too small
     share = float(mass[moving].sum()) / whole
-    path = integral(time, np.linalg.norm(centre, axis=1))
-    left = float(mass.sum() - mass[moving].sum())
-    doubt = share * float(np.sqrt(rest / (left * -(-time.size // stride))))
+    doubt = share * float(np.sqrt(rest / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride))))
     offsets = _offsets(time, ways, mass, moving, rate) * float(mass.sum()) / whole
-    part = momenta.parts[members[moving[int(np.argmax(np.square(offsets).sum(axis=(0, 2))))]]]
-    turning = None
-    if placement:
-        against = [members[i] for i in moving]
-        turning = turning_in_flight(momenta, masses, Rigid(members, against), flying, flight, placement)
+    against = [members[i] for i in moving]
+    part = momenta.parts[against[int(np.argmax(np.square(offsets).sum(axis=(0, 2))))]]
+    rigid = Rigid(members, against)
+    turning = turning_in_flight(momenta, masses, rigid, flying, flight, placement) if placement else None
     found = Drift(time, offsets.sum(axis=1), path, part, doubt, turning)
     return found if doubt <= found.limit else None
 
 
+def _ways(time: Samples, velocity: Samples, mass: Samples) -> tuple[Samples, Samples]:
+    """Give the ways of parts (n, parts, 3) against their centre of mass, and the path of that (n,) [length]."""
+    centre = np.average(velocity, axis=1, weights=mass)
+    ways = integral(time, (velocity - centre[:, np.newaxis]).reshape(time.size, -1)).reshape(velocity.shape)
+    return ways, integral(time, np.linalg.norm(centre, axis=1))
+
+
 def _offsets(time: Samples, ways: Samples, mass: Samples, moving: Sequence[int], rate: Samples) -> Samples:
-    """How far each of the moving parts pushes the others off, shape (n, moving, 3) [length]."""
+    """How far each of the moving parts pushes the others off, if no more flies, shape (n, moving, 3) [length]."""
     others = np.setdiff1d(np.arange(mass.size), moving)
     shares = mass[list(moving), np.newaxis] / mass.sum()
     against = ways[:, list(moving)] - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
