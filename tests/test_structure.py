@@ -180,9 +180,16 @@ UNNEEDED = {
         "vibration.modes",
         "vibration.fit_several", "flight.momentum", "choice.health", "choice.judged_card",
         "deck.printing.common", "report.figures", "report.page", "report.health", "histories.formats.fixed_text",
-        "histories.formats.lsda",
+        "histories.formats.lsda", "flight.flying_parts", "flight.momentum", "vibration.replay", "vibration.integration",
+        "cli.explorer",
     )
-} | {"pathlib", "json", "csv", "tempfile", "hashlib", "numpy.typing", "numpy.polynomial", "numpy.random"}  # fmt: skip
+} | {
+    "pathlib", "json", "csv", "tempfile", "hashlib", "numpy.typing", "numpy.polynomial", "numpy.random",
+    "array", "heapq", "unicodedata", "logging", "subprocess", "concurrent.futures", "multiprocessing", "shutil",
+    "tomllib", "difflib", "zlib", "importlib.metadata", "importlib.resources", "traceback",
+}  # fmt: skip
+# Each module costs start-up, too: one more is worth a thought.
+MOST_MODULES = 80
 
 
 def test_a_plain_table_loads_only_what_its_answer_needs() -> None:
@@ -190,7 +197,31 @@ def test_a_plain_table_loads_only_what_its_answer_needs() -> None:
     there = subprocess.run(libraries, capture_output=True, text=True, check=True, timeout=TIME_LIMIT)
     theirs = set(there.stdout.split())
     assert "d2rpick" not in theirs
-    assert not (loaded("suggest", "-q", "--td", "0.064", ENERGY) - theirs) & UNNEEDED
+    mine = loaded("suggest", "--quiet", "--td", "0.064", ENERGY) - theirs
+    assert not mine & UNNEEDED
+    assert len([name for name in mine if name.partition(".")[0] == "d2rpick"]) <= MOST_MODULES
+
+
+def printed_by(code: str) -> str:
+    """What a fresh interpreter prints."""
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT, timeout=TIME_LIMIT
+    )
+    return result.stdout
+
+
+def test_the_package_alone_imports_nothing() -> None:
+    """What typing and its like make is looked through for garbage, unless the command line comes first."""
+    code = "import sys; before = {*sys.modules}; import d2rpick; print(*({*sys.modules} - before))"
+    assert {*printed_by(code).split()} <= {"d2rpick", "d2rpick.version", "__future__"}
+
+
+def test_no_garbage_is_looked_for_at_the_end() -> None:
+    code = (
+        "import atexit, gc, sys; atexit.register(lambda: print(len(gc.get_objects()) < gc.get_freeze_count()));"
+        "sys.argv = ['d2rpick', '--help']; from d2rpick.__main__ import main; main()"
+    )
+    assert printed_by(code).splitlines()[-1] == "True"
 
 
 def test_the_command_line_offers_the_formats_there_are() -> None:

@@ -55,7 +55,7 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
         # without a sign of the next contact nothing is known of what comes after td
         end = flight.end or (float(history.time[-1]) if flying or span else td)
         start = min(td, float(history.time[0]) if flight.start is None else flight.start)
-        evidence = _with_parts(evidence, history, td, Span(start, end))
+        evidence = _with_parts(evidence, history, td, Span(start, end), fits)
     return Situation(history, td, settings, flight, evidence, fits)
 
 
@@ -94,7 +94,7 @@ def _resolved(history: History, fit: Identification, fits: Fits) -> Identificati
     return fits.once(("resolved", fit.start, fit.end, fit.rms), lambda: resolved(*window, fit))
 
 
-def _with_parts(evidence: Evidence, history: History, td: float, within: Span) -> Evidence:
+def _with_parts(evidence: Evidence, history: History, td: float, within: Span, fits: Fits) -> Evidence:
     """Add what the energies of single parts tell of the flight."""
     from d2rpick.vibration.envelope import upper_envelope
     from d2rpick.vibration.part_signs import PartVibration, read_parts
@@ -103,7 +103,8 @@ def _with_parts(evidence: Evidence, history: History, td: float, within: Span) -
     time, energy = history.between(*within)
     if time.size < 3:
         return evidence
-    parts = read_parts(time, history.part_energies[window(history.time, *within)], history.part_names)
+    energies = history.part_energies[window(history.time, *within)]
+    parts = fits.once(("parts", *within), lambda: read_parts(time, energies, history.part_names))
     whole = energy_at(history, td, evidence).mode or upper_envelope(time, energy)
     return evidence._replace(parts=parts, signed=PartVibration(parts, whole) if parts.signed and whole else None)
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from d2rpick.choice.examine import examine
 from d2rpick.choice.suggest import Suggestion, suggest_at
 from d2rpick.choice.verify import Verdict, verify, with_comparison
-from d2rpick.flight.flying_parts import with_parts_by_number
 from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.opening import Selection, open_run
 
@@ -36,7 +35,11 @@ class Reference(NamedTuple):
     @classmethod
     def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read what is selected of a run that is open; FormatError when it is not there."""
-        return cls(run, run.history(with_parts_by_number(run, selection) if selection.parts else selection))
+        if selection.parts:
+            from d2rpick.flight.flying_parts import with_parts_by_number  # not above: a table has no parts
+
+            selection = with_parts_by_number(run, selection)
+        return cls(run, run.history(selection))
 
     def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read of another run of the model the parts that this one has, whatever words they were asked for by."""

@@ -70,7 +70,7 @@ def longest_flight(
 def flights_of(history: History, settings: Settings, fits: Fits | None = None) -> tuple[Flight, ...]:
     """Find all flights; where the energy is all there is, one oscillator for the whole record, else none is sought."""
     if any(True for _ in witnesses(history)) or not settings.replay:
-        return find_flights(history, settings)
+        return find_flights(history, settings, fits)
     middle = examine(history, float(history.time[0] + history.time[-1]) / 2, settings, fits)
     if middle.flight.source == "oscillator":
         return (middle.flight,)

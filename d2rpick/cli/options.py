@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.quality import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.histories.opening import Run, Selection
+    from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.oscillator import Oscillator
 
 # Kinds of values, under the names by which commands ask for them.
@@ -293,8 +294,6 @@ def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
 
 def oscillator(options: dict[str, Any]) -> Oscillator | None:
     """Build the oscillator that the options give, None when they give none; UsageError when they give half of one."""
-    from d2rpick.vibration.oscillator import Oscillator
-
     names = ("stiffness", "mass", "alpha", "v0")
     given = [name for name in (*names, "frame_mass", "beta") if options[name] is not None]
     if not given:
@@ -306,6 +305,8 @@ def oscillator(options: dict[str, Any]) -> Oscillator | None:
         )
     if (options["frame_mass"] is None) == (options["beta"] is None):
         raise click.UsageError("the oscillator needs either --frame-mass or --beta")
+    from d2rpick.vibration.oscillator import Oscillator
+
     mass, frame_mass = options["mass"], options["frame_mass"]
     return Oscillator(options["stiffness"], mass, frame_mass or mass / options["beta"], options["alpha"])
 
@@ -313,7 +314,6 @@ def oscillator(options: dict[str, Any]) -> Oscillator | None:
 def settings(options: dict[str, Any]) -> Settings:
     """Collect the options of ``choosing_options``; UsageError where they contradict each other."""
     from d2rpick.choice.settings import Settings
-    from d2rpick.vibration.replay import to_mode
 
     given, window = oscillator(options), options["fit_window"]
     ways = {"an oscillator": given, "--fit-window": window, "--no-verify": options["no_verify"]}
@@ -331,13 +331,19 @@ def settings(options: dict[str, Any]) -> Settings:
         tolerance=options["tolerance"],
         max_kinetic_share=options["max_kinetic_share"],
         max_residual=options["max_residual"],
-        oscillator=to_mode(given, options["v0"]) if given else None,
+        oscillator=_mode_of(given, options["v0"]) if given else None,
         fit_window=window,
         replay=not options["no_verify"],
         strict=options["strict"],
         cost_share=cost_share,
         step_ratio=step_ratio or 1.0,
     )
+
+
+def _mode_of(oscillator: Oscillator, v0: float) -> Mode:
+    from d2rpick.vibration.equivalent import to_mode  # not above: mostly none is given
+
+    return to_mode(oscillator, v0)
 
 
 def falls_short(quality: Quality | None, wanted: str | None) -> bool:

@@ -9,7 +9,6 @@ import click
 from d2rpick.cli import deck_cost, typed
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
-from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.cli.wording import in_words, with_options
@@ -89,7 +88,7 @@ def command(
         model = deck_cost.model_of(options)
         options = deck_cost.with_deck(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
-        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model, options["merge"])
     answer = suggest_of(reference, td_window if td is None else td, settings)
     answer = answer._replace(cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)
@@ -122,6 +121,7 @@ def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> 
     """Draw the figures, wide and narrow, explore the flight, and write the page around them."""
     from d2rpick.choice.explored import explored_around
     from d2rpick.choice.judged_card import input_for
+    from d2rpick.cli.explorer import explorer_of
     from d2rpick.report.page import PageContext
     from d2rpick.report.suggestion_page import as_page, drawn
 
@@ -142,7 +142,7 @@ def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output)
     if pair is None:
         output.content(b"")
         return False
-    request = card_request(run, options, situation.history)
+    request = card_request(run, options, situation.history).by(situation.settings)
     found = judged_card(
         [(pair.tr, pair.td)], situation.history, lambda tr, td: verify_at(situation.at(td), tr), request
     )

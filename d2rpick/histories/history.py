@@ -61,15 +61,14 @@ class Precision(NamedTuple):
 EXACT = Precision()
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """A part of the model, by the number and the title that the solver gives it."""
 
     id: int
     title: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Momenta:
     """Momentum of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); None for parts: the whole model.
 
@@ -102,6 +101,11 @@ class Momenta:
         return float((highest - lowest)[list(members)].max())
 
     @cached_property
+    def at_rest(self) -> bool:
+        """Whether nothing ever has any momentum."""
+        return not self.values.any()
+
+    @cached_property
     def moving(self) -> tuple[int, ...]:
         """Indices of the parts whose components are not all the same number."""
         lowest, highest = self._bounds
@@ -124,7 +128,7 @@ class Track(NamedTuple):
     values: Samples
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Balance:
     """Energies of the whole model at ``time``, arrays of shape (n,); None for what the files do not have.
 
@@ -178,7 +182,7 @@ class Given(NamedTuple):
 NO_EVIDENCE = Given()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class History:
     """Internal energy of the parts to switch, over time, in the run's own consistent units.
 
