@@ -14,6 +14,7 @@ from d2rpick.histories.samples import window
 from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.identify import Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, energy_at
+from d2rpick.vibration.one_mode import LARGEST_ENERGY
 from d2rpick.vibration.second_mode import resolved
 from d2rpick.vibration.span import Span, described_span, identify_within, span_of
 
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
     from d2rpick.flight.flight import Seen
     from d2rpick.histories.history import History
-
-# Beyond, squares of energies are no numbers any more; no unit system comes near.
-_LARGEST = 1e150
 
 
 def examine(history: History, td: float, settings: Settings, fits: Fits | None = None) -> Situation:
@@ -38,8 +36,10 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
         raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
     history.energy_at(td, "td")
     largest = float(np.abs(history.energy).max())
-    if largest > _LARGEST:
-        raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
+    if largest > LARGEST_ENERGY:
+        raise RangeError(
+            f"{', '.join(history.source)}: energies up to {largest:g}, at most {LARGEST_ENERGY:g} was expected"
+        )
     if settings.after is not None:
         _inside(history, settings.after, "`after`")
     seen = seen_flight(history, td)

@@ -8,8 +8,9 @@ from q(tr) - q(td) and -q'(td).  All measures compare that difference with the v
 
 from __future__ import annotations
 
+from itertools import repeat
 from math import sqrt
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -33,6 +34,37 @@ class Deformation(Protocol):
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """V [energy]."""
+
+
+class Measured(NamedTuple):
+    """Measures that only known deformations give; ``residual_high``: at worst, with what a fit may have missed."""
+
+    sign_match: bool
+    lock_in_error: float
+    residual: float
+    residual_high: float
+    timing_tolerance: float
+    part_mismatch: float | None
+
+
+def measured(
+    vibration: Deformation,
+    tr: Samples,
+    td: float,
+    *,
+    residual: Samples,
+    residual_high: Samples,
+    timing_tolerance: Samples,
+    of_parts: bool,
+) -> list[Measured]:
+    """All measures of each tr of shape (n,), those that a model knows best as it gives them.
+
+    ``of_parts``: the deformations are those of parts, whose energy at td the mismatch is held against.
+    """
+    mismatch = part_mismatch(vibration, tr, td).tolist() if of_parts else repeat(None, tr.size)
+    columns = (sign_match(vibration, tr, td), lock_in_error(vibration, tr, td), residual, residual_high)
+    lists = (column.tolist() for column in (*columns, timing_tolerance))
+    return [Measured(*row) for row in zip(*lists, mismatch, strict=True)]
 
 
 # The growth of the lock-in error that ``timing_tolerance`` allows.
@@ -153,8 +185,8 @@ def timing_tolerance(mode: Mode, tr: Samples, td: float) -> Samples:
     half = np.pi / mode.omega
     ahead = mode.standstill_after(tr) + half * np.arange(3)[:, np.newaxis]
     behind = mode.standstill_after(tr) - half * np.arange(1, 4)[:, np.newaxis]
-    distances = [_leaving(mode, tr, turns, wanted, room) for turns in (ahead, behind)]
-    return np.minimum(np.minimum(*distances), 2 * half)
+    distances = _leaving(mode, np.tile(tr, 2), np.hstack([ahead, behind]), wanted, np.tile(room, 2))
+    return np.asarray(np.minimum(distances.reshape(2, -1).min(axis=0), 2 * half))
 
 
 def _leaving(mode: Mode, tr: Samples, turns: Samples, wanted: Samples, room: Samples) -> Samples:

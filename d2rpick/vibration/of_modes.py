@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,10 +9,10 @@ import numpy as np
 
 from d2rpick.histories.crossings import find_crossings
 from d2rpick.vibration import measures
-from d2rpick.vibration.moments import Measured, Moment
+from d2rpick.vibration.equivalent import replayed_residual
+from d2rpick.vibration.moments import Moment
 from d2rpick.vibration.of_energy import sampled_before
 from d2rpick.vibration.one_mode import Mode
-from d2rpick.vibration.replay import replayed_residual
 from d2rpick.vibration.second_mode import residual_bound
 from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.lock_in_profile import Profile
-    from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.span import Span
 
@@ -36,22 +35,25 @@ _DROWNED = 0.2
 _ZERO = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
 class OfModes:
     """The ``mode`` of a ``fit``, or several, that describes a record within ``span``, seen from a ``td`` in it."""
-
-    history: History
-    td: float
-    fit: Identification
-    mode: Mode | Modes
-    span: Span
-
-    doubts: tuple[str, ...] = ()
 
     basis = "oscillator"
     undescribed = "not described by the oscillator"
     unknown = estimated = None
     unsigned = signed = ()
+
+    def __init__(
+        self, history: History, td: float, fit: Identification, span: Span, doubts: tuple[str, ...] = ()
+    ) -> None:
+        assert fit.mode
+        self.history, self.td = history, td
+        self.fit, self.mode, self.span = fit, fit.mode, span
+        self.doubts = doubts
+
+    def doubting(self, doubts: tuple[str, ...]) -> OfModes:
+        """Give the same with these doubts."""
+        return OfModes(self.history, self.td, self.fit, self.span, doubts)
 
     @cached_property
     def sunk(self) -> str | None:
@@ -130,17 +132,20 @@ class OfModes:
         tr = times[inside]
         if not tr.size:
             return [None] * times.size
-        lock_in = measures.lock_in_error(self.mode, tr, self.td)
         if isinstance(self.mode, Mode):
-            tolerance = measures.timing_tolerance(self.mode, tr, self.td).tolist()
+            tolerance = measures.timing_tolerance(self.mode, tr, self.td)
         else:
             assert self.profile is not None
-            tolerance = [self.profile.tolerance(*one) for one in zip(tr.tolist(), lock_in.tolist(), strict=True)]
+            lock_in = measures.lock_in_error(self.mode, tr, self.td)
+            tolerance = self.profile.tolerances(tr, lock_in)
         residual = replayed_residual(self.mode, tr, self.td)
         highest = residual_bound(residual, self.fit, tr, self.td)
-        signs = measures.sign_match(self.mode, tr, self.td).tolist()
-        rows = zip(signs, lock_in.tolist(), residual.tolist(), highest.tolist(), tolerance, strict=True)
-        found = (Measured(*row, part_mismatch=None) for row in rows)
+        found = iter(
+            measures.measured(
+                self.mode, tr, self.td,
+                residual=residual, residual_high=highest, timing_tolerance=tolerance, of_parts=False,
+            )
+        )  # fmt: skip
         return [next(found) if one else None for one in inside]
 
     def errors(self, times: Samples) -> Samples:

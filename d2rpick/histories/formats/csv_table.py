@@ -24,7 +24,7 @@ from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, sp
 from d2rpick.histories.formats.order import not_a_restart
 from d2rpick.histories.formats.table_values import checked_values, line_of, plain_values
 from d2rpick.histories.formats.text import UTF16, Text
-from d2rpick.histories.names import listing
+from d2rpick.histories.names import listing, quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -169,8 +169,10 @@ class Table:
 
     def _values(self, column: int) -> Samples:
         if column not in self._read and self._plain:
-            # first what was asked for; who wants more mostly wants all
-            wanted = range(self._layout.columns) if self._read else sorted({*self._needed, column})
+            # first what was asked for, and what tells of the flight; who wants more mostly wants all the others
+            others = {*range(self._layout.columns)} - self._read.keys()
+            telling = [own for name, own in self._columns.items() if quantity_of(name)]
+            wanted = sorted(others if self._read else {*self._needed, *telling, column})
             columns = plain_values(self._text, self._begin, self._layout, wanted)
             self._plain = columns is not None
             found = zip(wanted, columns or (), strict=self._plain)

@@ -376,20 +376,3 @@ def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: in
 def _spoken(name: Hashable) -> str:
     """Name a field in a message."""
     return f"{name[1]} of part {name[0]}" if isinstance(name, tuple) else f"{name!r}"
-
-
-def head(data: bytes | Content) -> tuple[str, str, int]:
-    """Read the head of an LS-DYNA text database.
-
-    Returns
-    -------
-    title, version : str
-        Empty if there is no head.
-    begin : int
-        Address behind it.
-    """
-    lines = data[:4096].split(b"\n")
-    if len(lines) < 3 or b"ls-dyna" not in lines[1]:
-        return "", "", 0
-    title, version = (line.decode("latin-1") for line in lines[:2])
-    return title.strip(), " ".join(version.split()), len(title) + len(version) + 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -85,6 +84,8 @@ def checked_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) 
     Where all cells are empty the curve has ended: another one beside it goes on.  FormatError with the line that is
     wrong.
     """
+    from array import array  # not above: most tables are read in columns
+
     values = array("d")
     for _, state in _states(text, begin, layout, used):
         values.extend(state)
