@@ -63,11 +63,12 @@ def suggest_of(
     *,
     with_better: bool = True,
     fits: Fits | None = None,
+    since: float | None = None,
 ) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window (low, high) or, for None, in the longest flight [time].
 
     ``with_better`` False: for a given td no better one is looked for.  ``fits`` are those of an earlier look at the
-    record with the same settings.
+    record with the same settings.  ``since``: for a td in a window no flight is taken to begin before that [time].
 
     Raises
     ------
@@ -81,7 +82,7 @@ def suggest_of(
     if isinstance(td, tuple):
         from d2rpick.choice.suggest_td import suggest_in_window
 
-        return _with_health(suggest_in_window(reference.history, td, settings, fits), reference.run)
+        return _with_health(suggest_in_window(reference.history, td, settings, fits, since), reference.run)
     answer = suggest_at(examine(reference.history, td, settings, fits), with_better=with_better)
     return _with_health(answer, reference.run)
 

@@ -19,6 +19,7 @@ from d2rpick.choice.suggest_td import bounds, flights_of
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.energy_alone import round_off
+from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
@@ -172,15 +173,21 @@ def plan_of(
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
     history, found, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
-    flights = flights_of(history, settings)
+    fits = Fits()
+    flights = flights_of(history, settings, fits)
     earlier = before and flights_of(switched_history(before, ())[0], settings)  # it may have been switched itself
     known = done_windows(history, flights, found, earlier)
-    rows = tuple(_with_status(list(_rows(reference, flights, settings, shortest, known)), known))
+    rows = tuple(_with_status(list(_rows(reference, flights, settings, shortest, known, fits)), known))
     return Plan(history, settings, shortest, rows, (*cautions, *_cautions(rows, known)), found)
 
 
 def _rows(
-    reference: Reference, flights: Sequence[Flight], settings: Settings, shortest: float, known: Sequence[Done]
+    reference: Reference,
+    flights: Sequence[Flight],
+    settings: Settings,
+    shortest: float,
+    known: Sequence[Done],
+    fits: Fits,
 ) -> Iterator[Planned]:
     """Give every flight with its window, as if each were the first."""
     last = max((one.td for one in known), default=None)
@@ -199,13 +206,15 @@ def _rows(
         elif end - margin.time - start < shortest:
             yield replace(row, reason=_too_short(end - margin.time - start, shortest, margin))
         else:
-            yield _asked(reference, row, settings, shortest)
+            yield _asked(reference, row, settings, shortest, fits)
 
 
-def _asked(reference: Reference, row: Planned, settings: Settings, shortest: float) -> Planned:
+def _asked(reference: Reference, row: Planned, settings: Settings, shortest: float, fits: Fits) -> Planned:
     """Ask ``suggest`` for the window of a flight."""
     own = settings.after is not None and row.start <= settings.after <= row.end
-    answer = suggest_of(reference, (row.start, row.end), settings if own else replace(settings, after=None))
+    asked = settings if own else replace(settings, after=None)
+    # the energy alone shows another beginning to each td, and that of an earlier td may lie before this flight
+    answer = suggest_of(reference, (row.start, row.end), asked, since=row.start, fits=fits)
     row = replace(row, answer=answer)
     if answer.recommended is None:
         why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]

@@ -16,7 +16,7 @@ _RANGES = (
     ("max_kinetic_share", 0.0, inf),
     ("max_residual", 0.0, inf),
     ("cost_share", 0.0, 1.0),
-    ("step_ratio", 0.0, inf),
+    ("step_ratio", 1.0, inf),
 )
 
 

@@ -32,11 +32,16 @@ Examples:
 
 
 @click.command("suggest", epilog=EXAMPLES)
-@click.option("--td", type=shared.TIME, metavar="T", help="Switch back to deformable at this time.")
+@click.option(
+    "--td", type=shared.TIME, metavar="T", cls=shared.Either, instead_of=("td_window",),
+    help="Switch back to deformable at this time.",
+)  # fmt: skip
 @click.option(
     "--td-window",
     type=(shared.TIME, shared.TIME),
     metavar="LO HI",
+    cls=shared.Either,
+    instead_of=("td",),
     help="Choose the time to switch back within this window.",
 )
 @click.option(
@@ -73,10 +78,6 @@ def command(
     """
     from d2rpick.choice.of_run import Reference, suggest_of
 
-    if _only_in_environment(ctx, "td", overruled_by="td_window"):
-        td = None
-    if _only_in_environment(ctx, "td_window", overruled_by="td"):
-        td_window = None
     _check_usage(td, td_window, card=output_format == "card", ids=(*options["part"], *options["node"]))
     prints = prints_card(options, output_format)
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
@@ -104,12 +105,6 @@ def command(
     text = write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit))
     output.result(in_words(text, output_format))
     return finish(ctx, objection=answer.recommended is None or poor, exit_zero=exit_zero)
-
-
-def _only_in_environment(ctx: click.Context, option: str, *, overruled_by: str) -> bool:
-    """Whether an option comes from the environment, and one that excludes it from the command line."""
-    sources = [ctx.get_parameter_source(name) for name in (option, overruled_by)]
-    return sources == [click.core.ParameterSource.ENVIRONMENT, click.core.ParameterSource.COMMANDLINE]
 
 
 def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: bool, ids: tuple[str, ...]) -> None:

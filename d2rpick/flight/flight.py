@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Final, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -54,23 +55,27 @@ class Flight(NamedTuple):
 
 
 class Witness(NamedTuple):
-    """One source of evidence: the flight that it shows around a time, over the times of its record.
+    """One source of evidence: the flight that it shows around a time, and all its ``flights``, ascending in time.
 
     ``decisive``: where it shows none, there is none, even if it shows none anywhere.
     """
 
     source: str
-    time: Samples
     around: Callable[[float], FreeFlight | None]
+    flights: Callable[[], tuple[FreeFlight, ...]]
     decisive: bool
 
-    def flights(self) -> tuple[FreeFlight, ...]:
-        """All flights that it shows, ascending in time."""
-        return all_windows(self.time, self.around)
+    @classmethod
+    def of(cls, source: str, time: Samples, around: Callable[[float], FreeFlight | None], *, decisive: bool) -> Witness:
+        """Give the source that shows flights over ``time`` (n,), which looks for all of them only once."""
+        return cls(source, around, cache(partial(all_windows, time, around)), decisive)
 
     def counts(self) -> bool:
         """Whether there is no flight where it shows none."""
         return self.decisive or bool(self.flights())
+
+
+_WITNESSES: WeakKeyDictionary[History, tuple[Witness, ...]] = WeakKeyDictionary()
 
 
 class Seen(NamedTuple):
@@ -123,7 +128,7 @@ def seen_flight(history: History, td: float) -> Seen:
 
 def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     """Find all flights that the best source shows and no other denies, each with its source, ascending in time."""
-    asked = tuple(witnesses(history))
+    asked = witnesses(history)
     for place, witness in enumerate(asked):
         kept, flights = [], witness.flights()
         for flight in flights:
@@ -140,25 +145,32 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     return ()
 
 
-def witnesses(history: History) -> Iterator[Witness]:
-    """Give the sources of evidence that a history has, best first."""
+def witnesses(history: History) -> tuple[Witness, ...]:
+    """Give the sources of evidence that a history has, best first; it is asked about many td."""
+    if history not in _WITNESSES:
+        _WITNESSES[history] = tuple(_witnesses(history))
+    return _WITNESSES[history]
+
+
+def _witnesses(history: History) -> Iterator[Witness]:
     if history.momenta:
         from d2rpick.flight import momentum
 
         momenta = momentum.to_be_asked(history.momenta)
         around = partial(_first, momenta)
         decisive = any(one.parts is not None and momentum.tells(one) for one in momenta)
-        yield Witness("momentum", momenta[0].time, around, decisive)
+        yield Witness.of("momentum", momenta[0].time, around, decisive=decisive)
     balance = history.balance
     if balance is None:
         return
     from d2rpick.flight import contact_energy, work
 
     if contact_energy.shows_contacts(balance):
-        yield Witness("contact-energy", balance.time, partial(contact_energy.plateau_around, balance), False)
+        around = partial(contact_energy.plateau_around, balance)
+        yield Witness.of("contact-energy", balance.time, around, decisive=False)
     if work.can_tell(balance):
         worked = balance.external_work is not None and bool(np.ptp(balance.external_work))
-        yield Witness("energy-balance", balance.time, partial(work.balanced_around, balance), worked)
+        yield Witness.of("energy-balance", balance.time, partial(work.balanced_around, balance), decisive=worked)
 
 
 def _first(momenta: Sequence[Momenta], td: float) -> FreeFlight | None:

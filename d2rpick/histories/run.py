@@ -249,8 +249,9 @@ class Run:
         columns = [database.channel(name) for name in names]
         channel = " + ".join(names)
         notes = quantity_note(channel)
-        history = self._made(database, database.time, np.sum(columns, axis=0), channel, names, notes, None)
-        return _with_terms(history, names, np.stack(columns, axis=1))
+        energy = columns[0] if len(columns) == 1 else np.sum(columns, axis=0)
+        history = self._made(database, database.time, energy, channel, names, notes, None)
+        return history if len(columns) == 1 else _with_terms(history, names, np.stack(columns, axis=1))
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
         """Find the database that has all these channels, under the names it gives them."""

@@ -377,6 +377,6 @@ def page_record(
 
 def written(path: arguments.Path, page: str) -> Path:
     """Write a page and give its path."""
-    place = Path(path)
+    place = Path(*arguments.paths("path", path))
     place.write_text(page, "utf-8")
     return place

@@ -115,7 +115,7 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:
         "exact_tr": repr(best.tr) if best else "none",
         "level": short(offer.energy_td),
         "kinetic": "" if offer.kinetic_share is None else measure(offer.kinetic_share),
-        "quality": f"{quality.grade}{': ' * bool(quality.reasons)}{'; '.join(quality.reasons)}" if quality else "",
+        "quality": quality.told if quality else "",
         "reason": offer.reason or "",
         **(_of_best(offer, best, unit) if best else {}),
         "compared": _compared(offer, start, unit),

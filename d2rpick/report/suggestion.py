@@ -119,10 +119,9 @@ def _saved(best: Candidate) -> str:
 
 def _sure(best: Candidate, quality: Quality) -> str:
     """How good the pair is, why it is none better, and how exactly tr is known."""
-    reasons = f": {'; '.join(quality.reasons)}" if quality.reasons else ""
     known = "" if best.tr_high is None else f"; tr is known to ±{best.tr_high - best.tr:.1g}"
     room = "" if best.timing_tolerance is None else f" and may be off by {best.timing_tolerance:.1g}"
-    return f"{quality.grade}{reasons}{known}{room}"
+    return f"{quality.told}{known}{room}"
 
 
 def _kept(answer: Suggestion, best: Candidate) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.errors import RangeError
-from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.one_mode import LARGEST_ENERGY, Mode
 from d2rpick.vibration.oscillator import Oscillator, State
 
 if TYPE_CHECKING:
@@ -50,7 +51,8 @@ def from_mode(mode: Mode, time: float) -> tuple[Oscillator, State]:
 def to_mode(oscillator: Oscillator, v0: float) -> Mode:
     """Give the energy mode of ``oscillator`` struck at time 0: frame velocity ``v0``, all else at rest (7).
 
-    RangeError when it is not underdamped: such a motion has no vibration to lock in.
+    RangeError when it is not underdamped: such a motion has no vibration to lock in; or when its energies are beyond
+    what can be squared.
     """
     omega = oscillator.omega_2
     if not omega > 0:
@@ -58,5 +60,7 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
             f"alpha {oscillator.alpha:g} overdamps the oscillator, whose rate is {oscillator.omega_0:g}, "
             f"less than {2 * oscillator.omega_0:g} was expected"
         )
-    sine = -v0 * np.sqrt(oscillator.stiffness / 2) / omega
-    return Mode(omega=omega, alpha=oscillator.alpha, cosine=0.0, sine=float(sine), origin=0.0)
+    sine = -v0 / omega * sqrt(oscillator.stiffness / 2)
+    if not abs(sine) <= sqrt(LARGEST_ENERGY):
+        raise RangeError(f"v0 is {v0:g}: it gives energies above {LARGEST_ENERGY:g}; choose units of moderate numbers")
+    return Mode(omega=omega, alpha=oscillator.alpha, cosine=0.0, sine=sine, origin=0.0)

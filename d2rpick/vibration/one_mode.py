@@ -12,6 +12,8 @@ from d2rpick.vibration.roots import narrow
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
+# Beyond, squares of energies are no numbers any more; no unit system comes near.
+LARGEST_ENERGY = 1e150
 # Halving alone would need no more to reach rounding.
 _STEPS = 64
 _EPS = float(np.finfo(np.float64).eps)
@@ -142,6 +144,8 @@ class Mode:
 
     def extrema(self, start: float, end: float) -> tuple[float, ...]:
         """Find the times in (start, end), ascending, where the deformation stands still (q' = 0) [time]."""
+        if not start < end:  # nor need ``start`` be a time whose phase is a number
+            return ()
         first = float(self.standstill_after(start))
         times = first + np.pi / self.omega * np.arange(max(0.0, np.ceil((end - first) * self.omega / np.pi)))
         return tuple(times[(times > start) & (times < end)].tolist())

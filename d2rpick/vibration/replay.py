@@ -79,8 +79,8 @@ def trajectory(
     written the same.
     """
     count = int(np.floor(t_end / dt * (1 + 1e-12))) + 1
-    time = np.round(dt * np.arange(count), 13 - int(np.floor(np.log10(t_end))))
     with np.errstate(all="ignore"):
+        time = np.round(dt * np.arange(count), 13 - int(np.floor(np.log10(t_end))))
         state = oscillator.free_on_grid(start, dt, count) if switched is None else switched.motion(time)
         motion = Trajectory(time, state, oscillator.internal_energy(state), oscillator.kinetic_energy(state))
     if not all(np.isfinite(column).all() for column in (time, *state, motion.internal_energy, motion.kinetic_energy)):

@@ -176,7 +176,7 @@ class Table:
             columns = plain_values(self._text, self._begin, self._layout, wanted)
             self._plain = columns is not None
             found = zip(wanted, columns or (), strict=self._plain)
-            self._read |= {one: values for one, values in found if np.isfinite(values).all()}
+            self._read |= {one: _kept(values) for one, values in found if np.isfinite(values).all()}
         if column not in self._read:
             values = checked_values(self._text, self._begin, self._layout, (self._time, column))
             self._read |= {self._time: values[:, 0].copy(), column: values[:, 1].copy()}
@@ -184,6 +184,12 @@ class Table:
 
     def _no_parts(self) -> FormatError:
         return FormatError(f"{self.source}: a table has no parts; choose its columns with `energy`")
+
+
+def _kept(values: Samples) -> Samples:
+    """Make values read-only, so that nobody needs a copy of his own."""
+    values.flags.writeable = False
+    return values
 
 
 def _is_whole(line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]) -> bool:
