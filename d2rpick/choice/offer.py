@@ -50,6 +50,12 @@ class Offer:
         """How long the parts are rigid [time]."""
         return self.best.rigid_time if self.best else None
 
+    @property
+    def saving(self) -> float | None:
+        """Share of the run time that is saved [-]; None where the cost of the parts is not known."""
+        share = self.best.run_time_share if self.best else None
+        return None if share is None else 1 - share
+
 
 def offer_of(situation: Situation, *, peak: bool) -> Offer:
     """Give what ``suggest`` says of a td; ``peak`` tells whether the energy peaks there."""

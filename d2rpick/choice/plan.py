@@ -4,6 +4,8 @@ A window in which nothing vibrates locks in nothing and leaves all landings wher
 moves the next landing by a little, for which the margin is kept, and those after it by more than any margin.  So one
 reference supports every window up to and with the first that locks in energy; the next ones are planned from the run
 that was switched so (THEORY.md section 12).
+
+Each window that locks in energy costs a run of its own, so a short one is left out for a longer one behind it.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.settings import Settings
@@ -34,6 +36,10 @@ if TYPE_CHECKING:
 
 # A rigid window shorter than this share of the record saves less than a restart costs.
 MIN_RIGID: Final = 0.05
+# A window is left out for one behind it that is rigid for more than so many times as long.  With w rigid in the first
+# and W in the other, one after the other saves w in the next run and w + W in that after it; the other alone saves W in
+# both, which is more from W = 2 w on.
+_LONGER: Final = 2.0
 
 
 @dataclass(frozen=True)
@@ -153,7 +159,8 @@ def plan_of(
     settings : Settings
         As for ``suggest``.  ``after`` counts in the flight that it lies in; what flies before is left out.
     min_rigid : float, optional
-        Shorter windows are left out [time].  Default: 5 % of the record.
+        Shorter windows are left out [time].  Default: 5 % of the record; then too a window that locks in energy is left
+        out for one behind it that is rigid for more than twice as long.
     done : sequence of (float, float)
         Windows in which the run was switched, in order [time].
     before : Reference, optional
@@ -177,7 +184,10 @@ def plan_of(
     flights = flights_of(history, settings, fits)
     earlier = before and flights_of(switched_history(before, ())[0], settings)  # it may have been switched itself
     known = done_windows(history, flights, found, earlier)
-    rows = tuple(_with_status(list(_rows(reference, flights, settings, shortest, known, fits)), known))
+    judged: Iterable[Planned] = _rows(reference, flights, settings, shortest, known, fits)
+    if min_rigid is None:
+        judged = _without_short(list(judged))
+    rows = tuple(_with_status(list(judged), known))
     return Plan(history, settings, shortest, rows, (*cautions, *_cautions(rows, known)), found)
 
 
@@ -227,6 +237,21 @@ def _asked(reference: Reference, row: Planned, settings: Settings, shortest: flo
 def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
     kept = f", with the margin {margin.time:.3g} before the contact" if margin.time else ""
     return f"too short: rigid for {max(rigid, 0.0):.3g}{kept}, at least {shortest:.3g} was asked for"
+
+
+def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
+    """Leave a window that locks in energy out for a much longer one behind it: a run supports only one of them."""
+    for at, row in enumerate(rows):
+        rigid = row.rigid_time or 0.0
+        behind = max(rows[at + 1 :], key=lambda one: one.rigid_time or 0.0, default=row)
+        if row.status != "supported" or not row.locks_in or not (behind.rigid_time or 0.0) > _LONGER * rigid:
+            yield row
+            continue
+        tr, td = row.window or (0.0, 0.0)
+        own = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, flight {behind.number} for {behind.rigid_time:.3g}"
+        why = f"{own}: a run supports only one window that locks in energy"
+        cure = f"with `min_rigid` below {rigid:.6g} this one comes first"
+        yield replace(row, status="left-out", reason=f"{why}; {cure}, and the other waits for the run switched so")
 
 
 def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Planned]:

@@ -88,7 +88,7 @@ def command(
         model = deck_cost.model_of(options)
         options = deck_cost.with_deck(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
-        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model, options["merge"])
     answer = suggest_of(reference, td_window if td is None else td, settings)
     answer = answer._replace(cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)
@@ -142,7 +142,7 @@ def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output)
     if pair is None:
         output.content(b"")
         return False
-    request = card_request(run, options, situation.history)
+    request = card_request(run, options, situation.history).by(situation.settings)
     found = judged_card(
         [(pair.tr, pair.td)], situation.history, lambda tr, td: verify_at(situation.at(td), tr), request
     )

@@ -160,6 +160,8 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
         said.append(
             f"rigid for {abs(longer):.{_READ}g}{unit} {'longer' if longer > 0 else 'less'} ({share:+.1%} of the record)"
         )
+    if offer.saving is not None and start.saving is not None:
+        said.append(f"saves {offer.saving:.1%} of the run time instead of {start.saving:.1%}")
     if offer.error is not None and start.error is not None and (offer.basis == "energy") == (start.basis == "energy"):
         said.append(f"{error_name([offer])} {measure(offer.error)} instead of {measure(start.error)}")
     return ", ".join(said)

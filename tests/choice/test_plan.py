@@ -238,3 +238,35 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_fac
     plan = plan_of(read(bouncing(seed, tmp_path_factory.getbasetemp())), Settings(replay=False))
     for row in plan.rows:
         assert row.window is None or row.start <= row.window[0] < row.window[1] <= row.end
+
+
+# ---- a short window before a longer one
+
+
+@pytest.fixture(scope="module")
+def car() -> Reference:
+    return read([str(shared("openradioss/car_drop/carT01.gz"))], Selection(parts=("1-14",)))
+
+
+def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(car: Reference) -> None:
+    """Between two pushes the car is rigid for 17 ms, after them for 108: the window that `parts` compares sets in."""
+    found = plan_of(car, PLAIN)
+    assert statuses(found) == ["left-out", "supported"]
+    assert "flight 2 for 0.108: a run supports only one window" in (found.rows[0].reason or "")
+    longest = suggest_of(car, None, PLAIN).recommended
+    assert longest is not None
+    assert found.windows() == ((longest.tr, longest.td),)
+
+
+def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(car: Reference) -> None:
+    found = plan_of(car, PLAIN, min_rigid=0.013)
+    assert statuses(found) == ["supported", "re-plan"]
+    assert found.rows[0].rigid_time == pytest.approx(0.0171, abs=1e-4)
+    assert [one.code for one in found.cautions][-1] == "longer-window-later"
+
+
+def test_a_window_of_more_than_half_the_longest_comes_first() -> None:
+    """One after the other both are had with one more run; DROP2: 0.071 and then 0.091."""
+    found = plan_of(real("drop2T01.gz"), PLAIN)
+    assert statuses(found) == ["supported", "left-out", "supported", "re-plan", "re-plan", "left-out", "re-plan"]
+    assert found.rows[4].rigid_time == pytest.approx(0.0906, abs=1e-4)
