@@ -46,8 +46,8 @@ class Placement:
 
     @cached_property
     def parts(self) -> Mapping[int, Placed]:
-        """Parts whose elements are all placed; none where the deck moves its nodes."""
-        if self._inventory.moved:
+        """Parts whose elements are all placed; none where some may be missing, or the deck moves its nodes."""
+        if self._inventory.moved or not self._inventory.complete:
             return {}
         found: dict[int, list[_Share]] = {}
         for elements in self._inventory.elements:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,6 +56,10 @@ def test_a_part_with_a_node_that_is_nowhere_is_not_placed() -> None:
     lost = plate()
     lost.coordinates[0] = np.nan
     assert Placement(lost).parts.keys() == set()
+
+
+def test_where_elements_are_missing_no_part_is_placed() -> None:
+    assert Placement(replace(plate(), complete=False)).parts == {}
 
 
 PART = f"/PART/1\na\n{radioss.wide(1, 1)}/SHELL/1\n{radioss.wide(1, 1, 2, 4, 6)}{radioss.PROPS}"
