@@ -87,9 +87,9 @@ def test_of_many_runs_those_that_stand_out_are_named() -> None:
     assert axes.collections[0].get_label() == "internal energy of 31 runs"
 
 
-@pytest.mark.parametrize("narrow", [False, True])
-def test_runs_of_any_energy_can_be_drawn(narrow: bool) -> None:
+@pytest.mark.parametrize("page", [False, True])
+def test_runs_of_any_energy_can_be_drawn(page: bool) -> None:
     rows = [row("zero", 0.2, 0.0), row("one", 0.2), row("large", 0.3, 1e6)]
-    figure = draw_study(study(*rows), narrow=narrow)
+    figure = draw_study(study(*rows), page=page)
     figure.canvas.draw()
     assert draw_study(study()).axes
