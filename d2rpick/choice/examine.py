@@ -42,11 +42,11 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
         raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
     if settings.after is not None:
         _inside(history, settings.after, "`after`")
-    seen = seen_flight(history, td)
+    fits = Fits() if fits is None else fits
+    seen = seen_flight(history, td, fits)
     flying = None if seen.refusal else seen.flight
     # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
     at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
-    fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits)
     flight = find_flight(history, td, settings.after, seen, span)
     given = settings.oscillator is not None

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.flight.energy_alone import quiet_time
-from d2rpick.flight.window import all_windows
+from d2rpick.flight.window import all_windows, moments
+from d2rpick.vibration.fits import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -104,21 +105,36 @@ def find_flight(history: History, td: float, after: float | None, seen: Seen, sp
     return Flight(quiet.start, quiet.end, "energy", settled=quiet.settled) if quiet else Flight(None, None, None)
 
 
-def seen_flight(history: History, td: float) -> Seen:
+def seen_flight(history: History, td: float, fits: Fits | None = None) -> Seen:
     """Find the free flight around ``td`` [time] in everything but the energy of the parts.
 
     The best source that shows a flight counts.  A better one that shows none at td is never overruled, nor is the
-    contact energy; where two sources show different ends, the later start and the earlier end count.
+    contact energy; where two sources show different ends, the later start and the earlier end count.  ``fits`` remember
+    what earlier looks at the same record have shown.
     """
+    fits = Fits() if fits is None else fits
     found: list[tuple[str, FreeFlight]] = []
-    for witness in witnesses(history):
-        flight = witness.around(td)
+    for witness in fits.once(("witnesses",), lambda: tuple(witnesses(history))):
+        flight = _around(witness, td, fits)
         if flight:
             found.append((witness.source, flight))
-        elif (not found or witness.source in _AGREEING) and witness.counts():
+        elif (not found or witness.source in _AGREEING) and fits.once(("counts", witness.source), witness.counts):
             doubts = _contradicting(found, witness, td)
-            return _nearest(witness, td, _no_flight(witness.source, td), doubts)
-    return _confirmed(history, found) if found else Seen(None, None)
+            flights = fits.once(("flights", witness.source), witness.flights)
+            return _nearest(witness.source, flights, td, doubts)
+    return fits.once(("confirmed", *found), lambda: _confirmed(history, found)) if found else Seen(None, None)
+
+
+def _around(witness: Witness, td: float, fits: Fits) -> FreeFlight | None:
+    """Give the flight that a witness shows around td: that of the nearest mark that holds td, so that td share it.
+
+    Of the marks, the same for every td, each flight that is long enough holds one next to any td in it.
+    """
+    for mark in sorted(moments(witness.time), key=lambda mark: abs(mark - td))[:2]:
+        flight = fits.once(("flight", witness.source, mark), partial(witness.around, mark))
+        if flight and flight.start <= td <= flight.end:
+            return flight
+    return witness.around(td)
 
 
 def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
@@ -168,12 +184,11 @@ def _first(momenta: Sequence[Momenta], td: float) -> FreeFlight | None:
     return next(filter(None, (flight_around(one, td) for one in momenta)), None)
 
 
-def _nearest(witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]) -> Seen:
+def _nearest(source: str, flights: Sequence[FreeFlight], td: float, doubts: tuple[str, ...]) -> Seen:
     """Give the last flight before ``td``, or else the first one after it, where nothing flies at td."""
-    flights = witness.flights()
     before = [one for one in flights if one.end < td]
     nearest = before[-1] if before else flights[0] if flights else None
-    return Seen(nearest, witness.source if nearest else None, refusal, doubts)
+    return Seen(nearest, source if nearest else None, _no_flight(source, td), doubts)
 
 
 def _no_flight(source: str, td: float) -> str:
