@@ -16,6 +16,7 @@ import numpy as np
 from d2rpick.choice.objections import objections
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import Moment
+from d2rpick.vibration.together import measured_of, moments_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -105,16 +106,16 @@ class Candidates(Sequence[Candidate]):
     ranked: bool = False
 
     @classmethod
-    def of(cls, situation: Situation, moments: Sequence[Moment]) -> Candidates:
-        """Measure each tr and hold it against flight, sign and tolerance."""
+    def of(cls, situation: Situation, moments: Sequence[Moment], known: Sequence[Measured | None]) -> Candidates:
+        """Hold each tr, of which is ``known`` what was measured, against flight, sign and tolerance."""
         vibration = situation.vibration
         tr = np.array([one.tr for one in moments])
-        known, energy = tuple(vibration.measured(tr)), vibration.energies(tr)
+        energy = vibration.energies(tr)
         level_error = measures.level_errors(energy, situation.energy_td)
         return cls(
             situation=situation,
             moments=tuple(moments),
-            known=known,
+            known=tuple(known),
             tr=tr,
             energy=energy,
             level_error=level_error,
@@ -230,22 +231,40 @@ def find_candidates(situation: Situation, *, in_flight: bool = False) -> Candida
     Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
     acceptable, may be left out: noise in a long record makes tens of thousands.
     """
+    return candidates_of([situation], in_flight=in_flight)[0]
+
+
+def candidates_of(situations: Sequence[Situation], *, in_flight: bool = False) -> list[Candidates]:
+    """The same of many td of one record, of one set of rules, at once."""
+    vibrations = [one.vibration for one in situations]
+    starts = [one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf for one in situations]
+    found = moments_of(vibrations, situations[0].settings.tolerance, starts)
+    kept = [_at_start(one) or _distinct(one, moments) for one, moments in zip(situations, found, strict=True)]
+    known = measured_of(vibrations, [np.array([one.tr for one in moments]) for moments in kept])
+    return [Candidates.of(*row) for row in zip(situations, kept, known, strict=True)]
+
+
+def judge(situation: Situation, found: Sequence[Moment]) -> Candidates:
+    """Measure each tr and hold it against flight, sign and tolerance."""
+    return Candidates.of(situation, found, situation.vibration.measured(np.array([one.tr for one in found])))
+
+
+def _at_start(situation: Situation) -> list[Moment]:
+    """Where nothing vibrates in the flight, its start; else nothing."""
     start = situation.earliest_tr
-    if start is not None and situation.at_rest:
-        return judge(situation, [Moment(max(start, float(situation.history.time[0])), "start", None)])
-    since = start if in_flight and start is not None else -np.inf
-    found = situation.vibration.moments(situation.settings.tolerance, since)
+    if start is None or not situation.at_rest:
+        return []
+    return [Moment(max(start, float(situation.history.time[0])), "start", None)]
+
+
+def _distinct(situation: Situation, found: Sequence[Moment]) -> list[Moment]:
+    """Give the moments in time order, without the matches that lie next to a crossing or an extremum."""
     matches = [one for one in found if one.kind == "match"]
     if matches:
         of_level = np.array([one.tr for one in found if one.kind != "match"])
         known = {one for one in matches if not np.all(np.abs(of_level - one.tr) > situation.history.step)}
         found = [one for one in found if one not in known]
-    return judge(situation, sorted(found, key=itemgetter(0)))  # a Moment begins with its time
-
-
-def judge(situation: Situation, found: Sequence[Moment]) -> Candidates:
-    """Measure each tr and hold it against flight, sign and tolerance."""
-    return Candidates.of(situation, found)
+    return sorted(found, key=itemgetter(0))  # a Moment begins with its time
 
 
 def _remarks(situation: Situation, reach: float, known: Measured | None, parts: Sequence[PartMatch]) -> Iterator[str]:
