@@ -160,6 +160,11 @@ class Candidates(Sequence[Candidate]):
             ranked=True,
         )
 
+    @cached_property
+    def chosen(self) -> Candidate | None:
+        """The one that is recommended."""
+        return None if self.recommended is None else self[self.recommended]
+
     @property
     def out_of_place(self) -> NDArray[np.bool_]:
         """Which of them leave the body so far out of place that it is worth a warning."""
@@ -236,6 +241,8 @@ def find_candidates(situation: Situation, *, in_flight: bool = False) -> Candida
 
 def candidates_of(situations: Sequence[Situation], *, in_flight: bool = False) -> list[Candidates]:
     """The same of many td of one record, of one set of rules, at once."""
+    if not situations:
+        return []
     vibrations = [one.vibration for one in situations]
     starts = [one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf for one in situations]
     found = moments_of(vibrations, situations[0].settings.tolerance, starts)

@@ -68,8 +68,7 @@ class Suggestion(NamedTuple):
     @property
     def chosen(self) -> Candidate | None:
         """The candidate that is recommended."""
-        place = self.candidates.recommended
-        return None if place is None else self.candidates[place]
+        return self.candidates.chosen
 
     @property
     def acceptable_windows(self) -> tuple[tuple[float, float], ...]:

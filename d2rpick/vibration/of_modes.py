@@ -18,7 +18,7 @@ from d2rpick.vibration.second_mode import residual_bound
 from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -80,7 +80,7 @@ class OfModes:
 
     def energies(self, times: Samples) -> Samples:
         """E at many times, of their shape [energy]."""
-        return np.where(self.inside(times), self.mode.energy(times), self.history.energies_at(times))
+        return self._each(times, self.mode.energy, self.history.energies_at)
 
     def described(self, time: float) -> bool:
         """Whether ``time`` lies in the window that the mode describes."""
@@ -110,8 +110,10 @@ class OfModes:
     def crossings(self, passed: Sequence[float] | Samples | None = None) -> list[Moment]:
         """Crossings of the level at td: of the samples before the span, exact ones, which may be known, within it."""
         start, level = self.span.start, self.energy(self.td)
-        sampled = find_crossings(*sampled_before(self.history, self.td, level), level)
-        found = [Moment(one.time, "crossing", one.rising) for one in sampled if one.time < start]
+        found = []
+        if start > self.history.time[0]:
+            sampled = find_crossings(*sampled_before(self.history, self.td, level), level)
+            found = [Moment(one.time, "crossing", one.rising) for one in sampled if one.time < start]
         passed = self.mode.level_crossings(self.td, self.before) if passed is None else passed
         times = np.maximum(passed, start)
         slopes = self.mode.energy_slopes(times)[0]
@@ -173,8 +175,22 @@ class OfModes:
 
     def level_reach(self, times: Samples) -> Samples:
         """How far from each time the energy may have the level at td [time]."""
-        sampled = sampled_reach(self.history, times, self.td, self.energy(self.td))
-        return np.where(self.inside(times), fitted_reach(self.history, self.fit, self.mode, times, self.td), sampled)
+        return self._each(
+            times,
+            lambda inside: fitted_reach(self.history, self.fit, self.mode, inside, self.td),
+            lambda outside: sampled_reach(self.history, outside, self.td, self.energy(self.td)),
+        )
+
+    def _each(
+        self, times: Samples, inside: Callable[[Samples], Samples], outside: Callable[[Samples], Samples]
+    ) -> Samples:
+        """Give one thing for times in the window that the mode describes, another for those outside, of their shape."""
+        here = self.inside(times)
+        if here.all():  # as nearly always
+            return inside(times)
+        found = np.empty(times.shape)
+        found[here], found[~here] = inside(times[here]), outside(times[~here])
+        return found
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:  # noqa: ARG002  by the protocol
         """Nothing: single parts are not known."""
