@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.flight.energy_alone import quiet_time
-from d2rpick.flight.window import all_windows, moments
+from d2rpick.flight.window import all_windows, marks
 from d2rpick.vibration.fits import Fits
 
 if TYPE_CHECKING:
@@ -126,11 +126,8 @@ def seen_flight(history: History, td: float, fits: Fits | None = None) -> Seen:
 
 
 def _around(witness: Witness, td: float, fits: Fits) -> FreeFlight | None:
-    """Give the flight that a witness shows around td: that of the nearest mark that holds td, so that td share it.
-
-    Of the marks, the same for every td, each flight that is long enough holds one next to any td in it.
-    """
-    for mark in sorted(moments(witness.time), key=lambda mark: abs(mark - td))[:2]:
+    """Give the flight that a witness shows around td: that of the first mark whose flight holds td, else td's own."""
+    for mark in marks(witness.time, td):
         flight = fits.once(("flight", witness.source, mark), partial(witness.around, mark))
         if flight and flight.start <= td <= flight.end:
             return flight
