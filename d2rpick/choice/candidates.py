@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple, overload
+from typing import TYPE_CHECKING, Final, NamedTuple, overload
 
 import numpy as np
 
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_shares import PartMatch
 
 
+# Candidates that are looked at together, at most: arrays of more are no faster, and noise makes tens of thousands a td.
+_MOST: Final = 20_000
 # A residual that may be so much higher is worth a note.
 _MUCH_HIGHER = 0.1
 _SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
@@ -236,13 +238,19 @@ def find_candidates(situation: Situation, *, in_flight: bool = False) -> Candida
     Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
     acceptable, may be left out: noise in a long record makes tens of thousands.
     """
-    return candidates_of([situation], in_flight=in_flight)[0]
+    return next(candidates_of([situation], in_flight=in_flight))
 
 
-def candidates_of(situations: Sequence[Situation], *, in_flight: bool = False) -> list[Candidates]:
-    """The same of many td of one record, of one set of rules, at once."""
-    if not situations:
-        return []
+def candidates_of(situations: Sequence[Situation], *, in_flight: bool = False) -> Iterator[Candidates]:
+    """The same of many td of one record, by one set of rules: so many td at once as have few candidates."""
+    first, together = 0, 1
+    while first < len(situations):
+        found = _found_together(situations[first : first + together], in_flight=in_flight)
+        yield from found
+        first, together = first + together, max(1, _MOST // max(1, *map(len, found)))
+
+
+def _found_together(situations: Sequence[Situation], *, in_flight: bool) -> list[Candidates]:
     vibrations = [one.vibration for one in situations]
     starts = [one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf for one in situations]
     found = moments_of(vibrations, situations[0].settings.tolerance, starts)

@@ -131,8 +131,12 @@ def mark_times(panels: Sequence[Axes], tr: float | None, td: float | None, *, pa
 
 
 def finish(axes: Axes, *, legend: bool = True) -> None:
-    """Draw the grid, keep the time axis tight, and put the legend beside the axes."""
+    """Draw the grid, keep the time axis tight, and put the legend beside the axes.
+
+    A power of ten of the numbers stands above them, clear of the labels of the switch times.
+    """
     axes.grid(visible=True, linewidth=0.3)
+    axes.yaxis.get_offset_text().set_horizontalalignment("right")
     axes.margins(x=0)
     if legend:
         axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.verify import Verdict
     from d2rpick.choice.view import View
 
-# Height of a file's figure of the energy alone, and with the motion [inch]; on a page, that of a panel.
+# Height of a file's figure of the energy alone, and with the motion; on a page, that of a panel [inch].
 _HEIGHTS: Final = (4.0, 6.5)
-_PANEL: Final = 2.3
+_PANELS: Final = (2.6, 2.0)
 # Up to so many candidates are told apart as marks; beyond, what is acceptable is a band.
 _FEW: Final = 20
 # Share of the axes at their foot in which the band lies, clear of the curve.
@@ -87,7 +87,7 @@ def _draw(
         finish(panel, legend=not page)
     _show(panels[0], situation, seen)
     if page:
-        arrange(figure, panels, _PANEL)
+        arrange(figure, panels, _PANELS[bool(motion)])
     mark_times(panels, tr, situation.td, page=page)
     return figure
 

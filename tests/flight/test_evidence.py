@@ -20,6 +20,7 @@ from d2rpick.histories.selection import Selection
 from d2rpick.models.rollover.files import WRITERS
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import simulate
+from d2rpick.vibration.fits import Fits
 from tests.cli.test_output import check_by_schema
 from tests.command import ENERGY, ROLLOVER, answer, codes, run
 from tests.sample_box import t01
@@ -276,3 +277,18 @@ def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout
             assert answer("verify", "--tr", repr(tr), *ALONE)["verified"]
     assert f"{own['start']:.6g} to {own['end']:.6g}" in run("suggest", *ALONE).stdout
     assert answer("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None
+
+
+@pytest.mark.parametrize("form", ["glstat", "matsum"])
+def test_a_flight_is_the_same_from_any_td_in_it_and_what_was_seen_before_changes_nothing(
+    rolled: Rolled, form: str
+) -> None:
+    history = open_run([str(rolled.files[form])]).history(Selection(parts=("box",) if form == "matsum" else ()))
+    length, fits = rolled.end - rolled.start, Fits()
+    times = [rolled.start + share * length for share in (0.9, 0.02, 0.5, 0.98, 0.3)]
+    seen = [seen_flight(history, td, fits) for td in times]
+    assert seen == [seen_flight(history, td) for td in times]
+    assert len({one.flight and one.flight[:2] for one in seen}) == 1
+    after = rolled.end + 0.02
+    assert seen_flight(history, after, fits) == seen_flight(history, after)
+    assert seen_flight(history, after, fits).refusal
