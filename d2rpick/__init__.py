@@ -6,14 +6,17 @@
     >>> d2.verify(run, tr=answer.recommended.tr, td=answer.recommended.td).verified
     True
 
-What is named here is imported when it is first used: the package itself imports nothing heavy.
+What is named here is imported when it is first used: the package itself imports nothing, not even typing.
 """
 
-from typing import TYPE_CHECKING, Any
+from __future__ import annotations
 
 from d2rpick.version import __version__ as __version__
 
+TYPE_CHECKING = False  # type checkers take it for theirs; importing typing is left to those who need it
 if TYPE_CHECKING:
+    from typing import Any
+
     from d2rpick.errors import ConfigurationError as ConfigurationError
     from d2rpick.errors import D2RPickError as D2RPickError
     from d2rpick.errors import DeckError as DeckError
@@ -66,4 +69,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *_HOME]
+    return __all__

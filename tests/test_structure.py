@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from functools import cache
 from graphlib import TopologicalSorter
 from importlib.resources import files
 from typing import TYPE_CHECKING
@@ -50,13 +51,24 @@ def name_of(path: Path) -> str:
 MODULES = {name_of(path): path for path in PACKAGE.rglob("*.py")}
 
 
-def imports(path: Path) -> Iterator[str]:
-    """Names of all modules that a file imports, also for type checking, those of the package without its name."""
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+@cache
+def parsed(module: str) -> ast.Module:
+    """The source of a module."""
+    return ast.parse(MODULES[module].read_text("utf-8"))
+
+
+@cache
+def imports(module: str) -> frozenset[str]:
+    """Names of all modules that a module imports, also for type checking, those of the package without its name."""
+    return frozenset(_imports(module))
+
+
+def _imports(module: str) -> Iterator[str]:
+    for node in ast.walk(parsed(module)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
+            assert node.level == 0, f"{module}: relative import"
             origin = (node.module or "").removeprefix("d2rpick.")
             inside = [f"{origin}.{alias.name}".removeprefix("d2rpick.") for alias in node.names]
             yield from (name if name in MODULES else origin for name in inside)
@@ -75,37 +87,48 @@ def test_every_folder_has_its_layer() -> None:
     assert {folder(module) for module in INNER} == {*LAYER}
 
 
-@pytest.mark.parametrize("module", INNER)
-def test_a_module_imports_only_from_its_folder_and_from_lower_layers(module: str) -> None:
-    mine = folder(module)
-    imported = {*imports(MODULES[module])}
-    assert "d2rpick" not in imported  # the public face stands above all
-    theirs = {folder(name) for name in imported if name in INNER}
-    assert not {name for name in theirs - {mine} if LAYER[name] >= LAYER[mine]}
+def test_a_module_imports_only_from_its_folder_and_from_lower_layers() -> None:
+    inner = {*INNER}
+    found = {
+        (module, name)
+        for module in INNER
+        for name in imports(module) & inner
+        if folder(name) != folder(module) and LAYER[folder(name)] >= LAYER[folder(module)]
+    }
+    assert not found
+    assert not [module for module in INNER if "d2rpick" in imports(module)]  # the public face stands above all
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
-    graph = {module: {name for name in imports(MODULES[module]) if name in INNER} - {module} for module in INNER}
+    graph = {module: (imports(module) & {*INNER}) - {module} for module in INNER}
     TopologicalSorter(graph).prepare()  # raises CycleError, which names the circle
 
 
-@pytest.mark.parametrize("module", MODULES)
 @pytest.mark.parametrize("library", RESERVED)
-def test_a_library_stays_behind_its_module(library: str, module: str) -> None:
-    imported = {name.partition(".")[0] for name in imports(MODULES[module])}
-    assert library not in imported or module.partition(".")[0] in RESERVED[library]
+def test_a_library_stays_behind_its_module(library: str) -> None:
+    importing = {module for module in MODULES if library in {folder(name) for name in imports(module)}}
+    assert importing
+    assert {folder(module) for module in importing} <= {*RESERVED[library]}
 
 
-@pytest.mark.parametrize("module", [name for name in MODULES if name.partition(".")[0] != "cli"])
-def test_only_the_command_line_prints_and_exits(module: str) -> None:
-    tree = ast.walk(ast.parse(MODULES[module].read_text("utf-8")))
-    called = {ast.unparse(node.func) for node in tree if isinstance(node, ast.Call)}
-    assert not called & {"print", "exit", "sys.exit", "sys.stdout.write", "sys.stderr.write"}
+def test_only_the_command_line_prints_and_exits() -> None:
+    called = {
+        (module, ast.unparse(node.func))
+        for module in MODULES
+        if folder(module) != "cli"
+        for node in ast.walk(parsed(module))
+        if isinstance(node, ast.Call)
+    }
+    assert not {
+        (module, name)
+        for module, name in called
+        if name in ("print", "exit", "sys.exit", "sys.stdout.write", "sys.stderr.write")
+    }
 
 
 def test_no_file_is_mapped_into_memory() -> None:
     """Where a mapped file is cut by another program, the system ends the process."""
-    assert not [module for module in MODULES if "mmap" in {*imports(MODULES[module])}]
+    assert not [module for module in MODULES if "mmap" in imports(module)]
 
 
 def loaded(*args: str) -> set[str]:
@@ -157,9 +180,16 @@ UNNEEDED = {
         "vibration.modes",
         "vibration.fit_several", "flight.momentum", "choice.health", "choice.judged_card",
         "deck.printing.common", "report.figures", "report.page", "report.health", "histories.formats.fixed_text",
-        "histories.formats.lsda",
+        "histories.formats.lsda", "flight.flying_parts", "flight.momentum", "vibration.replay", "vibration.integration",
+        "cli.explorer",
     )
-} | {"pathlib", "json", "csv", "tempfile", "hashlib", "numpy.typing", "numpy.polynomial", "numpy.random"}  # fmt: skip
+} | {
+    "pathlib", "json", "csv", "tempfile", "hashlib", "numpy.typing", "numpy.polynomial", "numpy.random",
+    "array", "heapq", "unicodedata", "logging", "subprocess", "concurrent.futures", "multiprocessing", "shutil",
+    "tomllib", "difflib", "zlib", "importlib.metadata", "importlib.resources", "traceback",
+}  # fmt: skip
+# Each module costs start-up, too: one more is worth a thought.
+MOST_MODULES = 80
 
 
 def test_a_plain_table_loads_only_what_its_answer_needs() -> None:
@@ -167,7 +197,31 @@ def test_a_plain_table_loads_only_what_its_answer_needs() -> None:
     there = subprocess.run(libraries, capture_output=True, text=True, check=True, timeout=TIME_LIMIT)
     theirs = set(there.stdout.split())
     assert "d2rpick" not in theirs
-    assert not (loaded("suggest", "-q", "--td", "0.064", ENERGY) - theirs) & UNNEEDED
+    mine = loaded("suggest", "--quiet", "--td", "0.064", ENERGY) - theirs
+    assert not mine & UNNEEDED
+    assert len([name for name in mine if name.partition(".")[0] == "d2rpick"]) <= MOST_MODULES
+
+
+def printed_by(code: str) -> str:
+    """What a fresh interpreter prints."""
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT, timeout=TIME_LIMIT
+    )
+    return result.stdout
+
+
+def test_the_package_alone_imports_nothing() -> None:
+    """What typing and its like make is looked through for garbage, unless the command line comes first."""
+    code = "import sys; before = {*sys.modules}; import d2rpick; print(*({*sys.modules} - before))"
+    assert {*printed_by(code).split()} <= {"d2rpick", "d2rpick.version", "__future__"}
+
+
+def test_no_garbage_is_looked_for_at_the_end() -> None:
+    code = (
+        "import atexit, gc, sys; atexit.register(lambda: print(len(gc.get_objects()) < gc.get_freeze_count()));"
+        "sys.argv = ['d2rpick', '--help']; from d2rpick.__main__ import main; main()"
+    )
+    assert printed_by(code).splitlines()[-1] == "True"
 
 
 def test_the_command_line_offers_the_formats_there_are() -> None:

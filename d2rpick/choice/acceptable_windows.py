@@ -5,6 +5,7 @@ Candidates are single times, and no two runs share one; what they can share is a
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -148,7 +149,9 @@ def _residual_left(situation: Situation) -> float:
     limit, share = situation.settings.max_residual, situation.kinetic_share
     if limit is None:
         return np.inf
-    return -1.0 if share is None or share > limit**2 else float(np.sqrt(limit**2 - share))
+    if share is None or sqrt(share) > limit:
+        return -1.0
+    return sqrt(limit - sqrt(share)) * sqrt(limit + sqrt(share))  # the square of a large limit is no number
 
 
 def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples:

@@ -6,18 +6,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.cost import CostModel, Weights
-from d2rpick.choice.part_sets import SEVERAL_BODIES, recommended_parts, with_cost_of
-from d2rpick.choice.same_model import doubts_of
+from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost
+from d2rpick.choice.part_sets import recommended_parts, with_cost_of
+from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.inventory import read_inventory
 from d2rpick.deck.inventory.model import DISCRETE
 from d2rpick.flight.flying_parts import asks_for_recommended
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from d2rpick.choice.settings import Settings
-    from d2rpick.histories.history import History, Part
+    from d2rpick.histories.history import History
     from d2rpick.histories.run import Run
     from d2rpick.histories.selection import Selection
 
@@ -52,23 +51,22 @@ def selected(run: Run, selection: Selection, settings: Settings, model: CostMode
 
 
 def with_deck(settings: Settings, history: History, model: CostModel) -> tuple[Settings, tuple[Caution, ...]]:
-    """Let the deck tell the cost share of the parts of a history, unless it is given, and whether they are one body.
+    """Let the deck tell the cost share of the parts of a history, unless it is given, and which bodies they become.
 
     What stays unknown is in the cautions.
     """
     if not history.parts:
         why = "no parts are named whose elements are saved; give them with `parts`"
         told = () if settings.cost_share is not None else (Caution("cost-unknown", f"the run time stays open: {why}"),)
-        return settings, told
+        return replace(settings, bodies=()), told
     ids = [part.id for part in history.parts]
     found, share = with_cost_of(settings, model, ids)
-    one_body = len(model.inventory.bodies(ids)) == 1
-    return replace(found, one_body=one_body), tuple(_cautions(share.reason, history.parts, model, one_body=one_body))
-
-
-def _cautions(unknown: str | None, parts: Sequence[Part], model: CostModel, *, one_body: bool) -> Iterator[Caution]:
-    yield from doubts_of(parts, model.inventory)
-    if unknown:
-        yield Caution("cost-unknown", f"the run time stays open: {unknown}")
-    if not one_body:
-        yield Caution("several-bodies", SEVERAL_BODIES)
+    found = replace(found, bodies=bodies_of(model.inventory, ids))
+    doubts = [
+        *doubts_of(history.parts, model.inventory),
+        *doubts_of_cost(model, used=settings.cost_share is None and share.value is not None),
+    ]
+    doubts += doubts_of_bodies(ids, model.inventory)
+    if share.reason:
+        doubts.append(Caution("cost-unknown", f"the run time stays open: {share.reason}"))
+    return found, tuple(doubts)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from d2rpick.choice.warnings import Caution
     from d2rpick.histories.history import Samples
 
 # Times of a leg are right within some 5 %, measured ratios of weights within a half: one over the other.
@@ -56,6 +57,7 @@ class Calibration:
     told: tuple[str, ...]
     misfit: float
     observations: tuple[Observation, ...]
+    cautions: tuple[Caution, ...] = ()
 
 
 def calibrate(observations: Sequence[Observation]) -> Calibration:

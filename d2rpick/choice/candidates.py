@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
-from typing import TYPE_CHECKING, Final, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
 import numpy as np
 
@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.objections import Objection
     from d2rpick.choice.situation import Situation
+    from d2rpick.flight.bodies import Off
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.moments import Measured
+    from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.part_shares import PartMatch
 
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 _MOST: Final = 20_000
 # A residual that may be so much higher is worth a note.
 _MUCH_HIGHER = 0.1
+ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
 
 
@@ -47,8 +49,9 @@ class Candidate(NamedTuple):
     expected run time over that of the reference.  ``same_swing``: the energy turns less than twice from tr to td, so
     that hardly anything is saved.  ``residual_high``: how large the residual may be if what the oscillator leaves over
     is a further mode.  ``parts``: what each part has of the mismatch, empty where single parts are not known.
-    ``position_error``: how far the body is out of place at td [length], because ``position_error_part`` is frozen
-    elsewhere.
+    ``position_error``: how far a body is out of place at td [length], because ``position_error_part`` is frozen
+    elsewhere; of several bodies the largest, ``position_error_body`` has the parts of that one.
+    ``position_error_assumes`` says what is taken for granted where no deck tells which parts become one body.
     """
 
     rank: int
@@ -76,6 +79,8 @@ class Candidate(NamedTuple):
     residual_high: float | None = None
     position_error: float | None = None
     position_error_part: str | None = None
+    position_error_body: str | None = None
+    position_error_assumes: str | None = None
 
     @property
     def error(self) -> float:
@@ -84,7 +89,7 @@ class Candidate(NamedTuple):
         return np.inf if error is None else error
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
     """Candidates of one td in some order: columns of what decides, each of shape (n,), made for all of them at once.
 
@@ -169,11 +174,11 @@ class Candidates(Sequence[Candidate]):
 
     @property
     def out_of_place(self) -> NDArray[np.bool_]:
-        """Which of them leave the body so far out of place that it is worth a warning."""
-        drift = self.situation.drift
-        if drift is None:
+        """Which of them leave a body so far out of place that it is worth a warning."""
+        bodies = self.situation.bodies
+        if bodies is None:
             return np.zeros(len(self), dtype=bool)
-        return np.asarray(self.position_error > drift.limit)
+        return np.asarray(self.position_error > bodies.limit)
 
     def recommending(self, place: int) -> Candidates:
         """Give the same with another one recommended."""
@@ -199,7 +204,7 @@ class Candidates(Sequence[Candidate]):
             column[i].item()
             for column in (self.energy, self.level_error, self.reach, self.same_swing, self.position_error)
         )
-        drift = None if np.isnan(off) else situation.drift
+        worst = None if np.isnan(off) or situation.bodies is None else situation.bodies.worst(tr, td)
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
         parts = situation.vibration.part_matches(tr) if known else ()
         against = tuple(one.sentence(i) for one in self.objections if one.holds[i])
@@ -227,8 +232,7 @@ class Candidates(Sequence[Candidate]):
             same_swing=same_swing,
             parts=parts,
             residual_high=known and known.residual_high,
-            position_error=off if drift else None,
-            position_error_part=drift.name if drift else None,
+            **_position(worst),
         )
 
 
@@ -297,6 +301,18 @@ def _remarks(situation: Situation, reach: float, known: Measured | None, parts: 
         yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known.timing_tolerance:.2g}"
     if known is None and reach >= situation.history.step:
         yield "the level lies within the sampling error of an extremum"
+
+
+def _position(worst: Off | None) -> dict[str, Any]:
+    """How far the body is off that is off most; nothing where that is not known."""
+    if worst is None:
+        return {}
+    return {
+        "position_error": worst.error,
+        "position_error_part": worst.part,
+        "position_error_body": worst.body.name if worst.body and worst.part else None,
+        "position_error_assumes": ONE_BODY if worst.assumed else None,
+    }
 
 
 def _run_time_share(situation: Situation, rigid_fraction: float) -> float | None:

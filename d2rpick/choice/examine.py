@@ -14,6 +14,7 @@ from d2rpick.histories.samples import window
 from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.identify import Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, energy_at
+from d2rpick.vibration.one_mode import LARGEST_ENERGY
 from d2rpick.vibration.second_mode import resolved
 from d2rpick.vibration.span import Span, described_span, identify_within, span_of
 
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
     from d2rpick.flight.flight import Seen
     from d2rpick.histories.history import History
-
-# Beyond, squares of energies are no numbers any more; no unit system comes near.
-_LARGEST = 1e150
 
 
 def examine(history: History, td: float, settings: Settings, fits: Fits | None = None) -> Situation:
@@ -38,15 +36,17 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
         raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
     history.energy_at(td, "td")
     largest = float(np.abs(history.energy).max())
-    if largest > _LARGEST:
-        raise RangeError(f"{', '.join(history.source)}: energies up to {largest:g}, at most {_LARGEST:g} was expected")
+    if largest > LARGEST_ENERGY:
+        raise RangeError(
+            f"{', '.join(history.source)}: energies up to {largest:g}, at most {LARGEST_ENERGY:g} was expected"
+        )
     if settings.after is not None:
         _inside(history, settings.after, "`after`")
-    fits = Fits() if fits is None else fits
-    seen = seen_flight(history, td, fits)
+    seen = seen_flight(history, td)
     flying = None if seen.refusal else seen.flight
     # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
     at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
+    fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits)
     flight = find_flight(history, td, settings.after, seen, span)
     given = settings.oscillator is not None
@@ -55,7 +55,7 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
         # without a sign of the next contact nothing is known of what comes after td
         end = flight.end or (float(history.time[-1]) if flying or span else td)
         start = min(td, float(history.time[0]) if flight.start is None else flight.start)
-        evidence = _with_parts(evidence, history, td, Span(start, end))
+        evidence = _with_parts(evidence, history, td, Span(start, end), fits)
     return Situation(history, td, settings, flight, evidence, fits)
 
 
@@ -94,7 +94,7 @@ def _resolved(history: History, fit: Identification, fits: Fits) -> Identificati
     return fits.once(("resolved", fit.start, fit.end, fit.rms), lambda: resolved(*window, fit))
 
 
-def _with_parts(evidence: Evidence, history: History, td: float, within: Span) -> Evidence:
+def _with_parts(evidence: Evidence, history: History, td: float, within: Span, fits: Fits) -> Evidence:
     """Add what the energies of single parts tell of the flight."""
     from d2rpick.vibration.envelope import upper_envelope
     from d2rpick.vibration.part_signs import PartVibration, read_parts
@@ -103,7 +103,8 @@ def _with_parts(evidence: Evidence, history: History, td: float, within: Span) -
     time, energy = history.between(*within)
     if time.size < 3:
         return evidence
-    parts = read_parts(time, history.part_energies[window(history.time, *within)], history.part_names)
+    energies = history.part_energies[window(history.time, *within)]
+    parts = fits.once(("parts", *within), lambda: read_parts(time, energies, history.part_names))
     whole = energy_at(history, td, evidence).mode or upper_envelope(time, energy)
     return evidence._replace(parts=parts, signed=PartVibration(parts, whole) if parts.signed and whole else None)
 

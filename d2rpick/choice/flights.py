@@ -8,6 +8,7 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.flight.flight import Flight, all_seen
 from d2rpick.flight.window import moments
+from d2rpick.vibration.fits import Fits
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 _PLAIN = Settings()
 
 
-def find_flights(history: History, settings: Settings = _PLAIN) -> tuple[Flight, ...]:
+def find_flights(history: History, settings: Settings = _PLAIN, fits: Fits | None = None) -> tuple[Flight, ...]:
     """Find every flight of a record, ascending in time.
 
     Parameters
@@ -24,6 +25,8 @@ def find_flights(history: History, settings: Settings = _PLAIN) -> tuple[Flight,
         With its evidence, as a run gives it.
     settings : Settings, optional
         How an oscillator is looked for where no better evidence shows a flight.
+    fits : Fits, optional
+        Those of an earlier look at the record; none of its windows is fitted twice.
 
     Returns
     -------
@@ -41,10 +44,11 @@ def find_flights(history: History, settings: Settings = _PLAIN) -> tuple[Flight,
             Flight(one.start, one.end if one.end_seen else None, source, one.parts, one.damping) for source, one in seen
         )
     found: list[Flight] = []
+    fits = Fits() if fits is None else fits
     for td in sorted(moments(history.time), reverse=True):  # the last quiet time before td tells most of the flight
         if found and found[-1].start is not None and td > found[-1].start:
             continue
-        situation = examine(history, td, settings)
+        situation = examine(history, td, settings, fits)
         flight = situation.flight
         if situation.in_flight and not flight.refusal and not (found and _overlap(flight, found[-1])):
             found.append(flight)

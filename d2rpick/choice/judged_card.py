@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.choice.plan import Plan
+    from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.verify import Verdict
     from d2rpick.deck.printing.common import PrintedCard, Times
@@ -39,6 +40,11 @@ class CardRequest:
         end = float(history.time[-1]) if self.printing.end is None else self.printing.end
         return self.solver or solver_of(history.format), replace(self.printing, part=ids, end=end)
 
+    def by(self, settings: Settings) -> CardRequest:
+        """Let the parts of each rigid body that a deck tells be merged."""
+        bodies = tuple(body.parts for body in settings.bodies or ())
+        return replace(self, printing=replace(self.printing, bodies=bodies))
+
 
 class SolverInput(NamedTuple):
     """Solver input for a pair of times: its ``text``, or ``refusal``, why it cannot be printed.
@@ -59,7 +65,7 @@ def input_for(situation: Situation, tr: float, request: CardRequest) -> SolverIn
         return verify_at(situation.at(late), early)
 
     try:
-        found = judged_card([(tr, situation.td)], situation.history, judge, request)
+        found = judged_card([(tr, situation.td)], situation.history, judge, request.by(situation.settings))
     except D2RPickError as error:
         return SolverInput(solver, refusal=str(error))
     return SolverInput(solver, found[0].text if found else None)
@@ -93,7 +99,7 @@ def card_of_plan(
     """Print the card of the run that a plan leads to, its new windows judged; None also where none is new."""
     new = plan.windows(every=every)
     judge = partial(verify_of, Reference(run, plan.history), settings=plan.settings)
-    return judged_card(new, plan.history, judge, request, plan.done) if new else None
+    return judged_card(new, plan.history, judge, request.by(plan.settings), plan.done) if new else None
 
 
 def _of_done(done: Sequence[Times], history: History) -> Iterator[str]:
@@ -112,7 +118,9 @@ def _remarks(verdicts: Sequence[Verdict]) -> Iterator[str]:
 
 def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
     candidate, history = verdict.candidate, verdict.situation.history
-    result = "verified" if verdict.verified else f"NOT verified ({'; '.join(verdict.reasons)})"
+    poor = verdict.quality is not None and verdict.quality.grade == "poor"
+    held = "verified, but of poor quality" if poor else "verified"
+    result = held if verdict.verified else f"NOT verified ({'; '.join(verdict.reasons)})"
     yield f"Judged by {', '.join(history.source)}, {history.channel}:{which} {result}."
     measures = [
         f"{name} {value:.3f}"

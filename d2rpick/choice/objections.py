@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.moments import Measured
+    from d2rpick.vibration.measures import Measured
 
 
 class Objection(NamedTuple):

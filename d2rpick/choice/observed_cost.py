@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.choice.calibrate import Observation
+from d2rpick.choice.warnings import Caution
 from d2rpick.deck import find_windows, read_deck, read_parts, read_switching
 from d2rpick.deck.folder import main_decks
 from d2rpick.deck.inventory import ls_dyna, radioss
@@ -32,6 +34,32 @@ class _Rigid(NamedTuple):
     part: int
     tr: float
     td: float
+
+
+def observations_of_runs(folders: Sequence[str]) -> tuple[tuple[Observation, ...], tuple[Caution, ...]]:
+    """Read what the legs of several runs took; a file of the same content, in a folder named twice or a copy, once.
+
+    Raises
+    ------
+    DeckError, FormatError
+        As `observations_of`.
+    """
+    found: dict[str, tuple[Observation, ...]] = {}
+    cautions = []
+    for folder in folders:
+        by_file: dict[str, list[Observation]] = {}
+        for one in observations_of(folder):
+            by_file.setdefault(one.name, []).append(one)
+        for name, legs in by_file.items():
+            with Path(name).open("rb") as stream:
+                content = hashlib.file_digest(stream, "sha256").hexdigest()
+            if content in found:
+                same = found[content][0].name
+                what = "is given twice" if Path(same).samefile(name) else f"has the content of {same}"
+                cautions.append(Caution("same-leg-twice", f"{name} {what}; it counts once"))
+            else:
+                found[content] = tuple(legs)
+    return tuple(one for legs in found.values() for one in legs), tuple(dict.fromkeys(cautions))
 
 
 def observations_of(folder: str) -> tuple[Observation, ...]:

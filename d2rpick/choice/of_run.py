@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from d2rpick.choice.examine import examine
 from d2rpick.choice.suggest import Suggestion, suggest_at
 from d2rpick.choice.verify import Verdict, verify, with_comparison
-from d2rpick.flight.flying_parts import with_parts_by_number
 from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.opening import Selection, open_run
 
@@ -36,7 +35,11 @@ class Reference(NamedTuple):
     @classmethod
     def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read what is selected of a run that is open; FormatError when it is not there."""
-        return cls(run, run.history(with_parts_by_number(run, selection) if selection.parts else selection))
+        if selection.parts:
+            from d2rpick.flight.flying_parts import with_parts_by_number  # not above: a table has no parts
+
+            selection = with_parts_by_number(run, selection)
+        return cls(run, run.history(selection))
 
     def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read of another run of the model the parts that this one has, whatever words they were asked for by."""
@@ -60,11 +63,12 @@ def suggest_of(
     *,
     with_better: bool = True,
     fits: Fits | None = None,
+    since: float | None = None,
 ) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window (low, high) or, for None, in the longest flight [time].
 
     ``with_better`` False: for a given td no better one is looked for.  ``fits`` are those of an earlier look at the
-    record with the same settings.
+    record with the same settings.  ``since``: for a td in a window no flight is taken to begin before that [time].
 
     Raises
     ------
@@ -78,7 +82,7 @@ def suggest_of(
     if isinstance(td, tuple):
         from d2rpick.choice.suggest_td import suggest_in_window
 
-        return _with_health(suggest_in_window(reference.history, td, settings, fits), reference.run)
+        return _with_health(suggest_in_window(reference.history, td, settings, fits, since), reference.run)
     answer = suggest_at(examine(reference.history, td, settings, fits), with_better=with_better)
     return _with_health(answer, reference.run)
 

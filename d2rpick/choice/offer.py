@@ -53,6 +53,12 @@ class Offer:
         """How long the parts are rigid [time]."""
         return self.best.rigid_time if self.best else None
 
+    @property
+    def saving(self) -> float | None:
+        """Share of the run time that is saved [-]; None where the cost of the parts is not known."""
+        share = self.best.run_time_share if self.best else None
+        return None if share is None else 1 - share
+
 
 def offers_of(situations: Sequence[Situation], peaks: Container[float]) -> Iterator[Offer]:
     """Give what ``suggest`` says of each td; ``peaks`` are the times where the energy peaks."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-import numpy as np
-
+from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share
+from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
 from d2rpick.choice.part_facts import facts_of
 from d2rpick.choice.part_steps import steps_of
 from d2rpick.choice.part_verdicts import rows_of
-from d2rpick.choice.same_model import doubts_of
-from d2rpick.choice.warnings import Caution
+from d2rpick.choice.rigid_bodies import bodies_of
+from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.errors import FormatError, RangeError
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.measures import run_time_share
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 _LIKE: Final = 0.01
 # The heaviest parts that together have this share of the mass of all that may be switched.
 _HEAVY: Final = 0.5
-SEVERAL_BODIES: Final = "several rigid bodies: how far each is out of place is not predicted"
 _NO_ANGLE: Final = "no file of a run tells how its parts turn; the angle error is not known"
 
 
@@ -64,6 +63,8 @@ class PartSet:
     position_error: float | None = None
     position_limit: float | None = None
     position_part: Part | None = None
+    position_body: tuple[int, ...] | None = None
+    position_assumes: str | None = None
     angle_error: float | None = None
     reasons: tuple[str, ...] = ()
     recommended: bool = False
@@ -151,7 +152,8 @@ def recommended_parts(run: Run, settings: Settings, model: CostModel) -> tuple[i
     """Give the parts of the recommended set; FormatError where none can be recommended."""
     found = parts_of(run, settings, model)
     if found.recommended is None:
-        why = "; ".join(dict.fromkeys(reason for one in found.sets for reason in one.reasons))
+        absent = [one.message for one in found.cautions if one.code in ("no-part-history", "parts-not-in-deck")]
+        why = "; ".join(dict.fromkeys([*absent, *(reason for one in found.sets for reason in one.reasons)]))
         raise FormatError(
             f"{run.name}: no set of parts can be recommended ({why or 'no part may be switched'}); name the parts"
         )
@@ -247,7 +249,8 @@ class _Comparison:
     def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
         """Find when the set may be rigid; RangeError with the reason where it may not."""
         reference = Reference.of(self.run, Selection(parts=tuple(map(str, one.parts))))
-        settings = replace(self.settings, one_body=len(one.bodies) <= 1)
+        told = bodies_of(self.model.inventory, one.parts) if self.model else None
+        settings = replace(self.settings, bodies=told)
         if isinstance(times, tuple):
             situation = verify_of(reference, *times, settings).situation
             tr, td = times
@@ -263,13 +266,20 @@ class _Comparison:
 
 
 def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
-    """Add how far the body is out of place at td since its parts moved against each other before."""
-    if len(one.bodies) > 1:
-        return replace(one, reasons=(SEVERAL_BODIES,))
-    drift, error = situation.drift, float(situation.position_errors(np.array([tr]))[0])
-    if drift is None or np.isnan(error):
-        return one
-    return replace(one, position_error=error, position_limit=drift.limit, position_part=drift.part)
+    """Add how far the body that is off most is out of place at td since its parts moved against each other before."""
+    why = tuple(caution.message for caution in out_of_place(situation, tr) if caution.code == "several-bodies")
+    bodies = situation.bodies
+    worst = bodies.worst(tr, situation.td) if bodies else None
+    if bodies is None or worst is None:
+        return replace(one, reasons=why)
+    return replace(
+        one,
+        position_error=worst.error,
+        position_limit=bodies.limit if worst.part else None,
+        position_part=worst.drift.part if worst.part else None,
+        position_body=worst.body.parts if worst.body and worst.part else None,
+        position_assumes=ONE_BODY if worst.assumed else None,
+    )
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
@@ -295,13 +305,8 @@ def _cautions(
         yield Caution("no-deck", "without a deck the cost and most verdicts stay open; name the main deck of the run")
         return
     yield from doubts_of((fact.part for fact in facts.parts.values()), model.inventory)
-    for note in model.inventory.notes:
-        yield Caution("deck-not-followed", note)
-    if model.assumed:
-        yield Caution(
-            "weights-by-analogy",
-            f"the cost of {', '.join(model.assumed)} was not measured; that of a formulation alike was taken",
-        )
+    yield from doubts_of_bodies([row.id for row in rows if row.movable], model.inventory)
+    yield from doubts_of_cost(model)
     if missing := [row.id for row in rows if row.elements is None and row.id in facts.parts]:
         yield Caution("parts-not-in-deck", f"part {', '.join(map(str, missing))} of the history is not in the deck")
     if not any(row.movable for row in rows):

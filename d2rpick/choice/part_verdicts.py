@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck.inventory.model import DISCRETE
+from d2rpick.deck.inventory.model import DISCRETE, some_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -123,7 +123,15 @@ def _judged(row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: i
     open_ = tuple(_not_known(row, facts, inventory, data))
     if open_:
         return replace(row, verdict=UNKNOWN, reasons=open_)
-    return replace(row, verdict=SWITCH, reasons=tuple(_to_switch(row, fact, data)))
+    return replace(row, verdict=SWITCH, reasons=(*_to_switch(row, fact, data), *_joined(row, inventory)))
+
+
+def _joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
+    """Parts to which welds and ties hold a part, which are off while it is rigid."""
+    others = inventory.joined.get(row.id, {}) if inventory else {}
+    if others:
+        kinds = ", ".join(sorted(frozenset[str]().union(*others.values())))
+        yield f"joined to part {some_of(sorted(others))} ({kinds})"
 
 
 def _to_keep(row: PartRow, fact: PartFacts | None, data: PartData | None, alone: int | None) -> Iterator[str]:
@@ -196,7 +204,7 @@ def landing_alone(rows: Sequence[PartRow]) -> int | None:
 
 
 def _merged(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
-    """Let parts that share nodes be one rigid body: the first by number leads, the others merge with it."""
+    """Let parts that share nodes or are joined be one rigid body: the first by number leads, others merge with it."""
     bodies = inventory.groups([row.id for row in rows if row.verdict == SWITCH])
     lead = {part: body[0] for body in bodies for part in body[1:]}
     for row in rows:

@@ -4,6 +4,8 @@ A window in which nothing vibrates locks in nothing and leaves all landings wher
 moves the next landing by a little, for which the margin is kept, and those after it by more than any margin.  So one
 reference supports every window up to and with the first that locks in energy; the next ones are planned from the run
 that was switched so (THEORY.md section 12).
+
+Each window that locks in energy costs a run of its own, so a short one is left out for a longer one behind it.
 """
 
 from __future__ import annotations
@@ -19,10 +21,11 @@ from d2rpick.choice.suggest_td import bounds, flights_of
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.energy_alone import round_off
+from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.settings import Settings
@@ -33,6 +36,10 @@ if TYPE_CHECKING:
 
 # A rigid window shorter than this share of the record saves less than a restart costs.
 MIN_RIGID: Final = 0.05
+# A window is left out for one behind it that is rigid for more than so many times as long.  With w rigid in the first
+# and W in the other, one after the other saves w in the next run and w + W in that after it; the other alone saves W in
+# both, which is more from W = 2 w on.
+_LONGER: Final = 2.0
 
 
 @dataclass(frozen=True)
@@ -152,7 +159,8 @@ def plan_of(
     settings : Settings
         As for ``suggest``.  ``after`` counts in the flight that it lies in; what flies before is left out.
     min_rigid : float, optional
-        Shorter windows are left out [time].  Default: 5 % of the record.
+        Shorter windows are left out [time].  Default: 5 % of the record; then too a window that locks in energy is left
+        out for one behind it that is rigid for more than twice as long.
     done : sequence of (float, float)
         Windows in which the run was switched, in order [time].
     before : Reference, optional
@@ -172,15 +180,24 @@ def plan_of(
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
     history, found, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
-    flights = flights_of(history, settings)
+    fits = Fits()
+    flights = flights_of(history, settings, fits)
     earlier = before and flights_of(switched_history(before, ())[0], settings)  # it may have been switched itself
     known = done_windows(history, flights, found, earlier)
-    rows = tuple(_with_status(list(_rows(reference, flights, settings, shortest, known)), known))
+    judged: Iterable[Planned] = _rows(reference, flights, settings, shortest, known, fits)
+    if min_rigid is None:
+        judged = _without_short(list(judged))
+    rows = tuple(_with_status(list(judged), known))
     return Plan(history, settings, shortest, rows, (*cautions, *_cautions(rows, known)), found)
 
 
 def _rows(
-    reference: Reference, flights: Sequence[Flight], settings: Settings, shortest: float, known: Sequence[Done]
+    reference: Reference,
+    flights: Sequence[Flight],
+    settings: Settings,
+    shortest: float,
+    known: Sequence[Done],
+    fits: Fits,
 ) -> Iterator[Planned]:
     """Give every flight with its window, as if each were the first."""
     last = max((one.td for one in known), default=None)
@@ -199,13 +216,15 @@ def _rows(
         elif end - margin.time - start < shortest:
             yield replace(row, reason=_too_short(end - margin.time - start, shortest, margin))
         else:
-            yield _asked(reference, row, settings, shortest)
+            yield _asked(reference, row, settings, shortest, fits)
 
 
-def _asked(reference: Reference, row: Planned, settings: Settings, shortest: float) -> Planned:
+def _asked(reference: Reference, row: Planned, settings: Settings, shortest: float, fits: Fits) -> Planned:
     """Ask ``suggest`` for the window of a flight."""
     own = settings.after is not None and row.start <= settings.after <= row.end
-    answer = suggest_of(reference, (row.start, row.end), settings if own else replace(settings, after=None))
+    asked = settings if own else replace(settings, after=None)
+    # the energy alone shows another beginning to each td, and that of an earlier td may lie before this flight
+    answer = suggest_of(reference, (row.start, row.end), asked, since=row.start, fits=fits)
     row = replace(row, answer=answer)
     if answer.recommended is None:
         why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
@@ -218,6 +237,21 @@ def _asked(reference: Reference, row: Planned, settings: Settings, shortest: flo
 def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
     kept = f", with the margin {margin.time:.3g} before the contact" if margin.time else ""
     return f"too short: rigid for {max(rigid, 0.0):.3g}{kept}, at least {shortest:.3g} was asked for"
+
+
+def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
+    """Leave a window that locks in energy out for a much longer one behind it: a run supports only one of them."""
+    for at, row in enumerate(rows):
+        rigid = row.rigid_time or 0.0
+        behind = max(rows[at + 1 :], key=lambda one: one.rigid_time or 0.0, default=row)
+        if row.status != "supported" or not row.locks_in or not (behind.rigid_time or 0.0) > _LONGER * rigid:
+            yield row
+            continue
+        tr, td = row.window or (0.0, 0.0)
+        own = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, flight {behind.number} for {behind.rigid_time:.3g}"
+        why = f"{own}: a run supports only one window that locks in energy"
+        cure = f"with `min_rigid` below {rigid:.6g} this one comes first"
+        yield replace(row, status="left-out", reason=f"{why}; {cure}, and the other waits for the run switched so")
 
 
 def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Planned]:

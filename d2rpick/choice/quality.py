@@ -30,6 +30,11 @@ class Quality(NamedTuple):
     grade: str
     reasons: tuple[str, ...] = ()
 
+    @property
+    def told(self) -> str:
+        """The grade, and why it is none better."""
+        return f"{self.grade}{': ' * bool(self.reasons)}{'; '.join(self.reasons)}"
+
 
 def quality_of(situation: Situation, best: Candidate, expected: Expectation | None) -> Quality:
     """Grade the recommended tr of a td.

@@ -7,6 +7,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from d2rpick.flight.bodies import RigidBody
     from d2rpick.vibration.one_mode import Mode
 
 # What an argument may be.  A tolerance of 1 accepts a tr that locks in nothing at all.
@@ -16,7 +17,7 @@ _RANGES = (
     ("max_kinetic_share", 0.0, inf),
     ("max_residual", 0.0, inf),
     ("cost_share", 0.0, 1.0),
-    ("step_ratio", 0.0, inf),
+    ("step_ratio", 1.0, inf),
 )
 
 
@@ -32,7 +33,8 @@ class Settings:
     the energy level alone.  ``strict``: accept no tr of a flight that is not certain.
     ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the step while rigid to that
     while deformable; without the first nothing is said of the run time.
-    ``one_body`` False: the parts become several rigid bodies, and none of them is predicted to be out of place.
+    ``bodies``: what the parts become while they are rigid, by a deck; None without one, empty where it does not tell.
+    Then one body is assumed.
     """
 
     after: float | None = None
@@ -46,7 +48,7 @@ class Settings:
     strict: bool = False
     cost_share: float | None = None
     step_ratio: float = 1.0
-    one_body: bool = True
+    bodies: tuple[RigidBody, ...] | None = None
 
     def __post_init__(self) -> None:
         """Raise ValueError with the name of an argument that is out of its range."""

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.choice.settings import Settings
+    from d2rpick.flight.bodies import Bodies
     from d2rpick.flight.flight import Flight
-    from d2rpick.flight.position_error import Drift
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.model import Vibration
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Situation:
     """A history seen from one td [time].
 
@@ -34,7 +34,7 @@ class Situation:
     settings: Settings
     flight: Flight
     evidence: Evidence
-    fits: Fits = field(default_factory=Fits, compare=False, repr=False)
+    fits: Fits = field(default_factory=Fits)
 
     @cached_property
     def vibration(self) -> Vibration:
@@ -76,18 +76,18 @@ class Situation:
         return nothing_vibrates(self.history, start, self.td, self.settings.tolerance, deformed=deformed)
 
     @cached_property
-    def drift(self) -> Drift | None:
-        """How the body that the parts to be switched become drifts in the flight; None where that is not known."""
-        if self.flight.parts is None or not self.settings.one_body:
+    def bodies(self) -> Bodies | None:
+        """How the bodies that the parts to be switched become drift in the flight; None where no parts show it."""
+        if self.flight.parts is None:
             return None
-        from d2rpick.flight.position_error import drift_in_flight  # not above: a table has no parts
+        from d2rpick.flight.bodies import bodies_in_flight  # not above: a table has no parts
 
-        return self.fits.once(("drift", *self.flight[:2]), lambda: drift_in_flight(self.history, self.flight))
+        told = self.settings.bodies
+        return self.fits.once(("drift", *self.flight[:2]), lambda: bodies_in_flight(self.history, self.flight, told))
 
     def position_errors(self, times: Samples) -> Samples:
-        """How far the body is out of place at td when it is frozen at each of ``times`` [length]; NaN where unknown."""
-        drift = self.drift
-        return np.full(times.shape, np.nan) if drift is None else drift.errors(times, self.td)
+        """How far a body is out of place at td when it is frozen at each of ``times`` [length]; NaN where unknown."""
+        return np.full(times.shape, np.nan) if self.bodies is None else self.bodies.errors(times, self.td)
 
     def errors(self, times: Samples) -> Samples:
         """What a tolerance is held against, of the shape of ``times`` [-]: at rest nothing, else the vibration's."""

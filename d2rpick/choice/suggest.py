@@ -125,7 +125,7 @@ def suggest_at(situation: Situation, *, with_better: bool = True, found: Candida
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
     if best:
-        cautions += out_of_place(situation, best.position_error)
+        cautions += out_of_place(situation, best.tr)
     else:
         cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
     if with_better and not better:

@@ -51,9 +51,16 @@ def suggest_in_longest_flight(history: History, settings: Settings) -> Suggestio
     return suggest_in_window(history, longest_flight(history, settings, fits), settings, fits)
 
 
-def longest_flight(history: History, settings: Settings, fits: Fits | None = None) -> tuple[float, float]:
-    """Give the longest flight as a window within the record [time]; RangeError where nothing shows a flight."""
+def longest_flight(
+    history: History, settings: Settings, fits: Fits | None = None, *, otherwise: tuple[float, float] | None = None
+) -> tuple[float, float]:
+    """Give the longest flight as a window within the record [time].
+
+    ``otherwise`` is given where nothing shows a flight; without it that is a RangeError.
+    """
     flights = flights_of(history, settings, fits)
+    if not flights and otherwise:
+        return otherwise
     if not flights:
         found = f"{', '.join(history.source)}: nothing in the record shows a flight"
         raise RangeError(f"{found}; name td, or a window for it")
@@ -63,7 +70,7 @@ def longest_flight(history: History, settings: Settings, fits: Fits | None = Non
 def flights_of(history: History, settings: Settings, fits: Fits | None = None) -> tuple[Flight, ...]:
     """Find all flights; where the energy is all there is, one oscillator for the whole record, else none is sought."""
     if any(True for _ in witnesses(history)) or not settings.replay:
-        return find_flights(history, settings)
+        return find_flights(history, settings, fits)
     middle = examine(history, float(history.time[0] + history.time[-1]) / 2, settings, fits)
     if middle.flight.source == "oscillator":
         return (middle.flight,)
@@ -77,16 +84,20 @@ def bounds(history: History, flight: Flight) -> tuple[float, float]:
 
 
 def suggest_in_window(
-    history: History, window: tuple[float, float], settings: Settings, fits: Fits | None = None
+    history: History,
+    window: tuple[float, float],
+    settings: Settings,
+    fits: Fits | None = None,
+    since: float | None = None,
 ) -> Suggestion:
-    """Choose td in ``window`` and tr for it; RangeError when the window lies outside the record.
+    """Choose td in ``window`` and tr for it, not before ``since``; RangeError when the window lies outside the record.
 
     Of the pairs of all peaks of the energy those that are alike in quality count, and of these the one with the
     longest rigid window wins.  Where deformations are known, a residual within 0.02 of the smallest is alike; on the
     energy alone, a level within the tolerance of the best one, which is twice the mean energy.  td keeps the margin
     from the contact, unless the whole window lies in it.  Without an acceptable peak the ends of the window are tried.
     """
-    look = looking(history, settings, fits)
+    look = looking(history, settings, fits, since)
     situation, inside = within_flight(look, history, window)
     choose = _by_level if situation.vibration.unknown else _by_residual
     chosen, longest = choose(situation, inside, look)
@@ -94,9 +105,21 @@ def suggest_in_window(
     return found._replace(td_window=window, longer=_given_up(longest, found.recommended, inside, look))
 
 
-def looking(history: History, settings: Settings, fits: Fits | None = None) -> Look:
-    """Give what examines a record once for each td, by ``fits`` of an earlier look with the same settings."""
-    return cache(partial(examine, history, settings=settings, fits=fits or Fits()))
+def looking(history: History, settings: Settings, fits: Fits | None = None, since: float | None = None) -> Look:
+    """Give what examines a record once for each td, by ``fits`` of an earlier look with the same settings.
+
+    No flight is taken to begin before ``since`` [time].
+    """
+    look = partial(examine, history, settings=settings, fits=fits or Fits())
+    return cache(look if since is None else lambda td: _beginning(look(td), since))
+
+
+def _beginning(situation: Situation, since: float) -> Situation:
+    """Give the same with a flight that does not begin before ``since`` [time]."""
+    flight = situation.flight
+    if flight.start is None or flight.start >= since:
+        return situation
+    return replace(situation, flight=flight._replace(start=since))
 
 
 def within_flight(look: Look, history: History, window: tuple[float, float]) -> tuple[Situation, tuple[float, float]]:
@@ -105,7 +128,7 @@ def within_flight(look: Look, history: History, window: tuple[float, float]) -> 
     RangeError when the window lies outside the record.
     """
     for time in window:
-        history.energy_at(time, "td_window")
+        history.energy_at(time, "td_window", window)
     situation = _flying(look, window)
     return situation, (window[0], _latest(situation, window))
 

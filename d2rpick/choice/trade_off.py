@@ -68,7 +68,7 @@ def explore_of(
     reference : Reference
     settings : Settings
     td_window : (float, float), optional
-        Where td is looked for [time].  Default: the longest flight.
+        Where td is looked for [time].  Default: the longest flight; where none is seen but td is asked for, the record.
     td : float, optional
         Offered too, and what others are compared with [time].
     steps : int
@@ -78,11 +78,11 @@ def explore_of(
     Raises
     ------
     RangeError
-        If td or the window lies outside the record, or no flight is seen.
+        If td or the window lies outside the record, or no flight is seen and neither is given.
     """
-    history = reference.history
-    fits = Fits()
-    window = longest_flight(history, settings, fits) if td_window is None else td_window
+    history, fits = reference.history, Fits()
+    record = float(history.time[0]), float(history.time[-1])
+    window = td_window or longest_flight(history, settings, fits, otherwise=None if td is None else record)
     look = looking(history, settings, fits)
     situation, inside = within_flight(look, history, window)
     suggestion = suggest_of(reference, window, settings, fits=fits)

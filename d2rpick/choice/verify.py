@@ -75,7 +75,7 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
         td_ok=td_ok,
         verified=keeps(situation, candidate),
         reasons=reasons,
-        cautions=(*cautions_of(situation), *out_of_place(situation, candidate.position_error)),
+        cautions=(*cautions_of(situation), *out_of_place(situation, tr)),
     )
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.situation import Situation
+    from d2rpick.flight.bodies import RigidBody
     from d2rpick.flight.flight import Flight
 
 # Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.
@@ -79,15 +80,36 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
         yield Caution("td-after-contact", f"td = {td:.6g} lies after {end_of_flight(situation)}")
 
 
-def out_of_place(situation: Situation, error: float | None) -> Iterator[Caution]:
-    """Say so where a part that is frozen elsewhere puts the body off at td by ``error`` [length], too much."""
-    drift = situation.drift
-    if drift is None or error is None or error <= drift.limit:
+def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
+    """Say so where a part that is frozen at ``tr`` puts a body off at td too much, and where that is not known."""
+    bodies = situation.bodies
+    if bodies is None:
         return
-    share, last = error / float(drift.path[-1]), float(drift.time[-1] - drift.time[0])
+    if len(bodies.told) > 1 and bodies.unknown:
+        yield Caution("several-bodies", _not_predicted(bodies.told, bodies.unknown))
+    worst = bodies.worst(tr, situation.td)
+    if worst is None or worst.error <= bodies.limit:
+        return
+    drift, which = worst.drift, f" of {_named(worst.body)}" if worst.body else ""
+    share, last = worst.error / float(drift.path[-1]), float(drift.time[-1] - drift.time[0])
     found = f"{drift.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
-    off = f"there the body is off by {error:.3g}, {share:.1%} of its path in the flight"
-    yield Caution("out-of-place", f"{found}: {off}; the next contact may move by {share * last:.2g}")
+    off = f"there the body{which} is off by {worst.error:.3g}, {share:.1%} of its path in the flight"
+    taken = "; this holds if the parts become one rigid body" if worst.assumed else ""
+    taken += ", which `deck` tells" if worst.assumed and situation.settings.bodies is None else ""
+    yield Caution("out-of-place", f"{found}: {off}; the next contact may move by {share * last:.2g}{taken}")
+
+
+def _not_predicted(told: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> str:
+    """Name the first body whose error is not known, and why."""
+    first, more = unknown[0], f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
+    why = "" if first.whole else "; its pieces do not hang together"
+    return f"{len(told)} rigid bodies: how far that of {_named(first)}{more} is out of place is not predicted{why}"
+
+
+def _named(body: RigidBody) -> str:
+    from d2rpick.deck.inventory.model import some_of  # not above: without a deck no body has a name
+
+    return f"part {some_of(body.parts)}"
 
 
 def end_of_load(situation: Situation) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import click
@@ -33,11 +34,13 @@ def command(
 
     Each RUN is the folder of one run, with its deck and what its solver printed: listings of Radioss (NAME_0001.out,
     with /MON/ON), d3hsp or glstat of LS-DYNA.  Give runs with and without switching of the same model: what they do
-    not tell apart keeps the ratio that was measured.
+    not tell apart keeps the ratio that was measured.  A run that is named twice counts once.
     """
     from d2rpick.choice.calibrate import calibrate
-    from d2rpick.choice.observed_cost import observations_of
+    from d2rpick.choice.observed_cost import observations_of_runs
 
     output = Output.of(options)
-    found = calibrate([one for folder in folders for one in observations_of(folder)])
+    observations, cautions = observations_of_runs(folders)
+    found = replace(calibrate(observations), cautions=cautions)
+    output.notes((), found.cautions)
     output.result(write("calibration", output_format, found, Shown(ctx.meta["d2rpick.command"])))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -46,6 +47,8 @@ def with_deck(run: Run, options: dict[str, Any], settings: Settings, model: Cost
 
     The energy of springs is no level: they are the parts that the deck, or their energies, show to be springs.
     """
+    if model is None and not options["part"]:
+        return options
     from d2rpick.flight.flying_parts import asks_for_recommended
 
     if asks_for_recommended(options["part"], run):
@@ -62,10 +65,17 @@ def with_deck(run: Run, options: dict[str, Any], settings: Settings, model: Cost
     return {**options, "part": found.parts, "springs": found.springs}
 
 
-def with_cost(settings: Settings, history: History, model: CostModel | None) -> tuple[Settings, tuple[Caution, ...]]:
-    """Let a deck tell what the parts of a history cost, and whether they are one body."""
-    if model is None:
-        return settings, ()
-    from d2rpick.choice import by_deck
+def with_cost(
+    settings: Settings, history: History, model: CostModel | None, merge: int | None
+) -> tuple[Settings, tuple[Caution, ...]]:
+    """Let a deck tell what the parts of a history cost, and which bodies they become; all one where ``--merge`` is."""
+    cautions: tuple[Caution, ...] = ()
+    if model is not None:
+        from d2rpick.choice import by_deck
 
-    return by_deck.with_deck(settings, history, model)
+        settings, cautions = by_deck.with_deck(settings, history, model)
+    if merge is not None and history.parts:
+        from d2rpick.flight.bodies import RigidBody
+
+        settings = replace(settings, bodies=(RigidBody(tuple(part.id for part in history.parts)),))
+    return settings, cautions

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from d2rpick.cli import deck_cost, typed
 from d2rpick.cli import options as shared
-from d2rpick.cli import typed
 from d2rpick.cli.card_options import card_options, card_request, energy_of, prints_card
 from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
@@ -24,6 +24,7 @@ Examples:
   d2rpick explore --td-window 0.06 0.07 sample_data/energy.csv
   d2rpick explore --td 0.064 --td-window 0.06 0.07 sample_data/energy.csv
   d2rpick explore --part box -f csv sample_data/rollover_box.matsum
+  d2rpick explore --part recommended --deck sample_data/rollover_box.k sample_data/rollover_box.matsum
   d2rpick explore --part box --plot explore.png --report explore.html sample_data/rollover_box.matsum
 """
 
@@ -42,6 +43,7 @@ Examples:
     "--limit", type=click.IntRange(min=1), default=10, show_default=True,
     help="Number of rows in the table, of the pairs that nothing beats; json and csv have all.",
 )  # fmt: skip
+@deck_cost.cost_options
 @shared.history_options
 @shared.choosing_options
 @card_options
@@ -76,8 +78,12 @@ def command(
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
         output = Output.of(options, *run.sources)
+        model = deck_cost.model_of(options)
+        options = deck_cost.with_deck(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model, options["merge"])
     found = explore_of(reference, settings, td_window, td=td, steps=steps)
+    found = found._replace(cautions=(*found.cautions, *unknown))
     output.notes(reference.history.notes, found.cautions)
     if extras.plot:
         from d2rpick.report import figures

@@ -6,23 +6,42 @@ from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
+from click.core import ParameterSource
 
 from d2rpick.cli import values
 from d2rpick.cli.typed import JUDGING, dashed, judging
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from d2rpick.choice.quality import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.histories.opening import Run, Selection
+    from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.oscillator import Oscillator
 
 # Kinds of values, under the names by which commands ask for them.
 FILE, NAMES, PARTS = values.FILE, values.NAMES, values.PARTS
 TIME, POSITIVE, NOT_NEGATIVE, FRACTION = values.TIME, values.POSITIVE, values.NOT_NEGATIVE, values.FRACTION
+STEP_RATIO = values.AT_LEAST_ONE  # elements that are rigid no longer limit the step: it cannot become smaller
 FORMATS = values.FORMATS
 Decorated = Any  # a command function; click's decorators do not say more
+
+
+class Either(click.Option):
+    """An option that excludes others: what the environment says of it gives way to those on the command line."""
+
+    def __init__(self, *args: Any, instead_of: Sequence[str], **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.instead_of = instead_of
+
+    def consume_value(self, ctx: click.Context, opts: Any) -> tuple[Any, ParameterSource]:
+        """Find the value and its source; click has done so before for all that is on the command line."""
+        value, source = super().consume_value(ctx, opts)
+        typed = (ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE for name in self.instead_of)
+        if source is ParameterSource.ENVIRONMENT and any(typed):
+            return self.get_default(ctx), ParameterSource.DEFAULT
+        return value, source
 
 
 def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
@@ -53,7 +72,7 @@ _FORMAT = click.option(
 )  # fmt: skip
 _TIME = click.option("--time", metavar="NAME|NUMBER", help="Time column, by name, number or HDF5 path.")
 _ENERGY = click.option(
-    "--energy", metavar="NAME|NUMBER", multiple=True, type=NAMES,
+    "--energy", metavar="NAME|NUMBER", multiple=True, type=NAMES, cls=Either, instead_of=("part",),
     help="Energy column, label or HDF5 path; repeat it to add several.",
 )  # fmt: skip
 _CHANNEL = click.option(
@@ -76,7 +95,7 @@ def reading_options(function: Decorated) -> Decorated:
     return _stack(
         _FORMAT, _TIME, _ENERGY,
         click.option(
-            "--part", metavar="IDS", multiple=True, type=PARTS,
+            "--part", metavar="IDS", multiple=True, type=PARTS, cls=Either, instead_of=("energy",),
             help="Parts to switch: number (3,7), range (10-19), title, `flying` or `all`; energies are added.",
         ),
         _FLYING, _CHANNEL,
@@ -135,16 +154,20 @@ def file_options(function: Decorated) -> Decorated:
 def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
     """Parameters of the floating oscillator."""
     rest = "" if required else "; all else at rest"
+
+    def given(name: str, *instead_of: str, **kwargs: Any) -> Callable[[Decorated], Decorated]:
+        return click.option(name, cls=Either, instead_of=(*instead_of, "fit_window", "no_verify"), **kwargs)
+
     return _stack(
-        click.option("--stiffness", type=POSITIVE, required=required, help="Spring k."),
-        click.option("--mass", type=POSITIVE, required=required, help="Suspended mass M."),
-        click.option("--frame-mass", type=POSITIVE, help="Frame mass m (or give --beta)."),
-        click.option("--beta", type=POSITIVE, help="Mass ratio M/m (instead of --frame-mass)."),
-        click.option(
+        given("--stiffness", type=POSITIVE, required=required, help="Spring k."),
+        given("--mass", type=POSITIVE, required=required, help="Suspended mass M."),
+        given("--frame-mass", "beta", type=POSITIVE, help="Frame mass m (or give --beta)."),
+        given("--beta", "frame_mass", type=POSITIVE, help="Mass ratio M/m (instead of --frame-mass)."),
+        given(
             "--alpha", type=NOT_NEGATIVE, default=0.0 if required else None, show_default=required,
             help="Rate of damping proportional to mass.",
         ),
-        click.option("--v0", type=TIME, help=f"Velocity of the frame at time 0{rest}."),
+        given("--v0", "vz0", type=TIME, help=f"Velocity of the frame at time 0{rest}."),
     )  # fmt: skip
 
 
@@ -157,7 +180,8 @@ def choosing_options(function: Decorated) -> Decorated:
             help="Share of the cost of a time step spent on the elements of the switched parts; gives the run time.",
         ),
         click.option(
-            "--step-ratio", type=POSITIVE, metavar="N", help="Time step while rigid over that before.  [default: 1]",
+            "--step-ratio", type=STEP_RATIO, metavar="N",
+            help="Time step while rigid over that before, 1 or more.  [default: 1]",
         ),
         click.option("--plot", metavar="FILE", type=FILE, help="Draw energy and motion to FILE (png, svg, pdf)."),
         click.option(
@@ -177,8 +201,14 @@ def judging_options(function: Decorated) -> Decorated:
         ),
         click.option("--max-residual", type=NOT_NEGATIVE, metavar="R", help="Reject a pair with a larger residual."),
         oscillator_options(required=False),
-        click.option("--fit-window", type=(TIME, TIME), metavar="LO HI", help="Identify the oscillator only here."),
-        click.option("--no-verify", is_flag=True, help="Judge by the energy level alone, without an oscillator."),
+        click.option(
+            "--fit-window", type=(TIME, TIME), metavar="LO HI", cls=Either, instead_of=("stiffness", "no_verify"),
+            help="Identify the oscillator only here.",
+        ),
+        click.option(
+            "--no-verify", is_flag=True, cls=Either, instead_of=("stiffness", "fit_window"),
+            help="Judge by the energy level alone, without an oscillator.",
+        ),
         click.option(
             "--strict", is_flag=True, help="Recommend nothing where the energy alone shows when the load is over."
         ),
@@ -264,8 +294,6 @@ def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
 
 def oscillator(options: dict[str, Any]) -> Oscillator | None:
     """Build the oscillator that the options give, None when they give none; UsageError when they give half of one."""
-    from d2rpick.vibration.oscillator import Oscillator
-
     names = ("stiffness", "mass", "alpha", "v0")
     given = [name for name in (*names, "frame_mass", "beta") if options[name] is not None]
     if not given:
@@ -277,6 +305,8 @@ def oscillator(options: dict[str, Any]) -> Oscillator | None:
         )
     if (options["frame_mass"] is None) == (options["beta"] is None):
         raise click.UsageError("the oscillator needs either --frame-mass or --beta")
+    from d2rpick.vibration.oscillator import Oscillator
+
     mass, frame_mass = options["mass"], options["frame_mass"]
     return Oscillator(options["stiffness"], mass, frame_mass or mass / options["beta"], options["alpha"])
 
@@ -284,7 +314,6 @@ def oscillator(options: dict[str, Any]) -> Oscillator | None:
 def settings(options: dict[str, Any]) -> Settings:
     """Collect the options of ``choosing_options``; UsageError where they contradict each other."""
     from d2rpick.choice.settings import Settings
-    from d2rpick.vibration.replay import to_mode
 
     given, window = oscillator(options), options["fit_window"]
     ways = {"an oscillator": given, "--fit-window": window, "--no-verify": options["no_verify"]}
@@ -302,13 +331,19 @@ def settings(options: dict[str, Any]) -> Settings:
         tolerance=options["tolerance"],
         max_kinetic_share=options["max_kinetic_share"],
         max_residual=options["max_residual"],
-        oscillator=to_mode(given, options["v0"]) if given else None,
+        oscillator=_mode_of(given, options["v0"]) if given else None,
         fit_window=window,
         replay=not options["no_verify"],
         strict=options["strict"],
         cost_share=cost_share,
         step_ratio=step_ratio or 1.0,
     )
+
+
+def _mode_of(oscillator: Oscillator, v0: float) -> Mode:
+    from d2rpick.vibration.equivalent import to_mode  # not above: mostly none is given
+
+    return to_mode(oscillator, v0)
 
 
 def falls_short(quality: Quality | None, wanted: str | None) -> bool:

@@ -35,7 +35,9 @@ Examples:
 )  # fmt: skip
 @shared.history_options
 @shared.judging_options
-@click.option("--step-ratio", type=shared.POSITIVE, metavar="N", help="Time step while rigid over that before.")
+@click.option(
+    "--step-ratio", type=shared.STEP_RATIO, metavar="N", help="Time step while rigid over that before, 1 or more."
+)
 @click.option("--report", metavar="FILE", type=shared.FILE, help="Write everything to one HTML page to read and sign.")
 @shared.output_options(*FORMATS["parts"])
 @click.pass_context

@@ -12,6 +12,7 @@ from d2rpick.cli.card_options import all_cautions, card_options, card_request, e
 from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
+from d2rpick.cli.wording import in_words, with_options
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def command(
         model = deck_cost.model_of(options)
         options = deck_cost.with_deck(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
-        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model, options["merge"])
         earlier = reference.like(asked._replace(names=before).open(), asked.selection) if before else None
     windows = _windows(done) if done else ()
     plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
@@ -98,7 +99,7 @@ def command(
     if output_format == "card":
         passed = _card(plan, reference, options, output, every=every) and passed
         return finish(ctx, objection=not passed, exit_zero=exit_zero)
-    text = write("plan", output_format, plan, Shown(ctx.meta["d2rpick.command"], every=every))
+    text = in_words(write("plan", output_format, plan, Shown(ctx.meta["d2rpick.command"], every=every)), output_format)
     output.result(f"{text}\n\n{checked}" if checked and output_format == "table" else text)
     return finish(ctx, objection=not (plan.supported and passed), exit_zero=exit_zero)
 
@@ -137,7 +138,8 @@ def _beside(plan: Plan, reference: Reference, options: dict[str, Any], output: O
         found = _judged(plan, reference, options, every=False)
         card = found[0].text if found else None
         explorer = explorer_of(explored_flights(reference, plan))
-        output.write(options["report"], text_bytes(as_page(plan, reference.run, typed.repeat(), card, explorer)))
+        page = as_page(plan, reference.run, typed.repeat(), card, explorer)
+        output.write(options["report"], text_bytes(with_options(page)))
 
 
 def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool) -> tuple[str, bool]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from contextlib import contextmanager
-from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING, Final
 
@@ -33,13 +32,11 @@ def reading(names: Sequence[str], *, quiet: bool) -> Iterator[None]:
         click.echo(f"read {what}{more} in {perf_counter() - start:.2f} s", err=True)
 
 
-@dataclass
 class Count:
     """How many of ``total`` runs are done; ``taken`` of them cost nothing."""
 
-    total: int
-    done: int = 0
-    taken: int = 0
+    def __init__(self, total: int, done: int = 0, taken: int = 0) -> None:
+        self.total, self.done, self.taken = total, done, taken
 
     def told(self, seconds: float) -> str:
         """Say how far it is after so many seconds, and how long the rest will take at this pace."""

@@ -28,7 +28,10 @@ Examples:
 @shared.oscillator_options(required=True)
 @click.option("--z0", type=shared.TIME, help="Displacement of the frame at time 0.  [default: 0]")
 @click.option("--y0", type=shared.TIME, help="Displacement of the suspended mass at time 0.  [default: 0]")
-@click.option("--vz0", type=shared.TIME, help="Velocity of the frame at time 0; the same as --v0.  [default: 0]")
+@click.option(
+    "--vz0", type=shared.TIME, cls=shared.Either, instead_of=("v0",),
+    help="Velocity of the frame at time 0; the same as --v0.  [default: 0]",
+)  # fmt: skip
 @click.option("--vy0", type=shared.TIME, help="Velocity of the suspended mass at time 0.  [default: 0]")
 @click.option("--tr", type=shared.NOT_NEGATIVE, metavar="T", help="Switch to rigid at this time; with --td.")
 @click.option("--td", type=shared.NOT_NEGATIVE, metavar="T", help="Switch back to deformable at this time.")

@@ -54,9 +54,12 @@ class Work:
 
 @click.command("study", epilog=EXAMPLES)
 @click.argument("run", metavar="RUN...", nargs=-1, type=shared.FILE)
-@click.option("--td", type=shared.TIME, metavar="T", help="Switch back to deformable at this time.")
 @click.option(
-    "--td-window", type=(shared.TIME, shared.TIME), metavar="LO HI",
+    "--td", type=shared.TIME, metavar="T", cls=shared.Either, instead_of=("td_window",),
+    help="Switch back to deformable at this time.",
+)  # fmt: skip
+@click.option(
+    "--td-window", type=(shared.TIME, shared.TIME), metavar="LO HI", cls=shared.Either, instead_of=("td",),
     help="Let each run choose its time to switch back within this window.",
 )  # fmt: skip
 @click.option(
@@ -68,9 +71,13 @@ class Work:
     help="Keep finished runs in FILE, and skip those that are in it and unchanged.",
 )  # fmt: skip
 @click.option(
-    "--jobs", type=click.IntRange(min=1), metavar="N", help="Number of processes.  [default: one per core]",
+    "--jobs", type=click.IntRange(min=1), metavar="N", cls=shared.Either, instead_of=("scheduler",),
+    help="Number of processes.  [default: one per core]",
 )  # fmt: skip
-@click.option("--scheduler", metavar="ADDRESS", help="Use a running Dask cluster, which must see the same files.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", cls=shared.Either, instead_of=("jobs",),
+    help="Use a running Dask cluster, which must see the same files.",
+)  # fmt: skip
 @shared.reading_options
 @shared.judging_options
 @click.option("--plot", metavar="FILE", type=shared.FILE, help="Draw the energies of all runs to FILE (png, svg, pdf).")
@@ -150,6 +157,8 @@ def _listed(name: str) -> Iterator[str]:
         content = sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
     except OSError as error:
         raise FormatError(f"{name}: cannot be read ({error.strerror}); give a file with one run per line") from None
+    if b"\0" in content:
+        raise FormatError(f"{name}: holds NUL bytes; give a text file with one run per line")
     for text in os.fsdecode(content).removeprefix("\ufeff").splitlines():
         if (text := text.strip()) and not text.startswith("#"):
             yield text

@@ -9,7 +9,6 @@ import click
 from d2rpick.cli import deck_cost, typed
 from d2rpick.cli import options as shared
 from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
-from d2rpick.cli.explorer import explorer_of
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.cli.wording import in_words, with_options
@@ -33,11 +32,16 @@ Examples:
 
 
 @click.command("suggest", epilog=EXAMPLES)
-@click.option("--td", type=shared.TIME, metavar="T", help="Switch back to deformable at this time.")
+@click.option(
+    "--td", type=shared.TIME, metavar="T", cls=shared.Either, instead_of=("td_window",),
+    help="Switch back to deformable at this time.",
+)  # fmt: skip
 @click.option(
     "--td-window",
     type=(shared.TIME, shared.TIME),
     metavar="LO HI",
+    cls=shared.Either,
+    instead_of=("td",),
     help="Choose the time to switch back within this window.",
 )
 @click.option(
@@ -74,10 +78,6 @@ def command(
     """
     from d2rpick.choice.of_run import Reference, suggest_of
 
-    if _only_in_environment(ctx, "td", overruled_by="td_window"):
-        td = None
-    if _only_in_environment(ctx, "td_window", overruled_by="td"):
-        td_window = None
     _check_usage(td, td_window, card=output_format == "card", ids=(*options["part"], *options["node"]))
     prints = prints_card(options, output_format)
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
@@ -88,7 +88,7 @@ def command(
         model = deck_cost.model_of(options)
         options = deck_cost.with_deck(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
-        settings, unknown = deck_cost.with_cost(settings, reference.history, model)
+        settings, unknown = deck_cost.with_cost(settings, reference.history, model, options["merge"])
     answer = suggest_of(reference, td_window if td is None else td, settings)
     answer = answer._replace(cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)
@@ -107,12 +107,6 @@ def command(
     return finish(ctx, objection=answer.recommended is None or poor, exit_zero=exit_zero)
 
 
-def _only_in_environment(ctx: click.Context, option: str, *, overruled_by: str) -> bool:
-    """Whether an option comes from the environment, and one that excludes it from the command line."""
-    sources = [ctx.get_parameter_source(name) for name in (option, overruled_by)]
-    return sources == [click.core.ParameterSource.ENVIRONMENT, click.core.ParameterSource.COMMANDLINE]
-
-
 def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: bool, ids: tuple[str, ...]) -> None:
     """Raise UsageError where what is asked for makes no sense, before a file is opened."""
     if td is not None and window:
@@ -127,6 +121,7 @@ def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> 
     """Draw the figure, explore the flight, and write the page around them."""
     from d2rpick.choice.explored import explored_around
     from d2rpick.choice.judged_card import input_for
+    from d2rpick.cli.explorer import explorer_of
     from d2rpick.report.page import PageContext
     from d2rpick.report.suggestion_page import as_page, drawn
 
@@ -147,7 +142,7 @@ def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output)
     if pair is None:
         output.content(b"")
         return False
-    request = card_request(run, options, situation.history)
+    request = card_request(run, options, situation.history).by(situation.settings)
     found = judged_card(
         [(pair.tr, pair.td)], situation.history, lambda tr, td: verify_at(situation.at(td), tr), request
     )

@@ -60,6 +60,13 @@ class File(click.types.StringParamType):
 
     envvar_list_splitter = ";"
 
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Take a name; one with a NUL byte, which only a program can give, is none of a file."""
+        name = super().convert(value, param, ctx)
+        if "\0" in name:
+            self.fail(f"{name!r} holds a NUL byte, the name of a file was expected", param, ctx)
+        return name
+
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
         """Leave it to the shell."""
         from click.shell_completion import CompletionItem
@@ -102,3 +109,4 @@ TIME = Number()
 POSITIVE = Number(0.0, above=True)
 NOT_NEGATIVE = Number(0.0)
 FRACTION = Number(0.0, high=1.0)
+AT_LEAST_ONE = Number(1.0)

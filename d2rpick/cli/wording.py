@@ -8,8 +8,10 @@ from typing import Final
 # Argument of the library: option that sets it.
 OPTIONS: Final = {
     "after": "--after",
+    "deck": "--deck",
     "energy": "--energy",
     "fit_window": "--fit-window",
+    "min_rigid": "--min-rigid",
     "parts": "--part",
     "td": "--td",
     "td_window": "--td-window",

@@ -1,4 +1,4 @@
-"""Nodal rigid bodies, extra nodes and joints of a deck: constraints that stay when their parts become rigid.
+"""Nodal rigid bodies, extra nodes, joints and welds of a deck: constraints that stay when their parts become rigid.
 
 Columns: the vendor's keyword data as published in its Python library.
 """
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.reader import Deck
     from d2rpick.deck.rows import Field, Row
 
-Kind = Literal["nodal rigid body", "extra nodes", "joint"]
+Kind = Literal["nodal rigid body", "extra nodes", "joint", "spotweld", "rivet", "generalized weld"]
 _PER_LINE = 8
 _JOINT_NODES = 6
 _LISTS = {"LIST", "TITLE", "GENERATE", "COLUMN"}
@@ -32,7 +32,7 @@ class Constraint(NamedTuple):
 
 def read_constraints(deck: Deck) -> list[Constraint]:
     """Collect the constraints of a deck; one whose nodes cannot be known has none."""
-    sets = _node_sets(deck)
+    sets = node_sets(deck)
     found: list[Constraint] = []
     for card in deck.named("CONSTRAINED_NODAL_RIGID_BODY"):
         found += _nodal_rigid_bodies(card, sets)
@@ -41,6 +41,31 @@ def read_constraints(deck: Deck) -> list[Constraint]:
     for card in deck.named("CONSTRAINED_JOINT"):
         found += _joints(card)
     return found
+
+
+def read_welds(deck: Deck) -> Iterator[Constraint]:
+    """Collect spotwelds, rivets and generalized welds; one whose nodes cannot be known has none."""
+    kinds: tuple[tuple[str, Kind], ...] = (("CONSTRAINED_SPOTWELD", "spotweld"), ("CONSTRAINED_RIVET", "rivet"))
+    for name, kind in kinds:
+        for card in deck.named(name):
+            yield from _pairs(card, kind, name)
+    sets = node_sets(deck) if any(True for _ in deck.named("CONSTRAINED_GENERALIZED_WELD")) else {}
+    for card in deck.named("CONSTRAINED_GENERALIZED_WELD"):
+        rows = [row for row in card.rows if not row.blank]
+        for row in rows[1:2] if card.name.endswith("_ID") else rows[:1]:
+            members = card.integer(row, 0)
+            nodes = sets.get(members.value + card.transform.set_, frozenset())
+            yield Constraint("generalized weld", members.field, 0, nodes)
+
+
+def _pairs(card: Card, kind: Kind, name: str) -> Iterator[Constraint]:
+    """Two nodes on a line, on each where no option adds lines."""
+    rows, options = [row for row in card.rows if not row.blank], card.name.removeprefix(name)
+    first = int(options.endswith("_ID"))
+    for row in rows[first : first + 1] if options else rows:
+        nodes = [card.integer(row, at) for at in range(2)]
+        ids = frozenset(node.value + card.transform.node for node in nodes if node.value > 0)
+        yield Constraint(kind, nodes[0].field, 0, ids)
 
 
 def _nodal_rigid_bodies(card: Card, sets: dict[int, frozenset[int]]) -> Iterator[Constraint]:
@@ -77,7 +102,7 @@ def _joints(card: Card) -> Iterator[Constraint]:
         yield Constraint("joint", values[0].field, number, nodes)
 
 
-def _node_sets(deck: Deck) -> dict[int, frozenset[int]]:
+def node_sets(deck: Deck) -> dict[int, frozenset[int]]:
     """Members of the node sets whose lines are followed."""
     found: dict[int, frozenset[int]] = {}
     for card in deck.named("SET_NODE"):

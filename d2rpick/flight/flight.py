@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Final, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from d2rpick.flight.energy_alone import quiet_time
 from d2rpick.flight.window import all_windows, marks
-from d2rpick.vibration.fits import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -55,7 +55,7 @@ class Flight(NamedTuple):
 
 
 class Witness(NamedTuple):
-    """One source of evidence: the flight that it shows around a time, over the times of its record.
+    """One source of evidence: the flight that it shows around a time, and all its ``flights``, ascending in time.
 
     ``decisive``: where it shows none, there is none, even if it shows none anywhere.
     """
@@ -63,15 +63,28 @@ class Witness(NamedTuple):
     source: str
     time: Samples
     around: Callable[[float], FreeFlight | None]
+    flights: Callable[[], tuple[FreeFlight, ...]]
     decisive: bool
 
-    def flights(self) -> tuple[FreeFlight, ...]:
-        """All flights that it shows, ascending in time."""
-        return all_windows(self.time, self.around)
+    @classmethod
+    def of(cls, source: str, time: Samples, around: Callable[[float], FreeFlight | None], *, decisive: bool) -> Witness:
+        """Give the source that shows flights over ``time`` (n,), which looks around no time, and for all, only once."""
+        once = cache(around)
+        return cls(source, time, once, cache(partial(all_windows, time, once)), decisive)
+
+    def holding(self, td: float) -> FreeFlight | None:
+        """Give the flight that it shows around td: that of the first mark whose flight holds td, else td's own."""
+        shared = filter(None, map(self.around, marks(self.time, td)))
+        return next((flight for flight in shared if flight.start <= td <= flight.end), None) or self.around(td)
 
     def counts(self) -> bool:
         """Whether there is no flight where it shows none."""
         return self.decisive or bool(self.flights())
+
+
+_WITNESSES: WeakKeyDictionary[History, tuple[Witness, ...]] = WeakKeyDictionary()
+# What was confirmed of the flights that witnesses show: many td lie in the same.
+_CONFIRMED: WeakKeyDictionary[History, dict[tuple[tuple[str, FreeFlight], ...], Seen]] = WeakKeyDictionary()
 
 
 class Seen(NamedTuple):
@@ -105,38 +118,29 @@ def find_flight(history: History, td: float, after: float | None, seen: Seen, sp
     return Flight(quiet.start, quiet.end, "energy", settled=quiet.settled) if quiet else Flight(None, None, None)
 
 
-def seen_flight(history: History, td: float, fits: Fits | None = None) -> Seen:
+def seen_flight(history: History, td: float) -> Seen:
     """Find the free flight around ``td`` [time] in everything but the energy of the parts.
 
     The best source that shows a flight counts.  A better one that shows none at td is never overruled, nor is the
-    contact energy; where two sources show different ends, the later start and the earlier end count.  ``fits`` remember
-    what earlier looks at the same record have shown.
+    contact energy; where two sources show different ends, the later start and the earlier end count.
     """
-    fits = Fits() if fits is None else fits
     found: list[tuple[str, FreeFlight]] = []
-    for witness in fits.once(("witnesses",), lambda: tuple(witnesses(history))):
-        flight = _around(witness, td, fits)
+    for witness in witnesses(history):
+        flight = witness.holding(td)
         if flight:
             found.append((witness.source, flight))
-        elif (not found or witness.source in _AGREEING) and fits.once(("counts", witness.source), witness.counts):
+        elif (not found or witness.source in _AGREEING) and witness.counts():
             doubts = _contradicting(found, witness, td)
-            flights = fits.once(("flights", witness.source), witness.flights)
-            return _nearest(witness.source, flights, td, doubts)
-    return fits.once(("confirmed", *found), lambda: _confirmed(history, found)) if found else Seen(None, None)
-
-
-def _around(witness: Witness, td: float, fits: Fits) -> FreeFlight | None:
-    """Give the flight that a witness shows around td: that of the first mark whose flight holds td, else td's own."""
-    for mark in marks(witness.time, td):
-        flight = fits.once(("flight", witness.source, mark), partial(witness.around, mark))
-        if flight and flight.start <= td <= flight.end:
-            return flight
-    return witness.around(td)
+            return _nearest(witness, td, _no_flight(witness.source, td), doubts)
+    known = _CONFIRMED.setdefault(history, {})
+    if found and tuple(found) not in known:
+        known[tuple(found)] = _confirmed(history, found)
+    return known[tuple(found)] if found else Seen(None, None)
 
 
 def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     """Find all flights that the best source shows and no other denies, each with its source, ascending in time."""
-    asked = tuple(witnesses(history))
+    asked = witnesses(history)
     for place, witness in enumerate(asked):
         kept, flights = [], witness.flights()
         for flight in flights:
@@ -153,25 +157,32 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     return ()
 
 
-def witnesses(history: History) -> Iterator[Witness]:
-    """Give the sources of evidence that a history has, best first."""
+def witnesses(history: History) -> tuple[Witness, ...]:
+    """Give the sources of evidence that a history has, best first; it is asked about many td."""
+    if history not in _WITNESSES:
+        _WITNESSES[history] = tuple(_witnesses(history))
+    return _WITNESSES[history]
+
+
+def _witnesses(history: History) -> Iterator[Witness]:
     if history.momenta:
         from d2rpick.flight import momentum
 
         momenta = momentum.to_be_asked(history.momenta)
         around = partial(_first, momenta)
         decisive = any(one.parts is not None and momentum.tells(one) for one in momenta)
-        yield Witness("momentum", momenta[0].time, around, decisive)
+        yield Witness.of("momentum", momenta[0].time, around, decisive=decisive)
     balance = history.balance
     if balance is None:
         return
     from d2rpick.flight import contact_energy, work
 
     if contact_energy.shows_contacts(balance):
-        yield Witness("contact-energy", balance.time, partial(contact_energy.plateau_around, balance), False)
+        around = partial(contact_energy.plateau_around, balance)
+        yield Witness.of("contact-energy", balance.time, around, decisive=False)
     if work.can_tell(balance):
         worked = balance.external_work is not None and bool(np.ptp(balance.external_work))
-        yield Witness("energy-balance", balance.time, partial(work.balanced_around, balance), worked)
+        yield Witness.of("energy-balance", balance.time, partial(work.balanced_around, balance), decisive=worked)
 
 
 def _first(momenta: Sequence[Momenta], td: float) -> FreeFlight | None:
@@ -181,11 +192,12 @@ def _first(momenta: Sequence[Momenta], td: float) -> FreeFlight | None:
     return next(filter(None, (flight_around(one, td) for one in momenta)), None)
 
 
-def _nearest(source: str, flights: Sequence[FreeFlight], td: float, doubts: tuple[str, ...]) -> Seen:
+def _nearest(witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]) -> Seen:
     """Give the last flight before ``td``, or else the first one after it, where nothing flies at td."""
+    flights = witness.flights()
     before = [one for one in flights if one.end < td]
     nearest = before[-1] if before else flights[0] if flights else None
-    return Seen(nearest, source if nearest else None, _no_flight(source, td), doubts)
+    return Seen(nearest, witness.source if nearest else None, refusal, doubts)
 
 
 def _no_flight(source: str, td: float) -> str:

@@ -58,6 +58,8 @@ def flight_around(momenta: Momenta, td: float) -> FreeFlight | None:
         None when no set flies around td.
     """
     best: FreeFlight | None = None
+    if momenta.at_rest:
+        return None
     for members in [momenta.flying] if momenta.flying else _sets(momenta, td):
         found = flight_of(momenta, members, td)
         if found and (best is None or found.end - found.start > _LONGER * (best.end - best.start)):

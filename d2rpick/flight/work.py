@@ -152,9 +152,11 @@ class _Parabola:
         if time.size < FEWEST_STATES:
             return 0.0
         elapsed = (time - time[0]) / (time[-1] - time[0])
-        columns = [np.ones_like(elapsed), elapsed, elapsed**2]
-        if self.spent is not None and np.ptp(self.spent[states]) > 0:
-            columns.append((self.spent[states] - self.spent[states][0]) / np.ptp(self.spent[states]))
-        table = np.stack(columns, axis=1)
+        spent = None if self.spent is None else self.spent[states]
+        extent = 0.0 if spent is None else np.ptp(spent)
+        table = np.empty((time.size, 4 if extent > 0 else 3))
+        table[:, 0], table[:, 1], table[:, 2] = 1.0, elapsed, elapsed**2
+        if spent is not None and extent > 0:
+            table[:, 3] = (spent - spent[0]) / extent
         factors, *_ = np.linalg.lstsq(table, self.energies[states], rcond=None)
         return float(np.abs(self.energies[states] - table @ factors).max())

@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import stat
 import time
-from array import array
 from io import FileIO
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -80,6 +79,8 @@ class OnDisk(Content):
     """
 
     def __init__(self, name: str, file: int) -> None:
+        from array import array  # not above: most files are small
+
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
         self._seen = _State.of(self._file)

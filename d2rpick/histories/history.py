@@ -61,15 +61,14 @@ class Precision(NamedTuple):
 EXACT = Precision()
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """A part of the model, by the number and the title that the solver gives it."""
 
     id: int
     title: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Momenta:
     """Momentum of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); None for parts: the whole model.
 
@@ -102,6 +101,11 @@ class Momenta:
         return float((highest - lowest)[list(members)].max())
 
     @cached_property
+    def at_rest(self) -> bool:
+        """Whether nothing ever has any momentum."""
+        return not self.values.any()
+
+    @cached_property
     def moving(self) -> tuple[int, ...]:
         """Indices of the parts whose components are not all the same number."""
         lowest, highest = self._bounds
@@ -124,7 +128,7 @@ class Track(NamedTuple):
     values: Samples
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Balance:
     """Energies of the whole model at ``time``, arrays of shape (n,); None for what the files do not have.
 
@@ -178,7 +182,7 @@ class Given(NamedTuple):
 NO_EVIDENCE = Given()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class History:
     """Internal energy of the parts to switch, over time, in the run's own consistent units.
 
@@ -271,26 +275,30 @@ class History:
     def _turns(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         return find_turns(self.energy)
 
-    def energy_at(self, time: float, argument: str = "") -> float:
-        """Energy at ``time``, linear between the states; RangeError outside the record, naming the ``argument``."""
+    def energy_at(self, time: float, argument: str = "", given: Sequence[float] = ()) -> float:
+        """Energy at ``time``, linear between the states; RangeError outside the record, naming the ``argument``.
+
+        ``given`` are all times of an argument that takes several.
+        """
         if not self.time[0] <= time <= self.time[-1]:
             span = f"{self.time[0]:g} to {self.time[-1]:g}"
             from d2rpick.histories.legs import later_legs  # not above: pathlib costs start-up
 
             legs = later_legs(self.source) if time > self.time[-1] else []
             more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
-            more = more or (self._in_another_unit(time, argument) if argument else "")
+            more = more or (self._in_another_unit(given or (time,), argument) if argument else "")
             raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}{more}")
         before = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
         cell = slice(before, before + 2)  # of whole arrays that are read-only, numpy would make copies
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
-    def _in_another_unit(self, time: float, argument: str) -> str:
+    def _in_another_unit(self, times: Sequence[float], argument: str) -> str:
         """Ask whether an argument was given in another unit, in which it lies in the record."""
         for unit, size in (("ms", 1e-3), ("us", 1e-6)):
-            value = float(f"{time * size:.12g}")
-            if value > 0 and self.time[0] <= value <= self.time[-1]:
-                return f"; was it meant in {unit}? Then give `{argument}` {value:g}, in the unit of the record"
+            values = [float(f"{time * size:.12g}") for time in times]
+            if values[-1] > 0 and all(self.time[0] <= value <= self.time[-1] for value in values):
+                shown = " ".join(f"{value:g}" for value in values)
+                return f"; was it meant in {unit}? Then give `{argument}` {shown}, in the unit of the record"
         return ""
 
     def energies_at(self, times: Samples) -> Samples:

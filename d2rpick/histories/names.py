@@ -68,11 +68,11 @@ QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]\s*$")
 _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
 
-# An internal energy among others: of a part, a total.
-_SOME_INTERNAL = re.compile(r"(?i:internal|allie|inten)|(?<![A-Z])IE(?![A-Za-z])")
+# An internal energy among others: of a part, a total.  This and the next are compiled where they are needed.
+_SOME_INTERNAL = r"(?i:internal|allie|inten)|(?<![A-Z])IE(?![A-Za-z])"
 
 # Words that name another quantity; KE in capitals only, since "make" and "spoke" hold it too.
-_OTHER = re.compile(
+_OTHER = (
     r"(?i:kinetic|kinen|\ball(?:ke|pd|se|ae|wk|fd|vd|cd|dmd|mw)|etotal|total.?energy|hourglass|hgeng|eroded"
     r"|dissipat|plastic|damping|sliding|contact|friction|external|work|stonewall|rigidwall"
     r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
@@ -121,7 +121,7 @@ def is_internal_energy(name: str) -> bool:
 
 def is_some_internal_energy(name: str) -> bool:
     """Whether a name speaks of an internal energy: ``IE_total_J``, ``box IE``, not ``eroded internal``."""
-    return bool(_SOME_INTERNAL.search(name)) and not _OTHER.search(name)
+    return bool(re.search(_SOME_INTERNAL, name)) and not re.search(_OTHER, name)
 
 
 def internal_energies(names: Sequence[str]) -> list[int]:
@@ -157,7 +157,9 @@ def quantity_note(channel: str) -> tuple[str, ...]:
     >>> quantity_note("ALLKE for Whole Model")
     ("'ALLKE for Whole Model' is not an internal energy by its name (ALLKE); it was used as it is",)
     """
-    word = _OTHER.search(channel)
+    if channel.replace("_", "").casefold() in _INTERNAL_NAMES:  # as mostly
+        return ()
+    word = re.search(_OTHER, channel)
     if not word:
         return ()
     return (f"{channel!r} is not an internal energy by its name ({word[0]}); it was used as it is",)
@@ -165,7 +167,7 @@ def quantity_note(channel: str) -> tuple[str, ...]:
 
 def refuse_other_quantity(channel: str, where: str) -> None:
     """FormatError if the only column or curve of a file is called something else than an internal energy."""
-    word = _OTHER.search(channel)
+    word = re.search(_OTHER, channel)
     if word:
         raise FormatError(
             f"{where}: the only values are {channel!r}, by its name not an internal energy ({word[0]}); "

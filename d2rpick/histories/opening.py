@@ -27,8 +27,8 @@ __all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "open_
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
 _DEFAULT = Selection()
-# A keyword of LS-DYNA at the start of a line, or the first line of a Radioss deck, behind comments only.
-_DECK: Final = re.compile(rb"(?:\xef\xbb\xbf)?(?:[ \t]*(?:\$[^\n]*)?\r?\n)*(?:\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN)")
+# A keyword of LS-DYNA at the start of a line, or the first line of a Radioss deck; compiled where it is needed.
+_DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN"
 
 
 class Reader(Protocol):
@@ -117,9 +117,16 @@ def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
         raise FormatError(f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave `time` out")
 
 
+def _is_deck(head: bytes) -> bool:
+    """Whether a deck begins, behind comments only."""
+    lines = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")
+    first = next((line for line in lines if line.strip() and not line.lstrip().startswith(b"$")), b"")
+    return first.startswith((b"*", b"#", b"/")) and re.match(_DECK, first) is not None
+
+
 def _format(source: Source) -> str:
     head = source.data[:_HEAD]
-    if _DECK.match(head):
+    if _is_deck(head):
         raise FormatError(
             f"{source.name}: this is a deck, an energy history was expected; name the glstat, matsum, binout or T01 of "
             "its run"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -28,16 +28,14 @@ _VELOCITIES = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
 _CENTRES = ("x_center", "y_center", "z_center")
 
 
-@dataclass(frozen=True)
 class Run:
     """Databases of one run, one per format, those that say most of it first.
 
     ``sources`` name their files; ``files`` are what was read of them.
     """
 
-    sources: tuple[str, ...]
-    databases: tuple[Legs, ...]
-    files: tuple[Source, ...] = ()
+    def __init__(self, sources: tuple[str, ...], databases: tuple[Legs, ...], files: tuple[Source, ...] = ()) -> None:
+        self.sources, self.databases, self.files = sources, databases, files
 
     @property
     def name(self) -> str:
@@ -251,8 +249,9 @@ class Run:
         columns = [database.channel(name) for name in names]
         channel = " + ".join(names)
         notes = quantity_note(channel)
-        history = self._made(database, database.time, np.sum(columns, axis=0), channel, names, notes, None)
-        return _with_terms(history, names, np.stack(columns, axis=1))
+        energy = columns[0] if len(columns) == 1 else np.sum(columns, axis=0)
+        history = self._made(database, database.time, energy, channel, names, notes, None)
+        return history if len(columns) == 1 else _with_terms(history, names, np.stack(columns, axis=1))
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
         """Find the database that has all these channels, under the names it gives them."""

@@ -21,10 +21,10 @@ STDIN = "-"
 _GZIP = b"\x1f\x8b"
 # Files of a folder often share their suffix, and have it in common with any name that has it.
 _LIKENESS = 0.8
-_NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
+_NUMBER = r"\d+\.?\d*|\.\d+"  # compiled where it is needed, as the next one
 
 # What solvers call their databases in the folder of a run.
-_DATABASE = r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?"  # compiled where it is needed
+_DATABASE = r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?"
 
 
 class Source(NamedTuple):
@@ -136,7 +136,7 @@ def _read_file(name: str) -> bytes | OnDisk:
 def _meant(name: str) -> str:
     """Ask for the file beside it that has nearly this name, or whether it is a time."""
     seconds = in_seconds(name)
-    if seconds is not None or _NUMBER.fullmatch(name):
+    if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} where it is s"
         return f", and a time is given as `td`, a number in the unit of the record{value}"
     folder, wanted = os.path.split(name)

@@ -41,7 +41,7 @@ class Answer(Document):
 
     ``situation`` is what the record tells about td, ``warnings`` are (``code``, ``message``), ``health`` how far the
     run can be trusted, None where its files hold nothing to judge it by; ``command`` is the command line that gives the
-    same answer.  Times are in the unit of the run.
+    same answer, with ``<weights in memory>`` for the file where these were no file.  Times are in the unit of the run.
     """
 
     run: Run = field(repr=False)
@@ -377,6 +377,6 @@ def page_record(
 
 def written(path: arguments.Path, page: str) -> Path:
     """Write a page and give its path."""
-    place = Path(path)
+    place = Path(*arguments.paths("path", path))
     place.write_text(page, "utf-8")
     return place

@@ -28,7 +28,7 @@ class Choosing(TypedDict, total=False):
     identified, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the oscillator
     is identified there only.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr where the
     energy alone shows when the load is over.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a
-    step, and of the step while rigid to that while deformable.
+    step, and of the step while rigid to that while deformable, 1 or more.
     """
 
     after: float | None
@@ -131,7 +131,11 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
             raise TypeError(f"{name} holds {one!r}; paths were expected")
     if not listed:
         raise ValueError(f"{name} is empty; give a file or folder")
-    return tuple(os.fsdecode(one) for one in listed)
+    found = tuple(os.fsdecode(one) for one in listed)
+    for one in found:
+        if "\0" in one:
+            raise ValueError(f"{name} holds {one!r} with a NUL byte, which no name of a file has")
+    return found
 
 
 def settings(choosing: Choosing, *, with_deck: bool = False) -> Settings:
@@ -140,7 +144,7 @@ def settings(choosing: Choosing, *, with_deck: bool = False) -> Settings:
     ``with_deck``: a deck tells the cost share, unless it is given.
     """
     from d2rpick.choice.settings import Settings
-    from d2rpick.vibration.replay import to_mode
+    from d2rpick.vibration.equivalent import to_mode
 
     known = Choosing.__annotations__
     if unknown := [name for name in choosing if name not in known]:

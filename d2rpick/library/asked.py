@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.library import arguments
 from d2rpick.library.repeat import asking
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.selection import Selection
     from d2rpick.library.arguments import Choosing, Parts
     from d2rpick.library.runs import Run
+
+# Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
+_IN_MEMORY: Final = "<weights in memory>"
 
 
 class Asked(NamedTuple):
@@ -98,8 +101,10 @@ def model_of(
     from d2rpick.choice.cost import Weights
 
     main = _one_path("deck", deck)
-    if weights is None or isinstance(weights, Weights):  # the command line has no words for weights in memory
-        return read_model(main, weights), ("--deck", main)
+    if weights is None:
+        return read_model(main), ("--deck", main)
+    if isinstance(weights, Weights):
+        return read_model(main, weights), ("--deck", main, "--weights", _IN_MEMORY)
     file = _one_path("weights", weights)
     return read_model(main, file), ("--deck", main, "--weights", file)
 

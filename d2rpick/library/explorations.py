@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.library import arguments
 from d2rpick.library.answers import explorer_of, page_record, written
-from d2rpick.library.asked import selection_for
+from d2rpick.library.asked import asked_of
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import asking, command_line
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from d2rpick.choice.cost import Weights
     from d2rpick.choice.offer import Offer
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.choice.warnings import Caution
@@ -96,6 +96,8 @@ def explore(
     steps: int = 200,
     parts: Parts | None = None,
     flying: Parts | None = None,
+    deck: arguments.Path | None = None,
+    weights: Weights | arguments.Path | None = None,
     **choosing: Unpack[Choosing],
 ) -> Exploration:
     """Find what each td costs, as ``d2rpick explore`` does.
@@ -107,10 +109,10 @@ def explore(
     td : float, optional
         Explored too, and what others are compared with [time].
     td_window : (float, float), optional
-        Where td is looked for [time].  Default: the longest flight.
+        Where td is looked for [time].  Default: the longest flight; where none is seen but td is named, the record.
     steps : int
         Number of evenly spaced td; peaks of the energy come on top.
-    parts, flying, **choosing
+    parts, flying, deck, weights, **choosing
         As for `suggest`.
 
     Returns
@@ -120,7 +122,8 @@ def explore(
     Raises
     ------
     D2RPickError
-        If the run has no such parts or energy, a time lies outside the record, or no flight is seen.
+        If the run has no such parts or energy, a time lies outside the record, or no flight is seen and no td
+        is named.
     TypeError, ValueError
         If an argument is not of its kind.
 
@@ -131,16 +134,15 @@ def explore(
     >>> round(found.step.td - found.start.td, 4)
     0.0048
     """
-    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.trade_off import explore_of
 
-    asked = None if td is None else arguments.number("td", td)
+    wanted = None if td is None else arguments.number("td", td)
     window = None if td_window is None else arguments.window("td_window", td_window)
     count = int(arguments.number("steps", steps, 1))
-    settings = arguments.settings(choosing)
-    selection = selection_for(run, parts, flying)
-    core = explore_of(Reference.of(run.files, selection), settings, window, td=asked, steps=count)
-    times = [] if asked is None else ["--td", repr(asked)]
+    asked = asked_of(run, parts, flying, deck, weights, choosing)
+    core = explore_of(asked.reference, asked.settings, window, td=wanted, steps=count)
+    core = core._replace(cautions=(*core.cautions, *asked.cautions))
+    times = [] if wanted is None else ["--td", repr(wanted)]
     times += ["--td-window", *map(repr, window)] if window else []
     return Exploration(
         run=run,
@@ -149,7 +151,7 @@ def explore(
         start=core.start,
         step=core.step,
         warnings=core.cautions,
-        command=command_line("explore", (*times, "--steps", str(count)), run, selection, choosing),
-        _asking=asking(run, selection, choosing),
+        command=("explore", *times, "--steps", str(count), *asked.options),
+        _asking=asked.options,
         _core=core,
     )

@@ -5,19 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from d2rpick.histories.selection import Selection
     from d2rpick.library.arguments import Choosing
     from d2rpick.library.runs import Run
     from d2rpick.vibration.oscillator import Oscillator
-
-
-def command_line(
-    command: str, times: Sequence[str], run: Run, selection: Selection, choosing: Choosing
-) -> tuple[str, ...]:
-    """Give the arguments of ``d2rpick`` that ask the same question."""
-    return (command, *times, *asking(run, selection, choosing))
 
 
 def asking(run: Run, selection: Selection, choosing: Choosing) -> tuple[str, ...]:

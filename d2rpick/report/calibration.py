@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from d2rpick.choice.cost import MEASURED
 from d2rpick.choice.weights_file import written
 from d2rpick.errors import printable
-from d2rpick.report import tables
+from d2rpick.report import keys, tables
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def as_json(found: Calibration, command: Sequence[str]) -> str:
             "schema": SCHEMA,
             "tool_version": __version__,
             "command": list(command),
-            "warnings": [],
+            "warnings": keys.of_warnings(found.cautions),
             "element_share": found.weights.element_share,
             "rigid_node": found.weights.rigid_node,
             "per_element": dict(found.weights.per_element),

@@ -115,7 +115,7 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:
         "exact_tr": repr(best.tr) if best else "none",
         "level": short(offer.energy_td),
         "kinetic": "" if offer.kinetic_share is None else measure(offer.kinetic_share),
-        "quality": f"{quality.grade}{': ' * bool(quality.reasons)}{'; '.join(quality.reasons)}" if quality else "",
+        "quality": quality.told if quality else "",
         "reason": offer.reason or "",
         **(_of_best(offer, best, unit) if best else {}),
         "compared": _compared(offer, start, unit),
@@ -160,6 +160,8 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
         said.append(
             f"rigid for {abs(longer):.{_READ}g}{unit} {'longer' if longer > 0 else 'less'} ({share:+.1%} of the record)"
         )
+    if offer.saving is not None and start.saving is not None:
+        said.append(f"saves {offer.saving:.1%} of the run time instead of {start.saving:.1%}")
     if offer.error is not None and start.error is not None and (offer.basis == "energy") == (start.basis == "energy"):
         said.append(f"{error_name([offer])} {measure(offer.error)} instead of {measure(start.error)}")
     return ", ".join(said)

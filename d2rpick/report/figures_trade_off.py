@@ -22,7 +22,7 @@ _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
 
 
 def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
-    """Draw the energy in the window of td, and below it error and rigid time of the best pair for each td."""
+    """Draw the energy in the window of td, and below it error and saving of the best pair for each td."""
     figure = Figure(figsize=(WIDTH, _HEIGHT), layout=None if page else "constrained")
     energy, error, rigid = figure.subplots(3, sharex=True)
     history = found.situation.history
@@ -32,9 +32,11 @@ def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
     by_energy = bool(found.offers) and all(one.basis == "energy" for one in found.offers)
     _curve(error, found, [one.error for one in found.offers])
     error.set(ylabel=_ERRORS[by_energy], ylim=(0, None))
-    _curve(rigid, found, [one.rigid_time for one in found.offers])
-    unit = history.time_unit
-    rigid.set(ylabel="rigid time", xlabel=f"td [{unit}]" if unit else "td", ylim=(0, None))
+    saved = [one.saving for one in found.offers]
+    cost = any(one is not None for one in saved)
+    _curve(rigid, found, saved if cost else [one.rigid_time for one in found.offers])
+    td = f"td [{history.time_unit}]" if history.time_unit else "td"
+    rigid.set(ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None))
     panels = (energy, error, rigid)
     for axes in panels:
         for one, colour, name in ((found.asked, FLIGHT, "td asked for"), (found.recommended, SWITCHED, "recommended")):

@@ -77,6 +77,8 @@ CANDIDATE: Final[Mapping[str, Callable[[Candidate], Any]]] = {
     "residual_high": lambda c: c.residual_high,
     "position_error": lambda c: c.position_error,
     "position_error_part": lambda c: c.position_error_part,
+    "position_error_body": lambda c: c.position_error_body,
+    "position_error_assumes": lambda c: c.position_error_assumes,
 }
 
 
@@ -89,7 +91,7 @@ def of_candidate(candidate: Candidate) -> dict[str, Any]:
 MEASURES: Final = (
     *("energy", "energy_ratio", "level_error", "sign_match", "lock_in_error", "residual", "residual_high"),
     *("part_mismatch", "timing_tolerance", "rigid_time", "rigid_fraction", "run_time_share"),
-    *("position_error", "position_error_part"),
+    *("position_error", "position_error_part", "position_error_body", "position_error_assumes"),
 )
 
 

@@ -35,7 +35,7 @@ PART = (
 SET = (
     "name", "recommended", "parts", "bodies", "elements", "element_fraction", "mass_fraction", "cost_share",
     "step_growth", "step_free", "tr", "td", "rigid_fraction", "run_time_share", "saving", "position_error",
-    "position_limit", "position_part", "angle_error", "reasons",
+    "position_limit", "position_part", "position_body", "position_assumes", "angle_error", "reasons",
 )  # fmt: skip
 _MOST_SHOWN = 6
 
@@ -166,6 +166,8 @@ def set_(one: PartSet) -> dict[str, Any]:
         "position_error": one.position_error,
         "position_limit": one.position_limit,
         "position_part": keys.of_parts((one.position_part,)) if one.position_part else None,
+        "position_body": list(one.position_body) if one.position_body else None,
+        "position_assumes": one.position_assumes,
         "angle_error": one.angle_error,
         "reasons": list(one.reasons),
     }
@@ -175,12 +177,12 @@ def heading(found: Parts) -> list[str]:
     """What was read."""
     run, deck = found.run, found.inventory
     formats = " + ".join(one.format for one in run.databases)
-    lines = [f"history  {', '.join(run.sources)}: {formats}, {len(run.parts)} parts"]
+    lines = [f"history  {', '.join(run.sources)}: {formats}, {_number(len(run.parts), 'part')}"]
     if deck is None:
         lines.append("deck     none")
     else:
         number = sum(sum(counts.values()) for counts in deck.counts.values())
-        lines.append(f"deck     {deck.solver}, {len(deck.parts)} parts, {number} elements")
+        lines.append(f"deck     {deck.solver}, {_number(len(deck.parts), 'part')}, {_number(number, 'element')}")
     longest = found.facts.longest
     if longest is not None:
         start, end = found.facts.flights[longest]
@@ -229,10 +231,15 @@ def set_rows(found: Parts) -> list[list[tables.Cell]]:
             one.window[1] if one.window else None,
             _percent(one.run_time_share),
             _percent(one.saving),
-            _short(one.position_error),
+            _position(one),
         ]
         for one in found.sets
     ]
+
+
+def _position(one: PartSet) -> str | None:
+    """How far a set is out of place, and what that takes for granted."""
+    return f"{_short(one.position_error)} if one body" if one.position_assumes else _short(one.position_error)
 
 
 def verdict(row: PartRow) -> str:
@@ -250,12 +257,18 @@ def outlook(found: Parts) -> list[tuple[str, str]]:
         bodies = "one rigid body" if len(best.bodies) == 1 else f"{len(best.bodies)} rigid bodies"
         ids = ",".join(map(str, best.parts))
         lines.append(("recommended", f"{best.name}: --part {ids} ({bodies})"))
-        lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's"))
+        flights = len(found.facts.flights)
+        where = f", rigid in the longest of {flights} flights alone" if flights > 1 else ""
+        lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's{where}"))
         if best.step_growth is not None and best.step_growth > 1:
             much = "without limit" if isinf(best.step_growth) else f"{best.step_growth:.2g} times"
             lines.append(("step", f"may grow {much} while rigid, which saves more (--step-ratio); cap it (--step-cap)"))
     lines += [(one.name, reason) for one in found.sets for reason in one.reasons]
     return lines
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
 
 
 def _counted(row: PartRow) -> str | None:

@@ -14,20 +14,20 @@ if TYPE_CHECKING:
     from d2rpick.choice.plan import Plan, Planned
 
 SCHEMA = "d2rpick/plan/1"
-HEAD = ("", "flight", "from", "to", "margin", "tr", "td", "rigid", "of record", "quality", "status")
+HEAD = ("", "flight", "from", "to", "margin", "tr", "td", "rigid", "of record", "run time", "quality", "status")
 
 # Keys of a window in JSON, and columns of the csv.
 WINDOW = (
     "flight", "flight_start", "flight_end", "flight_source", "certain", "status", "reason", "tr", "td", "rigid_time",
     "rigid_fraction", "run_time_share", "locks_in", "basis", "kind", "level_error", "lock_in_error", "residual",
     "kinetic_share", "margin", "margin_source", "landing_spread", "landing", "landing_planned", "position_error",
-    "position_error_part",
+    "position_error_part", "position_error_body", "position_error_assumes",
 )  # fmt: skip
 
 
 def as_table(plan: Plan) -> str:
     """What was read, a row per flight, what the supported windows save, and why others are not supported."""
-    table = tables.as_text(HEAD, rows(plan)) if plan.rows else "no flight"
+    table = tables.as_text(head(plan), rows(plan)) if plan.rows else "no flight"
     named = [f"flight {row.number}  {row.reason}" for row in plan.rows if row.reason]
     lines = [heading(plan), "", table, "", *(f"{name.ljust(9)}  {text}" for name, text in outlook(plan)), *named]
     return "\n".join(lines)
@@ -37,7 +37,7 @@ def as_markdown(plan: Plan) -> str:
     """The flights as a Markdown table, and below it what is saved, and why windows are not supported."""
     named = [f"flight {row.number}: {row.reason}" for row in plan.rows if row.reason]
     return "\n\n".join(
-        [tables.as_markdown(HEAD, rows(plan)), *(f"{name}: {text}" for name, text in outlook(plan)), *named]
+        [tables.as_markdown(head(plan), rows(plan)), *(f"{name}: {text}" for name, text in outlook(plan)), *named]
     )
 
 
@@ -100,6 +100,8 @@ def window(plan: Plan, row: Planned) -> dict[str, Any]:
         "landing_planned": done.planned if done else None,
         "position_error": best.position_error if best else None,
         "position_error_part": best.position_error_part if best else None,
+        "position_error_body": best.position_error_body if best else None,
+        "position_error_assumes": best.position_error_assumes if best else None,
     }
 
 
@@ -122,6 +124,9 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     if plan.run_time_share is not None:
         lines.append(("run time", f"about {plan.run_time_share:.0%} of the reference's"))
     lines += [(f"flight {row.number}", given_up(row)) for row in supported if row.answer and row.answer.longer]
+    if any(row.candidate and row.candidate.position_error_assumes for row in plan.rows):
+        told = "; `deck` tells which do" if plan.settings.bodies is None else ""
+        lines.append(("off by", f"holds if the parts become one rigid body{told}"))
     if waiting or plan.done:
         what = "with those that are done and these" if plan.done else "with these windows"
         after = ", and plan the others from that run (--done)" if waiting else ""
@@ -139,8 +144,13 @@ def given_up(row: Planned) -> str:
     return told(row.answer.longer, row.answer.recommended)
 
 
+def head(plan: Plan) -> list[str]:
+    """Columns of the table; of the run time only where the cost of the parts is known."""
+    return [name for name in HEAD if name != "run time" or plan.settings.cost_share is not None]
+
+
 def rows(plan: Plan) -> list[list[tables.Cell]]:
-    """Cells of all flights, below ``HEAD``; those of supported windows have a star."""
+    """Cells of all flights, below ``head``; those of supported windows have a star."""
     span = float(plan.history.time[-1] - plan.history.time[0])
     return [
         [
@@ -153,11 +163,18 @@ def rows(plan: Plan) -> list[list[tables.Cell]]:
             row.window[1] if row.window else None,
             row.rigid_time,
             None if row.rigid_time is None else f"{row.rigid_time / span:.0%}",
+            *([] if plan.settings.cost_share is None else [_run_time(row)]),
             quality(row),
             row.status,
         ]
         for row in plan.rows
     ]
+
+
+def _run_time(row: Planned) -> str | None:
+    """Run time with this window alone."""
+    share = row.candidate.run_time_share if row.candidate else None
+    return None if share is None else f"{share:.0%}"
 
 
 def quality(row: Planned) -> str | None:
@@ -169,4 +186,4 @@ def quality(row: Planned) -> str | None:
         return "nothing vibrates"
     name, error = ("level error", best.level_error) if best.residual is None else ("residual", best.residual)
     off = "" if best.position_error is None else f", off by {best.position_error:.2g}"
-    return f"{name} {tables.measure(error)}{off}"
+    return f"{name} {tables.measure(error)}{off}{' if one body' if best.position_error_assumes else ''}"

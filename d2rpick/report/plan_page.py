@@ -10,7 +10,7 @@ from d2rpick.report.explorer import explorer
 from d2rpick.report.figures_page import svg_element
 from d2rpick.report.figures_plan import draw_plan
 from d2rpick.report.html import Markup, drawings, pairs, remarks, resource, section, table, tag
-from d2rpick.report.plan import HEAD, heading, outlook, quality, rows
+from d2rpick.report.plan import head, heading, outlook, quality, rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -52,7 +52,7 @@ def _sections(
         yield explorer(explored)
     yield drawings({_CAPTION: svg_element(draw_plan(plan, page=True), "plan-")})
     reasons = pairs([(f"flight {row.number}", row.reason) for row in plan.rows if row.reason])
-    yield section("Flights", table("Flights", HEAD[1:], [row[1:] for row in rows(plan)]), reasons)
+    yield section("Flights", table("Flights", head(plan)[1:], [row[1:] for row in rows(plan)]), reasons)
     if card:
         yield section("For the solver's input", tag("pre", card, tabindex="0"))
     what, _, text = heading(plan).partition(" ")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from d2rpick.errors import printable
+from d2rpick.histories.names import listing
 from d2rpick.report import keys
 from d2rpick.report.tables import measure
 from d2rpick.version import __version__
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.warnings import Caution
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
+
+# Parts that a line names of those that fly together; the JSON document has all.
+_NAMED = 5
 
 
 def read_line(history: History) -> str:
@@ -39,7 +43,8 @@ def heading(situation: Situation) -> list[str]:
         lines.append("flight   unknown")
     else:
         end = "no next contact found" if flight.end is None else f"to {flight.end:.6g}"
-        who = f" of {', '.join(part.title or str(part.id) for part in flight.parts)}" if flight.parts else ""
+        parts = [part.title or str(part.id) for part in flight.parts or ()]
+        who = f" of {listing(parts, most=_NAMED)}" if parts else ""
         lines.append(f"flight   from {flight.start:.6g} ({_source(flight)}{who}), {end}")
     return [printable(line) for line in lines]
 

@@ -119,10 +119,9 @@ def _saved(best: Candidate) -> str:
 
 def _sure(best: Candidate, quality: Quality) -> str:
     """How good the pair is, why it is none better, and how exactly tr is known."""
-    reasons = f": {'; '.join(quality.reasons)}" if quality.reasons else ""
     known = "" if best.tr_high is None else f"; tr is known to ±{best.tr_high - best.tr:.1g}"
     room = "" if best.timing_tolerance is None else f" and may be off by {best.timing_tolerance:.1g}"
-    return f"{quality.grade}{reasons}{known}{room}"
+    return f"{quality.told}{known}{room}"
 
 
 def _kept(answer: Suggestion, best: Candidate) -> str:
@@ -157,15 +156,24 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     if best and best.run_time_share is not None:
         lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's"))
     if best and best.position_error is not None:
-        lines.append(
-            ("position", f"off by {best.position_error:.2g} at td: {best.position_error_part} is frozen elsewhere")
-        )
+        lines.append(("position", position(best, deck=answer.situation.settings.bodies is not None)))
     if answer.longer and answer.recommended:
         lines.append(("longer", given_up(answer.longer, answer.recommended)))
     expected = answer.expected
     if expected and expected.ratio is None:
         lines.append(("mean after", f"about {expected.ratio_at_level:.0%} of the reference's with the energy of td"))
     return lines
+
+
+def position(best: Candidate, *, deck: bool) -> str:
+    """How far a body is out of place at td, why, and what that takes for granted, with a ``deck`` or without."""
+    assert best.position_error is not None
+    taken = f" if {best.position_error_assumes}" if best.position_error_assumes else ""
+    taken += " (`deck` tells which do)" if taken and not deck else ""
+    if best.position_error_part is None:
+        return f"in place at td{taken}, as far as parts tell: none moves against the others of its rigid body"
+    body = f", the body of part {best.position_error_body}" if best.position_error_body else ""
+    return f"off by {best.position_error:.2g} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
 
 
 def given_up(longer: Pair, chosen: Pair) -> str:

@@ -138,7 +138,12 @@ def _less(start: Offer, step: Offer) -> str:
 
 
 def _cost(start: Offer, step: Offer) -> str:
-    """What the step does to the rigid time."""
+    """What the step does to the run time, or to the rigid time where the cost of the parts is not known."""
+    if start.saving is not None and step.saving is not None:
+        longer = start.saving - step.saving
+        if abs(longer) < _NO_CHANGE:
+            return "costs no run time"
+        return f"{'costs' if longer > 0 else 'saves'} {abs(longer):.1%} of the reference's run time"
     assert start.rigid_time is not None
     assert step.rigid_time is not None
     change = step.rigid_time / start.rigid_time - 1

@@ -25,7 +25,8 @@ def as_table(answer: Verdict) -> str:
     reasons = [f"  {reason}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
-    return "\n".join([f"verdict  {_told(answer)}", *reasons, "", *heading(answer.situation), "", *lines])
+    told = [f"verdict  {_told(answer)}", *([f"quality  {answer.quality.told}"] if answer.quality else [])]
+    return "\n".join([*told, *reasons, "", *heading(answer.situation), "", *lines])
 
 
 def as_markdown(answer: Verdict) -> str:
@@ -61,9 +62,11 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
 
 
 def _told(answer: Verdict) -> str:
-    """The verdict, with the quality of a pair that verifies."""
-    quality = answer.quality
-    return word(answer) if quality is None else f"{word(answer)}, {'; '.join((quality.grade, *quality.reasons))}"
+    """The verdict, and what a pair that verifies keeps."""
+    if not answer.verified:
+        return word(answer)
+    held = "its level is" if answer.situation.basis == "energy" else "its sign matches and its error is"
+    return f"{word(answer)}: tr lies in the flight, {held} within the tolerance"
 
 
 def word(answer: Verdict) -> str:

@@ -37,13 +37,13 @@ def as_page(answer: Verdict, record: page.PageContext) -> str:
 def _sections(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
     situation, candidate = answer.situation, answer.candidate
     times = candidate.tr, situation.td
-    class_ = "card chosen" if answer.verified else "card refused"
+    poor = answer.quality is not None and answer.quality.grade == "poor"
     shown = page.pair(
-        word(answer).capitalize(),
+        f"{word(answer).capitalize()}{', but of poor quality' * poor}",
         times,
         tag("p", _left_over(candidate.residual), "; ", page.rigid_for(times, situation.history)),
         situation.history,
-        class_,
+        "card chosen" if answer.verified and not poor else "card refused",
     )
     yield tag("section", tag("div", shown, class_="choice"), remarks(answer.cautions, answer.reasons))
     if record.explorer:

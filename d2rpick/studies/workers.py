@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+# Plain forks copy locks that threads hold; one process that forks from a clean state is nearly as quick.
+_METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
 # Calls that wait for each process beside the one it works on: enough to keep it busy, too few to fill memory.
 _WAITING = 2
 # On a cluster, whose workers may come and go.
@@ -128,10 +130,8 @@ class Cores:
     """A pool of processes on this machine, which have imported ``module`` before they begin."""
 
     def __init__(self, processes: int, module: str) -> None:
-        # read when a process imports numpy: with several of them, threads would only fight over the cores
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        begin(processes, module)
         self.processes, self.room = processes, (1 + _WAITING) * processes
-        self._module = module
         self._held, self._leash = Pipe(duplex=False)  # the processes see when this end of it is closed
         self._pool = self._new(processes)
 
@@ -157,10 +157,7 @@ class Cores:
             return pool.submit(function, item)
 
     def _new(self, processes: int) -> ProcessPoolExecutor:
-        # plain forks copy locks that threads hold; one process that forks from a clean state is nearly as quick
-        method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-        set_forkserver_preload([self._module])
-        return ProcessPoolExecutor(processes, get_context(method), _begin_work, (self._held,))
+        return ProcessPoolExecutor(processes, get_context(_METHOD), _begin_work, (self._held,))
 
 
 def _begin_work(held: Connection) -> None:
@@ -172,6 +169,21 @@ def _begin_work(held: Connection) -> None:
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()
+
+
+def begin(processes: int, module: str) -> None:
+    """Let one process import ``module``, from which others are forked later, while this one goes on.
+
+    Whoever will need several of them calls it first; for a single one nothing happens.
+    """
+    if processes > 1:
+        # read when a process imports numpy: with several of them, threads would only fight over the cores
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        if _METHOD == "forkserver":
+            from multiprocessing.forkserver import ensure_running  # not on every system
+
+            set_forkserver_preload([module])
+            ensure_running()
 
 
 def on_cores(processes: int, module: str) -> Farm:

@@ -52,6 +52,10 @@ class Profile:
         times = np.array([moment.tr for moment in moments])
         return np.where([moment.kind == "match" for moment in moments], self.cell(times) / 2, reach)
 
+    def tolerances(self, tr: Samples, errors: Samples) -> Samples:
+        """Give the tolerance of each tr of shape (n,) with its error [time]."""
+        return np.array([self.tolerance(*one) for one in zip(tr.tolist(), errors.tolist(), strict=True)])
+
     def tolerance(self, tr: float, error: float) -> float:
         """How far ``tr`` may be off before ``error``, the one there, grows by 0.05; at most over all times [time]."""
         t, limit = self.time, error + measures.TOLERATED_GROWTH

@@ -8,8 +8,9 @@ from q(tr) - q(td) and -q'(td).  All measures compare that difference with the v
 
 from __future__ import annotations
 
+from itertools import repeat
 from math import sqrt
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -33,6 +34,37 @@ class Deformation(Protocol):
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """V [energy]."""
+
+
+class Measured(NamedTuple):
+    """Measures that only known deformations give; ``residual_high``: at worst, with what a fit may have missed."""
+
+    sign_match: bool
+    lock_in_error: float
+    residual: float
+    residual_high: float
+    timing_tolerance: float
+    part_mismatch: float | None
+
+
+def measured(
+    vibration: Deformation,
+    tr: Samples,
+    td: Samples | float,
+    *,
+    residual: Samples,
+    residual_high: Samples,
+    timing_tolerance: Samples,
+    of_parts: bool,
+) -> list[Measured]:
+    """All measures of each tr of shape (n,), those that a model knows best as it gives them.
+
+    ``of_parts``: the deformations are those of parts, whose energy at td the mismatch is held against.
+    """
+    mismatch = part_mismatch(vibration, tr, td).tolist() if of_parts else repeat(None, tr.size)
+    columns = (sign_match(vibration, tr, td), lock_in_error(vibration, tr, td), residual, residual_high)
+    lists = (column.tolist() for column in (*columns, timing_tolerance))
+    return [Measured(*row) for row in zip(*lists, mismatch, strict=True)]
 
 
 # The growth of the lock-in error that ``timing_tolerance`` allows.
@@ -80,10 +112,10 @@ def lock_in_error(vibration: Deformation, tr: Samples | float, td: Samples | flo
     return np.asarray(apart / np.sqrt(vibration.vibration_energy(td)))
 
 
-def part_mismatch(vibration: Deformation, tr: Samples | float, td: float) -> Samples:
+def part_mismatch(vibration: Deformation, tr: Samples | float, td: Samples | float) -> Samples:
     """D = L/sqrt(1 - K) [-]: the same error against the internal energy at td alone, of the shape of ``tr``."""
     apart = np.linalg.norm(_apart(vibration, tr, td), axis=0)
-    return np.asarray(apart / np.linalg.norm(vibration.amplitudes(td)))
+    return np.asarray(apart / np.linalg.norm(vibration.amplitudes(td), axis=0))
 
 
 def mismatch_shares(vibration: Deformation, tr: float, td: float) -> Samples:

@@ -6,7 +6,6 @@ A further kind of vibration is a module with these methods and a line in `model_
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -21,8 +20,9 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
+    from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.modes import Modes
-    from d2rpick.vibration.moments import Measured, Moment
+    from d2rpick.vibration.moments import Moment
     from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.part_signs import PartVibration, SignedParts, Unsigned
@@ -133,7 +133,7 @@ def model_at(history: History, td: float, evidence: Evidence) -> Vibration:
 
         return OfParts(whole, signed)
     if isinstance(whole, OfModes):
-        return replace(whole, doubts=(SUNK,)) if sunk else whole
+        return whole.doubting((SUNK,)) if sunk else whole
     return whole.without_parts(evidence.parts, sunk=sunk)
 
 
@@ -172,5 +172,5 @@ def describing(history: History, td: float, evidence: Evidence) -> OfModes | OfE
     """Give the model of the energy whatever it is worth at ``td``: an oscillator where it describes a window."""
     fit, span = evidence.fit, evidence.span
     if fit and fit.mode and span:
-        return OfModes(history, td, fit, fit.mode, span)
+        return OfModes(history, td, fit, span)
     return OfEnergy(history, td, "no oscillator describes the record")

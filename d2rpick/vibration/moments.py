@@ -1,4 +1,4 @@
-"""Times that may serve as tr, and what is measured at them."""
+"""Times that may serve as tr."""
 
 from __future__ import annotations
 
@@ -15,17 +15,6 @@ class Moment(NamedTuple):
     tr: float
     kind: str
     rising: bool | None
-
-
-class Measured(NamedTuple):
-    """Measures that only known deformations give; ``residual_high``: at worst, with what a fit may have missed."""
-
-    sign_match: bool
-    lock_in_error: float
-    residual: float
-    residual_high: float
-    timing_tolerance: float
-    part_mismatch: float | None
 
 
 # Why no tr can be trusted where the vibration is known but cannot be made out at td.

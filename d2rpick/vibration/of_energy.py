@@ -2,46 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.histories.crossings import find_turns, passages
+from d2rpick.histories.names import listing
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import SUNK, Moment
 from d2rpick.vibration.uncertainty import sampled_reach
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.part_shares import PartMatch
-    from d2rpick.vibration.part_signs import SignedParts
+    from d2rpick.vibration.part_signs import SignedParts, Unsigned
+
+# Parts that a warning names of those that share a reason; the JSON document has all.
+_NAMED = 5
 
 
-@dataclass(frozen=True, eq=False)
 class OfEnergy:
     """The samples of a record seen from ``td``; ``unknown`` says why no deformation is known."""
-
-    history: History
-    td: float
-    unknown: str
-    doubts: tuple[str, ...] = ()
 
     basis = "energy"
     undescribed = ""
     estimated = mode = kinetic_share = sunk = None
     unsigned = signed = ()
 
+    def __init__(self, history: History, td: float, unknown: str, doubts: tuple[str, ...] = ()) -> None:
+        self.history, self.td = history, td
+        self.unknown, self.doubts = unknown, doubts
+
     def without_parts(self, parts: SignedParts | None, *, sunk: bool) -> OfEnergy:
         """Say too why single parts do not tell the deformation: without a sign, or ``sunk`` at td."""
         reasons = [self.unknown]
         reasons += ["at td the vibration of the parts is below the error of a solver"] * sunk
-        reasons += [f"{part.name}: {part.reason}" for part in (parts.unsigned if parts else ())]
+        reasons += _by_reason(parts.unsigned) if parts else []
         doubts = (SUNK, *(doubt for doubt in self.doubts if doubt != SUNK)) if sunk else self.doubts
-        return replace(self, unknown="; ".join(reasons), doubts=doubts)
+        return OfEnergy(self.history, self.td, "; ".join(reasons), doubts)
 
     def energy(self, time: float) -> float:
         """E of the samples, linear between them [energy]."""
@@ -105,3 +106,11 @@ def sampled_before(history: History, td: float, level: float) -> tuple[Samples, 
     """Times and energies of the samples before ``td``, and td itself with its ``level`` at the end."""
     before = history.time < td
     return np.append(history.time[before], td), np.append(history.energy[before], level)
+
+
+def _by_reason(unsigned: Iterable[Unsigned]) -> list[str]:
+    """Name the parts of each reason, since all of a structure often share one."""
+    names: dict[str, list[str]] = {}
+    for part in unsigned:
+        names.setdefault(part.reason, []).append(part.name)
+    return [f"{listing(parts, most=_NAMED)}: {reason}" for reason, parts in names.items()]

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.histories.crossings import find_crossings
 from d2rpick.vibration import measures
-from d2rpick.vibration.moments import Measured, Moment
+from d2rpick.vibration.equivalent import replayed_residual
+from d2rpick.vibration.moments import Moment
 from d2rpick.vibration.of_energy import sampled_before
 from d2rpick.vibration.one_mode import Mode
-from d2rpick.vibration.replay import replayed_residual
 from d2rpick.vibration.second_mode import residual_bound
 from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.lock_in_profile import Profile
+    from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.span import Span
@@ -38,22 +38,25 @@ _DROWNED = 0.2
 _ZERO = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
 class OfModes:
     """The ``mode`` of a ``fit``, or several, that describes a record within ``span``, seen from a ``td`` in it."""
-
-    history: History
-    td: float
-    fit: Identification
-    mode: Mode | Modes
-    span: Span
-
-    doubts: tuple[str, ...] = ()
 
     basis = "oscillator"
     undescribed = "not described by the oscillator"
     unknown = estimated = None
     unsigned = signed = ()
+
+    def __init__(
+        self, history: History, td: float, fit: Identification, span: Span, doubts: tuple[str, ...] = ()
+    ) -> None:
+        assert fit.mode
+        self.history, self.td = history, td
+        self.fit, self.mode, self.span = fit, fit.mode, span
+        self.doubts = doubts
+
+    def doubting(self, doubts: tuple[str, ...]) -> OfModes:
+        """Give the same with these doubts."""
+        return OfModes(self.history, self.td, self.fit, self.span, doubts)
 
     @cached_property
     def sunk(self) -> str | None:
@@ -143,11 +146,10 @@ class OfModes:
         if not tr.size:
             return [None] * times.size
         if isinstance(self.mode, Mode):
-            tolerance = measures.timing_tolerance(self.mode, tr, self.td).tolist()
+            tolerance = measures.timing_tolerance(self.mode, tr, self.td)
         else:
             assert self.profile is not None
-            lock_in = measures.lock_in_error(self.mode, tr, self.td).tolist()
-            tolerance = [self.profile.tolerance(*one) for one in zip(tr.tolist(), lock_in, strict=True)]
+            tolerance = self.profile.tolerances(tr, measures.lock_in_error(self.mode, tr, self.td))
         return spread(measured(self.fit, self.mode, tr, self.td, tolerance), inside)
 
     def inside(self, times: Samples) -> NDArray[np.bool_]:
@@ -198,18 +200,15 @@ class OfModes:
 
 
 def measured(
-    fit: Identification, mode: Mode | Modes, tr: Samples, td: Samples | float, tolerance: Iterable[float]
+    fit: Identification, mode: Mode | Modes, tr: Samples, td: Samples | float, tolerance: Samples
 ) -> Iterator[Measured]:
     """Give the measures of each tr of shape (n,), for one ``td`` or each for its own, with its timing tolerance."""
     residual = replayed_residual(mode, tr, td)
-    columns: tuple[NDArray[Any], ...] = (
-        measures.sign_match(mode, tr, td),
-        measures.lock_in_error(mode, tr, td),
-        residual,
-        residual_bound(residual, fit, tr, td),
+    highest = residual_bound(residual, fit, tr, td)
+    found = measures.measured(
+        mode, tr, td, residual=residual, residual_high=highest, timing_tolerance=tolerance, of_parts=False
     )
-    rows = zip(*(column.tolist() for column in columns), tolerance, strict=True)
-    return (Measured(sign, lock_in, left, highest, off, None) for sign, lock_in, left, highest, off in rows)
+    return iter(found)
 
 
 def spread(found: Iterator[Measured], inside: NDArray[np.bool_]) -> list[Measured | None]:

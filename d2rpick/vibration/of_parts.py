@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from d2rpick.vibration import measures
 from d2rpick.vibration.lock_in_profile import Profile
-from d2rpick.vibration.moments import Measured, Moment
+from d2rpick.vibration.moments import Moment
 from d2rpick.vibration.of_modes import OfModes
 from d2rpick.vibration.part_shares import PartMatch, contributions
 
@@ -18,22 +17,22 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.of_energy import OfEnergy
     from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.part_signs import PartVibration, Unsigned
 
 
-@dataclass(frozen=True, eq=False)
 class OfParts:
     """Signed parts seen from the td of ``whole``, the model of their energy together."""
-
-    whole: OfModes | OfEnergy
-    parts: PartVibration
 
     basis = "parts"
     unknown = None
     undescribed = "the signs of the parts' deformations cannot be followed from here to td"
+
+    def __init__(self, whole: OfModes | OfEnergy, parts: PartVibration) -> None:
+        self.whole, self.parts = whole, parts
 
     @property
     def td(self) -> float:
@@ -114,12 +113,15 @@ class OfParts:
         tr = times[inside]
         if not tr.size:
             return [None] * times.size
-        lock_in = measures.lock_in_error(self.parts, tr, self.td).tolist()
-        tolerance = [self.profile.tolerance(*one) for one in zip(tr.tolist(), lock_in, strict=True)]
-        residual = [measures.residual(error, self.kinetic_share) for error in lock_in]
-        signs = measures.sign_match(self.parts, tr, self.td).tolist()
-        mismatch = measures.part_mismatch(self.parts, tr, self.td).tolist()
-        found = (Measured(*row) for row in zip(signs, lock_in, residual, residual, tolerance, mismatch, strict=True))
+        lock_in = measures.lock_in_error(self.parts, tr, self.td)
+        tolerance = self.profile.tolerances(tr, lock_in)
+        residual = np.array([measures.residual(error, self.kinetic_share) for error in lock_in.tolist()])
+        found = iter(
+            measures.measured(
+                self.parts, tr, self.td,
+                residual=residual, residual_high=residual, timing_tolerance=tolerance, of_parts=True,
+            )
+        )  # fmt: skip
         return [next(found) if one else None for one in inside]
 
     def errors(self, times: Samples) -> Samples:

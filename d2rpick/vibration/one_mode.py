@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
+# Beyond, squares of energies are no numbers any more; no unit system comes near.
+LARGEST_ENERGY = 1e150
 # Halving alone would need no more to reach rounding.
 _STEPS = 64
 _EPS = float(np.finfo(np.float64).eps)
@@ -119,7 +121,9 @@ class Mode:
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Energy of the vibration about the preload, V = (q - q_0)**2 + T; dV/dt = -2 alpha T [energy]."""
-        swing, velocity = self._swings(t, (self.cosine, self.sine), self._velocity_parts)
+        decay, cos, sin = self._waves(t)
+        cosine, sine = self._velocity_parts
+        swing, velocity = decay * (self.cosine * cos + self.sine * sin), decay * (cosine * cos + sine * sin)
         return swing**2 + (velocity / self.omega_0) ** 2
 
     def energy_slopes(self, t: Samples | float) -> tuple[Samples, Samples]:
@@ -142,6 +146,8 @@ class Mode:
 
     def extrema(self, start: float, end: float) -> tuple[float, ...]:
         """Find the times in (start, end), ascending, where the deformation stands still (q' = 0) [time]."""
+        if not start < end:  # nor need ``start`` be a time whose phase is a number
+            return ()
         first = float(self.standstill_after(start))
         times = first + np.pi / self.omega * np.arange(max(0.0, np.ceil((end - first) * self.omega / np.pi)))
         return tuple(times[(times > start) & (times < end)].tolist())
@@ -203,14 +209,15 @@ class Mode:
         return self.omega * self.sine - half * self.cosine, -self.omega * self.cosine - half * self.sine
 
     def _swing(self, t: Samples | float, cosine: float, sine: float) -> Samples:
-        return self._swings(t, (cosine, sine))[0]
+        """exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)) with s = t - origin."""
+        decay, cos, sin = self._waves(t)
+        return decay * (cosine * cos + sine * sin)
 
-    def _swings(self, t: Samples | float, *parts: tuple[float, float]) -> list[Samples]:
-        """exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)) with s = t - origin, for each cosine and sine."""
+    def _waves(self, t: Samples | float) -> tuple[Samples, Samples, Samples]:
+        """exp(-alpha s/2), cos(omega s) and sin(omega s)."""
         s = np.asarray(t, dtype=np.float64) - self.origin
         angle = self.omega * s
-        decay, cos, sin = np.exp(-self.alpha / 2 * s), np.cos(angle), np.sin(angle)
-        return [decay * (cosine * cos + sine * sin) for cosine, sine in parts]
+        return np.exp(-self.alpha / 2 * s), np.cos(angle), np.sin(angle)
 
 
 def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Samples, Samples]:

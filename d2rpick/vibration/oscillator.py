@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 Values: TypeAlias = "NDArray[np.float64]"
 
 
+# Of stiffness and masses: beyond, their products and quotients are no numbers any more; no unit system comes near.
+_SMALLEST, _LARGEST = 1e-100, 1e100
+
+
 class State(NamedTuple):
     """Displacements ``z`` (frame), ``y`` (suspended mass) and velocities ``vz``, ``vy``; numbers or arrays alike."""
 
@@ -42,7 +46,7 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Oscillator:
-    """Floating oscillator; RangeError unless stiffness and masses are positive and all numbers finite.
+    """Floating oscillator; RangeError unless stiffness and masses are from 1e-100 to 1e100 and alpha is finite.
 
     ``stiffness`` k [force/length], ``mass`` M (suspended) and ``frame_mass`` m [mass], ``alpha`` [1/time].
     A slightly negative alpha, as a fit to scattered samples may give, makes the motion grow.
@@ -55,8 +59,9 @@ class Oscillator:
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass", "frame_mass"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise RangeError(f"{name} is {getattr(self, name)}, a positive number was expected")
+            if not _SMALLEST <= getattr(self, name) <= _LARGEST:
+                found = f"{name} is {getattr(self, name)}"
+                raise RangeError(f"{found}, a positive number from {_SMALLEST:g} to {_LARGEST:g} was expected")
         if not np.isfinite(self.alpha):
             raise RangeError(f"alpha is {self.alpha}, a finite number was expected")
 

@@ -8,6 +8,7 @@ bends sharply unless the sign is turned there, at any other minimum it bends sha
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from d2rpick.vibration.envelope import Envelope
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -34,6 +35,8 @@ _MOST_OFF_CENTRE = 0.5
 # Every other sample is left out again and again while minima are unclear: in fine output a zero drowns in the error
 # of the solver, 1e-5 of the highest energy, and the root is round there.  But minima stay this many samples apart.
 _LEAST_APART = 8
+# Samples of parts that are looked at together: what is made of them stays in the cache.
+_TOGETHER = 1 << 14
 # Signs of five samples about a minimum where the deformation turns nowhere, just before the minimum, just after it.
 _TURNS = np.array([[1, 1, 1, 1, 1], [-1, -1, 1, 1, 1], [-1, -1, -1, 1, 1]])
 # Parts without a sign are left out where they hold no more than this share of the energy: D changes by 0.2 at most,
@@ -117,11 +120,11 @@ def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Signed
     signed: list[tuple[str, Samples]] = []
     unsigned: list[Unsigned] = []
     unclear: list[Samples] = []
-    roots = np.sqrt(np.maximum(energies, 0.0)).T
-    for name, root in zip(names, roots, strict=True):
-        zeros = _zeros(time, root)
+    roots = np.sqrt(np.maximum(energies.T, 0.0), order="C")
+    lasting = np.gradient(time)
+    for name, root, zeros in zip(names, roots, _all_zeros(time, roots), strict=True):
         deformation = np.where(np.searchsorted(zeros.sure, time) % 2, -root, root)
-        reason = _no_sign(time, deformation, zeros.sure)
+        reason = _no_sign(lasting, deformation, zeros.sure)
         if reason:
             unsigned.append(Unsigned(name, reason))
         else:
@@ -139,11 +142,10 @@ def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Signed
     )
 
 
-def _no_sign(time: Samples, deformation: Samples, zeros: Samples) -> str | None:
-    """Say why a deformation is none that swings about zero."""
+def _no_sign(lasting: Samples, deformation: Samples, zeros: Samples) -> str | None:
+    """Say why a deformation, whose states last so long, is none that swings about zero."""
     if zeros.size < 2:
         return "its energy does not return to zero: it is preloaded, has yielded or vibrates in many modes"
-    lasting = np.gradient(time)
     off, size = abs(float(lasting @ deformation)), float(lasting @ np.abs(deformation))
     if off > _MOST_OFF_CENTRE * size:
         return f"its deformation would vibrate about {off / size:.2g} of its mean size: it is preloaded or has yielded"
@@ -158,41 +160,65 @@ class _Zeros(NamedTuple):
     unseen: Samples
 
 
-def _zeros(time: Samples, root: Samples) -> _Zeros:
-    """Find the zeros from every sample, or every other, and so on: what leaves the fewest doubts."""
-    best, stride = _zeros_of(time, root, _minima(root)), 2
-    while best.doubtful.size:
-        coarse = root[::stride]
+def _all_zeros(time: Samples, roots: Samples) -> Iterator[_Zeros]:
+    """Find the zeros of each row of ``roots``, shape (k, n)."""
+    rows = max(1, _TOGETHER // time.size)
+    for first in range(0, len(roots), rows):
+        yield from _zeros(time, roots[first : first + rows])
+
+
+def _zeros(time: Samples, roots: Samples) -> list[_Zeros]:
+    """Find the zeros of each row from every sample, or every other, and so on: what leaves the fewest doubts."""
+    best, stride = _zeros_of(time, roots, _minima(roots)), 2
+    unsure = _unsure(best, range(len(best)))
+    while unsure.size:
+        coarse = roots[unsure, ::stride]
         minima = _minima(coarse)
-        if coarse.size < _LEAST_APART * max(1, minima.size):
-            break
-        coarser = _zeros_of(time[::stride], coarse, minima)
-        best, stride = min(best, coarser, key=lambda found: found.doubtful.size), 2 * stride
+        apart = coarse.shape[1] >= _LEAST_APART * np.maximum(1, np.count_nonzero(minima, axis=1))
+        rows = unsure[apart].tolist()
+        for row, coarser in zip(rows, _zeros_of(time[::stride], coarse[apart], minima[apart]), strict=True):
+            best[row] = min(best[row], coarser, key=lambda found: found.doubtful.size)
+        unsure, stride = _unsure(best, rows), 2 * stride
     return best
 
 
-def _zeros_of(time: Samples, root: Samples, at: Places) -> _Zeros:
-    """Zeros from just these samples, whose minima are ``at``."""
+def _unsure(zeros: Sequence[_Zeros], rows: Iterable[int]) -> Places:
+    return np.array([row for row in rows if zeros[row].doubtful.size], dtype=np.intp)
+
+
+def _zeros_of(time: Samples, roots: Samples, minima: NDArray[np.bool_]) -> list[_Zeros]:
+    """Zeros of each row from just these samples, which have these minima."""
+    row, at = np.nonzero(minima)
     # two samples to either side tell how the root bends; of a minimum nearer to an end nothing is known
-    early, late = at < 2, at >= root.size - 2
-    inner = at[~early & ~late]
-    around = inner[:, np.newaxis] + np.arange(-2, 3)
-    plain, before, after = _bends(time[around], root[around] * _TURNS[:, np.newaxis])
+    early, late = at < 2, at >= time.size - 2
+    own, middle = row[~early & ~late], at[~early & ~late]
+    around = middle[:, np.newaxis] + np.arange(-2, 3)
+    plain, before, after = _bends(time[around], roots[own[:, np.newaxis], around] * _TURNS[:, np.newaxis])
     turned = np.minimum(before, after)
     zero = plain > _CLEARLY * turned
     doubt = ~zero & (turned <= _CLEARLY * plain)
-    left = np.where(before < after, inner - 1, inner)[zero]
-    weight = root[left] + root[left + 1]
-    share = np.divide(root[left], weight, out=np.full(left.shape, 0.5), where=weight > 0)
+    left = np.where(before < after, middle - 1, middle)[zero]
+    low, high = roots[own[zero], left], roots[own[zero], left + 1]
+    share = np.divide(low, low + high, out=np.full(left.shape, 0.5), where=low + high > 0)
+    sure = time[left] + share * (time[left + 1] - time[left])
     # a zero beside a minimum near an end may lie one sample further inwards
-    unseen = np.concatenate([time[at[early] + 1], time[at[late] - 1]])
-    return _Zeros(time[left] + share * (time[left + 1] - time[left]), time[inner[doubt]], unseen)
+    ends, unseen = np.append(row[early], row[late]), np.append(time[at[early] + 1], time[at[late] - 1])
+    order = np.argsort(ends, kind="stable")
+    tables = (sure, own[zero]), (time[middle[doubt]], own[doubt]), (unseen[order], ends[order])
+    parted = (_by_row(times, owners, len(roots)) for times, owners in tables)
+    return [_Zeros(*one) for one in zip(*parted, strict=True)]
 
 
-def _minima(values: Samples) -> Places:
-    """Indices of local minima, of a flat one the first; an end below its neighbour counts."""
-    around = np.concatenate([[np.inf], values, [np.inf]])
-    return np.flatnonzero((values < around[:-2]) & (values <= around[2:]))
+def _by_row(values: Samples, row: Places, rows: int) -> list[Samples]:
+    """Values of each row, of which some may have none; they stand in the order of the rows."""
+    edges = np.searchsorted(row, np.arange(rows + 1)).tolist()
+    return [values[first:last] for first, last in pairwise(edges)]
+
+
+def _minima(values: Samples) -> NDArray[np.bool_]:
+    """Where in each row local minima are, of a flat one the first; an end below its neighbour counts."""
+    around = np.pad(values, ((0, 0), (1, 1)), constant_values=np.inf)
+    return np.asarray((values < around[:, :-2]) & (values <= around[:, 2:]))
 
 
 def _bends(times: Samples, values: Samples) -> Samples:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.errors import RangeError
-from d2rpick.vibration.one_mode import Mode
-from d2rpick.vibration.oscillator import Oscillator, State
+from d2rpick.vibration.equivalent import lacking_energy
+from d2rpick.vibration.oscillator import State
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.oscillator import Oscillator
 
 
 @dataclass(frozen=True)
@@ -61,54 +61,6 @@ class Replay:
         return float(np.sqrt(lack / self.oscillator.vibration_energy(reference)))
 
 
-def lacking_energy(oscillator: Oscillator, reference: State, switched: State) -> Samples:
-    """Energy of the vibration that ``switched`` lacks against ``reference``, states at td, numbers or arrays."""
-    lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
-    return oscillator.vibration_energy(lack)
-
-
-def replayed_residual(vibration: Mode | Modes, tr: Samples, td: Samples | float) -> Samples:
-    """Replay each tr of shape (n,) up to ``td`` and give the residual there, of all modes together [-].
-
-    ``td`` is one for all, or one for each.  Energy norm of what the switched run lacks at td, over that of the
-    reference vibration.
-    """
-    lack, whole = np.zeros(tr.shape), np.zeros(tr.shape)
-    for mode in vibration.modes:
-        oscillator, at_td = from_mode(mode, td)
-        at_tr = oscillator.free(at_td, tr - td)  # the closed form runs backwards as well
-        lack += lacking_energy(oscillator, at_td, oscillator.rigid(at_tr, td - tr))
-        whole += oscillator.vibration_energy(at_td)
-    return np.sqrt(lack / whole)
-
-
-def from_mode(mode: Mode, time: Samples | float) -> tuple[Oscillator, State]:
-    """Give an oscillator whose deformation is that of ``mode`` about its preload, and its state at ``time``.
-
-    An energy history tells neither masses nor the motion of the whole; they are chosen so that the deformation
-    equals q - q0 (k = 2), with equal masses and the centre of mass at rest.
-    """
-    mass = 4 / mode.omega_0**2
-    q, velocity = mode.deformation(time) - mode.preload, mode.velocity(time)
-    oscillator = Oscillator(stiffness=2.0, mass=mass, frame_mass=mass, alpha=mode.alpha)
-    return oscillator, State(-q / 2, q / 2, -velocity / 2, velocity / 2)
-
-
-def to_mode(oscillator: Oscillator, v0: float) -> Mode:
-    """Give the energy mode of ``oscillator`` struck at time 0: frame velocity ``v0``, all else at rest (7).
-
-    RangeError when it is not underdamped: such a motion has no vibration to lock in.
-    """
-    omega = oscillator.omega_2
-    if not omega > 0:
-        raise RangeError(
-            f"alpha {oscillator.alpha:g} overdamps the oscillator, whose rate is {oscillator.omega_0:g}, "
-            f"less than {2 * oscillator.omega_0:g} was expected"
-        )
-    sine = -v0 * np.sqrt(oscillator.stiffness / 2) / omega
-    return Mode(omega=omega, alpha=oscillator.alpha, cosine=0.0, sine=float(sine), origin=0.0)
-
-
 class Trajectory(NamedTuple):
     """Motion on an even grid of ``time`` (n,): ``state`` and both energies, arrays of the same shape."""
 
@@ -127,8 +79,8 @@ def trajectory(
     written the same.
     """
     count = int(np.floor(t_end / dt * (1 + 1e-12))) + 1
-    time = np.round(dt * np.arange(count), 13 - int(np.floor(np.log10(t_end))))
     with np.errstate(all="ignore"):
+        time = np.round(dt * np.arange(count), 13 - int(np.floor(np.log10(t_end))))
         state = oscillator.free_on_grid(start, dt, count) if switched is None else switched.motion(time)
         motion = Trajectory(time, state, oscillator.internal_energy(state), oscillator.kinetic_energy(state))
     if not all(np.isfinite(column).all() for column in (time, *state, motion.internal_energy, motion.kinetic_energy)):

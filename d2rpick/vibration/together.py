@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.model import Vibration
-    from d2rpick.vibration.moments import Measured, Moment
+    from d2rpick.vibration.moments import Moment
 
 
 def moments_of(vibrations: Sequence[Vibration], tolerance: float, since: Sequence[float]) -> list[Sequence[Moment]]:
@@ -45,7 +46,7 @@ def measured_of(vibrations: Sequence[Vibration], times: Sequence[Samples]) -> li
         inside = {place: one.inside(times[place]) for place, one in alike.items()}
         tr = np.concatenate([times[place][here] for place, here in inside.items()])
         td = np.repeat([one.td for one in alike.values()], [int(here.sum()) for here in inside.values()])
-        tolerance = measures.timing_tolerance(mode, tr, td).tolist()
+        tolerance = measures.timing_tolerance(mode, tr, td)
         found = measured(next(iter(alike.values())).fit, mode, tr, td, tolerance)
         known |= {place: spread(found, here) for place, here in inside.items()}
     return [known[i] if i in known else one.measured(times[i]) for i, one in enumerate(vibrations)]

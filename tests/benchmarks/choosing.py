@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 _ROUNDS = 3
 _PARTS, _PART_STATES = 500, 2000
-_RUNS, _RUN_STATES, _RUN_TD = 100, 10_000, 0.0687534
+_RUNS, _RUN_STATES, _RUN_TD = 1000, 10_000, 0.0687534
 # Cycles in the record, shares of the energy and phases of the five modes.
 _MODES = ((15.5, 1.0, 0.0), (28.5, 0.7, 1.0), (46.5, 0.5, 2.0), (69.5, 0.4, 3.0), (106.0, 0.3, 4.0))
 # Of the largest energy: with 1e5 states some 15,000 candidates.
@@ -107,17 +107,19 @@ def parts_to_matsum() -> float:
 def study_to_loop() -> float:
     """`study` of runs of 1e4 states, one process, over `suggest` of the library on each: per run, start-up in both."""
     names = _runs()
-    return _ratio(("-m", "d2rpick", *_study(names, "1")), ("-c", LOOP, *names))
+    return _ratio(("-m", "d2rpick", *_study(names, "1")), ("-c", LOOP, *names), rounds=1)
 
 
 def study_speed_up() -> float | None:
     """Wall time of a `study` in one process over that in two; None on one core."""
-    return _speed_up(lambda jobs: _study(_runs(), jobs))
+    return _speed_up(lambda jobs: _study(_runs(), jobs), rounds=2)
 
 
 def scan_speed_up() -> float | None:
     """Wall time of `rollover --scan` in one process over that in two; None on one core."""
-    return _speed_up(lambda jobs: ("rollover", "--scan", "--mesh", "6", "--jobs", jobs, "-q", "--exit-zero"))
+    return _speed_up(
+        lambda jobs: ("rollover", "--scan", "--mesh", "6", "--jobs", jobs, "-q", "--exit-zero"), rounds=_ROUNDS
+    )
 
 
 def report_to_matplotlib() -> float:
@@ -196,12 +198,12 @@ def _processor_seconds(command: Sequence[str]) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def _speed_up(command: Callable[[str], Sequence[str]]) -> float | None:
+def _speed_up(command: Callable[[str], Sequence[str]], rounds: int) -> float | None:
     """Wall time of the quickest of some runs with one process over that with two; None on one core."""
     if len(os.sched_getaffinity(0)) < 2:
         return None
     times: dict[str, list[float]] = {"1": [], "2": []}
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         for jobs, found in times.items():
             start = perf_counter()
             _output("-m", "d2rpick", *command(jobs))
@@ -210,5 +212,15 @@ def _speed_up(command: Callable[[str], Sequence[str]]) -> float | None:
 
 
 def _output(*command: str) -> bytes:
-    clean = {name: value for name, value in os.environ.items() if not name.startswith("D2RPICK_")}
-    return subprocess.run([sys.executable, *command], check=True, capture_output=True, cwd=ROOT, env=clean).stdout
+    return subprocess.run(
+        [sys.executable, *command], check=True, capture_output=True, cwd=ROOT, env=environment()
+    ).stdout
+
+
+@cache
+def environment() -> dict[str, str]:
+    """Environment of the processes, for which the package is compiled: an installed one is, a working copy may not."""
+    own = "PYTHONDONTWRITEBYTECODE"
+    clean = {name: value for name, value in os.environ.items() if name != own and not name.startswith("D2RPICK_")}
+    subprocess.run([sys.executable, "-m", "compileall", "-q", "d2rpick"], check=True, cwd=ROOT, env=clean)
+    return clean

@@ -21,6 +21,7 @@ import numpy as np
 
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.opening import Selection, open_run
+from tests.benchmarks.choosing import environment
 from tests.made_binout import GLSTAT, LsdaWriter, values
 from tests.text_files import glstat_text, matsum_text
 
@@ -217,7 +218,7 @@ def _loadtxt(file: Path) -> Samples:
 
 
 def _process(*command: str) -> None:
-    subprocess.run([sys.executable, *command], check=True, capture_output=True)
+    subprocess.run([sys.executable, *command], check=True, capture_output=True, env=environment())
 
 
 def _glstat_loop(file: Path) -> Numbers:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick.choice.calibrate import Observation, calibrate
 from d2rpick.choice.cost import MEASURED
-from d2rpick.choice.observed_cost import observations_of
+from d2rpick.choice.observed_cost import observations_of, observations_of_runs
 from d2rpick.errors import ConfigurationError, DeckError, FormatError
 from tests.deck.inventory.test_radioss import BEGIN, PROPS, nodes, wide
 
@@ -119,3 +120,19 @@ def test_folders_that_say_nothing_are_refused(tmp_path: Path) -> None:
         (folder / name).unlink()
     with pytest.raises(FormatError, match="nothing says what the run took"):
         observations_of(str(folder))
+
+
+def test_a_run_that_is_given_twice_counts_once(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    folder = run_folder(tmp_path / "run")
+    copy = shutil.copytree(folder, tmp_path / "copy")
+    once = observations_of(str(folder))
+    for again in (str(folder), f"{folder}/.", str(copy)):
+        found, cautions = observations_of_runs([str(folder), again])
+        assert found == once
+        assert [one.code for one in cautions] == ["same-leg-twice"] * 2
+        assert ("has the content of" if again == str(copy) else "is given twice; it counts") in cautions[0].message
+    (copy / "TEST_0002.out").write_text(listing(200, 0.8e-3, 1.3e-3))
+    found, cautions = observations_of_runs([str(folder), str(copy)])
+    assert len(found) == 3
+    assert len(cautions) == 1

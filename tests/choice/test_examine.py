@@ -10,7 +10,7 @@ import pytest
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.errors import RangeError
-from d2rpick.vibration.replay import to_mode
+from d2rpick.vibration.equivalent import to_mode
 from tests import paper
 from tests.energies import codes, of
 

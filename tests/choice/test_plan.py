@@ -5,7 +5,10 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from d2rpick.choice.of_run import Reference, read, suggest_of
 from d2rpick.choice.plan import Plan, plan_of
@@ -210,3 +213,60 @@ def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) 
     assert all(one.end < other.start for one, other in pairwise(found.rows))
     windows = found.windows(every=True)
     assert all(one[1] < other[0] for one, other in pairwise(windows))
+
+
+def bouncing(seed: int, folder: Path) -> list[str]:
+    """Write the energy of a run of two to five impacts, after each of which another vibration sets in."""
+    made = np.random.default_rng(seed)
+    time = np.linspace(0.0, 1.0, int(made.integers(300, 900)))
+    plastic, elastic = np.zeros_like(time), np.zeros_like(time)
+    for impact in np.sort(made.uniform(0.05, 0.95, int(made.integers(2, 6)))):
+        rate, damping, size = made.uniform((40, 0, 0.3), (300, 10, 2))
+        since = np.clip(time - impact, 0, None)
+        pushed = np.clip(since / made.uniform(0.01, 0.05), 0, 1)
+        elastic += size * np.exp(-damping * since) * np.sin(rate * since) * pushed
+        plastic += made.uniform(0, 2) * pushed
+    table = folder / f"{seed}.csv"
+    np.savetxt(table, np.stack([time, plastic + elastic**2], axis=1), "%.17g", ",", header="time,energy", comments="")
+    return [str(table)]
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 100_000))
+def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """The energy shows another beginning of the flight to each td; a window began before the flight of its row."""
+    plan = plan_of(read(bouncing(seed, tmp_path_factory.getbasetemp())), Settings(replay=False))
+    for row in plan.rows:
+        assert row.window is None or row.start <= row.window[0] < row.window[1] <= row.end
+
+
+# ---- a short window before a longer one
+
+
+@pytest.fixture(scope="module")
+def car() -> Reference:
+    return read([str(shared("openradioss/car_drop/carT01.gz"))], Selection(parts=("1-14",)))
+
+
+def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(car: Reference) -> None:
+    """Between two pushes the car is rigid for 17 ms, after them for 108: the window that `parts` compares sets in."""
+    found = plan_of(car, PLAIN)
+    assert statuses(found) == ["left-out", "supported"]
+    assert "flight 2 for 0.108: a run supports only one window" in (found.rows[0].reason or "")
+    longest = suggest_of(car, None, PLAIN).recommended
+    assert longest is not None
+    assert found.windows() == ((longest.tr, longest.td),)
+
+
+def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(car: Reference) -> None:
+    found = plan_of(car, PLAIN, min_rigid=0.013)
+    assert statuses(found) == ["supported", "re-plan"]
+    assert found.rows[0].rigid_time == pytest.approx(0.0171, abs=1e-4)
+    assert [one.code for one in found.cautions][-1] == "longer-window-later"
+
+
+def test_a_window_of_more_than_half_the_longest_comes_first() -> None:
+    """One after the other both are had with one more run; DROP2: 0.071 and then 0.091."""
+    found = plan_of(real("drop2T01.gz"), PLAIN)
+    assert statuses(found) == ["supported", "left-out", "supported", "re-plan", "re-plan", "left-out", "re-plan"]
+    assert found.rows[4].rigid_time == pytest.approx(0.0906, abs=1e-4)

@@ -97,7 +97,7 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
 def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -> None:
     situation = examine(car("1-17"), 0.12, Settings())
     ranked = rank(find_candidates(situation))
-    assert situation.drift is not None
+    assert situation.bodies is not None
     off = replace(ranked, situation=situation, position_error=np.where(ranked.tr < 0.0395, 1.0, 0.0))
     first, second = ranked[0], rank(off)[0]
     assert first.tr < 0.0395 < second.tr < first.tr + 0.1 * (0.12 - first.tr)

@@ -138,6 +138,8 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         ("suggest --td 1 --margin -1 x", ["--margin", "-1 was found", "at least 0 was expected"]),
         ("suggest --td 1 --tolerance -1 x", ["--tolerance", "at least 0 was expected"]),
         ("suggest --td 1 --stiffness 0 x", ["--stiffness", "above 0 was expected"]),
+        ("suggest --td 1 --step-ratio 0.5 --cost-share 0.5 x", ["--step-ratio", "at least 1 was expected"]),
+        ("parts --deck x --step-ratio 0.5 x", ["--step-ratio", "at least 1 was expected"]),
         # contradictions
         (f"verify --tr 0.07 --td 0.064 {ENERGY}", ["tr 0.07 is not before td 0.064"]),
         (f"verify --tr 0.064 --td 0.064 {ENERGY}", ["tr 0.064 is not before td 0.064"]),
@@ -150,6 +152,15 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         (f"suggest --td 0.064 --mass 31.4 {ENERGY}", ["--mass needs --stiffness"]),
         (f"suggest --td 0.064 {GIVEN} --frame-mass 2 {ENERGY}", ["either --frame-mass or --beta"]),
         (f"suggest --td 0.064 {GIVEN} --alpha 5000 {ENERGY}", ["alpha 5000", "less than 502.2"]),
+        (f"suggest --td 0.064 {GIVEN} --mass 1e-308 {ENERGY}", ["mass is 1e-308", "from 1e-100 to 1e+100"]),
+        (f"verify --tr 0.01 --td 0.064 {GIVEN} --beta 1e308 {ENERGY}", ["frame_mass is 3.1", "from 1e-100 to 1e+100"]),
+        (f"explore --td-window 0.06 0.07 {GIVEN} --v0 -1e308 {ENERGY}", ["v0 is -1e+308", "energies above 1e+150"]),
+        (f"suggest --td 0.064 {GIVEN} --v0 1e155 {ENERGY}", ["v0 is 1e+155", "energies above 1e+150"]),
+        # no name of a file; no shell can pass it
+        ("suggest --td 1 'a\0b'", ["'a\\x00b' holds a NUL byte"]),
+        (f"suggest --td 0.064 -o 'a\0b' {ENERGY}", ["--output-file", "NUL byte"]),
+        (f"plan --deck 'a\0b' {ENERGY}", ["--deck", "NUL byte"]),
+        ("check 'a\0b'", ["NUL byte"]),
         # replay
         ("replay", ["--stiffness"]),
         ("replay --stiffness 1 --mass 1 --v0 1 --t-end 1 --dt 1", ["either --frame-mass or --beta"]),
@@ -161,6 +172,7 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         (f"{ONE_COMMAND} --td 0.006", ["--tr and --td need each other"]),
         (f"{ONE_COMMAND} --tr 0.006 --td 0.005", ["--tr 0.006 is not before --td 0.005"]),
         (f"{ONE_COMMAND} -o motion.txt", ["motion.txt", "--write-as: csv, hdf5, glstat, matsum"]),
+        ("replay --stiffness 1 --mass 1 --beta 1 --v0 1 --t-end 1e-308 --dt 1e-308", ["exceeds the range of numbers"]),
         # files to be written; all of them are known to be wrong before anything is computed
         (f"suggest --td 0.064 -o absent/result.txt {ENERGY}", ["absent/result.txt: no such folder: 'absent'"]),
         (f"suggest --td 0.064 -o . {ENERGY}", [".: this is a folder"]),
@@ -180,6 +192,27 @@ def test_a_usage_that_makes_no_sense_is_explained_in_one_line(
     for part in parts:
         assert part in message
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        ("suggest --td 0.064 --margin 1e308", 1),
+        ("suggest --td-window 0.06 0.07 --margin 1e308", 1),
+        ("explore --td-window 0.06 0.07 --steps 2 --margin 1e308", 1),
+        ("plan --margin 1e308", 1),
+        ("suggest --td 0.064 --margin 1e-308", 0),
+        ("suggest --td 0.064 --margin -0.0", 0),
+        ("suggest --td 0.064 --max-residual 1e308", 0),
+        ("study --td 0.064 --jobs 1 --max-residual 1e155", 0),
+        ("verify --tr 0.0128853 --td 0.064 --tolerance 5e-324", 1),
+        ("suggest --td 0.064 --cost-share 1e-308 --step-ratio 1e308", 0),
+    ],
+)
+def test_a_number_of_any_size_has_an_answer(line: str, code: int) -> None:
+    result = run(*shlex.split(line), ENERGY)  # a warning of numpy would be raised here
+    assert result.exit_code == code, result.stderr
+    assert "error" not in result.stderr
 
 
 # Records that can be read but hold no answer: content, arguments, and the warning that says why.

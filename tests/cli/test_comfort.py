@@ -81,7 +81,10 @@ def test_parts_are_completed_from_the_history_that_was_typed() -> None:
     ("args", "told"),
     [
         (("--td", "64", ENERGY), "was it meant in ms? Then give --td 0.064, in the unit of the record"),
-        (("--td-window", "60", "70", ENERGY), "was it meant in ms? Then give --td-window 0.06"),
+        (
+            ("--td-window", "60", "70", ENERGY),
+            "was it meant in ms? Then give --td-window 0.06 0.07, in the unit of the record",
+        ),
         (("--td", "64ms", ENERGY), "give it in the unit of the history, without naming that; in s it is 0.064"),
         (("64", ENERGY), "a time is given as --td, a number in the unit of the record"),
         (("64ms", ENERGY), "a time is given as --td, a number in the unit of the record, 0.064 where it is s"),

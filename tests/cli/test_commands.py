@@ -60,10 +60,22 @@ def test_a_rollover_without_an_oscillator_is_judged_by_energy_after_the_trip() -
         assert {candidate[key] for key in ("sign_match", "lock_in_error", "residual", "timing_tolerance")} == {None}
 
 
+def test_what_a_pair_keeps_and_how_good_it_is_are_two_things() -> None:
+    poor = run("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY).stdout.splitlines()
+    assert poor[0].startswith("verdict  verified: tr lies in the flight")
+    assert poor[1] == "quality  poor: the vibration after td is off by 96%"
+    alone = run("verify", "--tr", "0.0128853", "--td", "0.064", "--no-verify", ENERGY).stdout.splitlines()
+    assert (
+        alone[0]
+        == "verdict  verified by the energy level alone: tr lies in the flight, its level is within the tolerance"
+    )
+
+
 def test_the_better_pair_verifies_and_the_crossing_before_it_of_opposite_sign_does_not() -> None:
     good = run("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY)
     assert good.exit_code == 0
-    assert "verdict  verified" in good.stdout
+    assert good.stdout.startswith("verdict  verified: tr lies in the flight, its sign matches and its error is within")
+    assert good.stdout.splitlines()[1] == "quality  good"
     bad = answer("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY)
     assert (bad["verified"], bad["tr_ok"], bad["sign_match"]) == (False, False, False)
     assert any("opposite sign" in reason for reason in bad["reasons"])
@@ -251,11 +263,35 @@ def test_options_come_from_the_environment_too() -> None:
     assert run("suggest", ENERGY, env={"D2RPICK_SUGGEST_TD": "soon"}).exit_code == 2
 
 
-def test_a_time_on_the_command_line_overrules_a_window_in_the_environment_and_the_reverse() -> None:
-    td, window = ("--td", "0.064"), ("--td-window", "0.06", "0.07")
-    for args, env in ((td, {"D2RPICK_SUGGEST_TD_WINDOW": "0.06 0.07"}), (window, {"D2RPICK_SUGGEST_TD": "0.064"})):
-        result = run("suggest", *args, "-f", "value", ENERGY, env=env)
-        assert (result.exit_code, result.stdout) == (0, run("suggest", *args, "-f", "value", ENERGY).stdout)
+GIVEN = {"stiffness": "660e3", "mass": "31.4", "beta": "2", "alpha": "50", "v0": "6"}
+
+
+@pytest.mark.parametrize(
+    ("command", "args", "env"),
+    [
+        ("suggest", "--td 0.064", {"td_window": "0.06 0.07"}),
+        ("suggest", "--td-window 0.06 0.07", {"td": "0.064"}),
+        ("suggest", "--td 0.064 --no-verify", {"fit_window": "0 0.1", **GIVEN}),
+        ("suggest", "--td 0.064 --fit-window 0 0.1", {"no_verify": "1"}),
+        ("study", "--td 0.064", {"td_window": "0.06 0.07"}),
+        ("study", "--td-window 0.06 0.07", {"td": "0.064"}),
+        ("study", "--td 0.064 --jobs 1", {"scheduler": "tcp://127.0.0.1:1"}),
+        ("explore", "--td-window 0.06 0.07 --steps 2 --energy 2", {"part": "1"}),
+        ("verify", "--tr 0.0128853 --td 0.064 --stiffness 660e3 --mass 31.4 --frame-mass 15.7 --alpha 50 --v0 6",
+         {"beta": "3", "no_verify": "1", "fit_window": "0 0.1"}),
+        ("plan", "--energy internal_energy", {"part": "1"}),
+    ],
+)  # fmt: skip
+def test_an_option_overrules_those_in_the_environment_that_it_excludes(
+    command: str, args: str, env: dict[str, str]
+) -> None:
+    named = {f"D2RPICK_{command}_{name}".upper(): value for name, value in env.items()}
+    plain, overruled = (run(command, *args.split(), "-f", "csv", ENERGY, env=each) for each in ({}, named))
+    assert overruled.exit_code in (0, 1), overruled.stderr
+    assert (overruled.exit_code, overruled.stdout) == (plain.exit_code, plain.stdout)
+
+
+def test_options_that_exclude_each_other_are_refused_where_both_come_from_the_environment() -> None:
     both = {"D2RPICK_SUGGEST_TD_WINDOW": "0.06 0.07", "D2RPICK_SUGGEST_TD": "0.064"}
     assert run("suggest", ENERGY, env=both).exit_code == 2
 

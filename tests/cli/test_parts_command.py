@@ -157,3 +157,33 @@ def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
     assert json.loads(result.stdout)["weights"]["per_element"].keys() == {"QEPH"}
     (tmp_path / "empty").mkdir()
     assert run("calibrate", str(tmp_path / "empty")).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ("parts",), ("suggest", "--td", "0.37"), ("plan",), ("verify", "--tr", "0.097", "--td", "0.37"),
+        ("explore", "--td-window", "0.3", "0.37", "--steps", "2"),
+    ],
+)  # fmt: skip
+def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(asked: tuple[str, ...], tmp_path: Path) -> None:
+    def codes(*args: str) -> set[str]:
+        part = () if asked[0] == "parts" else ("--part", "box")
+        return {one["code"] for one in answer(*asked, *part, *args)["warnings"]}
+
+    assert codes(*WITH_DECK) >= {"weights-by-analogy"}
+    deck = tmp_path / "main.k"
+    deck.write_text(DECK.read_text("utf-8").replace("*END", "*ELEMENT_GENERALIZED_SHELL\n*END"))
+    doubts = codes("--deck", str(deck), BOX)
+    assert "deck-not-followed" in doubts
+    if asked[0] != "parts":
+        assert "cost-unknown" in doubts
+        assert "weights-by-analogy" not in codes("--cost-share", "0.5", *WITH_DECK)
+
+
+def test_the_deck_that_a_plan_writes_merges_what_parts_merges(tmp_path: Path) -> None:
+    """Else `check` finds nodes that two rigid bodies own, D2R108."""
+    result = run("plan", "-q", "--part", "recommended", "--write-deck", str(tmp_path / "next"), *WITH_DECK)
+    assert result.exit_code == 0
+    assert "0 errors, 0 warnings" in result.stdout
+    assert "\n         2         1      PART\n" in (tmp_path / "next" / "switches.k").read_text()

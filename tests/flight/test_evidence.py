@@ -20,7 +20,6 @@ from d2rpick.histories.selection import Selection
 from d2rpick.models.rollover.files import WRITERS
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import simulate
-from d2rpick.vibration.fits import Fits
 from tests.cli.test_output import check_by_schema
 from tests.command import ENERGY, ROLLOVER, answer, codes, run
 from tests.sample_box import t01
@@ -283,12 +282,14 @@ def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout
 def test_a_flight_is_the_same_from_any_td_in_it_and_what_was_seen_before_changes_nothing(
     rolled: Rolled, form: str
 ) -> None:
-    history = open_run([str(rolled.files[form])]).history(Selection(parts=("box",) if form == "matsum" else ()))
-    length, fits = rolled.end - rolled.start, Fits()
+    def fresh() -> History:
+        return open_run([str(rolled.files[form])]).history(Selection(parts=("box",) if form == "matsum" else ()))
+
+    history, length = fresh(), rolled.end - rolled.start
     times = [rolled.start + share * length for share in (0.9, 0.02, 0.5, 0.98, 0.3)]
-    seen = [seen_flight(history, td, fits) for td in times]
-    assert seen == [seen_flight(history, td) for td in times]
+    seen = [seen_flight(history, td) for td in times]
+    assert seen == [seen_flight(fresh(), td) for td in times]
     assert len({one.flight and one.flight[:2] for one in seen}) == 1
     after = rolled.end + 0.02
-    assert seen_flight(history, after, fits) == seen_flight(history, after)
-    assert seen_flight(history, after, fits).refusal
+    assert seen_flight(history, after) == seen_flight(fresh(), after)
+    assert seen_flight(history, after).refusal

@@ -15,7 +15,7 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.flight.energy_alone import end_of_load
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import History
-from d2rpick.vibration.replay import to_mode
+from d2rpick.vibration.equivalent import to_mode
 from d2rpick.vibration.span import Span, described_span
 from tests import paper
 from tests.shared import shared

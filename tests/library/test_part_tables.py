@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 import d2rpick as d2
 from d2rpick.choice.cost import Weights
-from tests.command import ROOT, answer
+from tests.command import ROOT, answer, run
 from tests.sample_deck import DECK
 
 if TYPE_CHECKING:
@@ -33,6 +33,33 @@ def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
     assert found.rows[0].cost_share == pytest.approx(94 / 109)
     assert d2.parts(d2.read(BOX), deck=DECK, given=2).sets[-1].parts == (2,)
     assert "all that may" in found.report(tmp_path / "parts.html").read_text("utf-8")
+
+
+def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
+    """Typed without them it would give another run time; as it stands it is refused."""
+    weights = Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0)
+    asked: Any = {"parts": "recommended", "deck": DECK, "weights": weights}
+    read = d2.read(BOX)
+    answers: list[Any] = [
+        d2.parts(read, deck=DECK, weights=weights), d2.plan(read, **asked), d2.suggest(read, **asked),
+        d2.verify(read, 0.097, 0.37, **asked), d2.explore(read, td_window=(0.3, 0.37), steps=2, **asked),
+    ]  # fmt: skip
+    for one in answers:
+        assert one.command[one.command.index("--weights") + 1] == "<weights in memory>"
+    assert run(*answers[2].command).exit_code == 2
+
+
+def test_explore_takes_a_deck_as_suggest_does() -> None:
+    read = d2.read(BOX)
+    found = d2.explore(read, td=0.36, td_window=(0.3, 0.37), steps=5, parts="recommended", deck=DECK)
+    assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
+    chosen = d2.suggest(read, td_window=(0.3, 0.37), parts="recommended", deck=DECK)
+    best = next(one for one in chosen.candidates if one.recommended)
+    assert found.recommended is not None
+    assert (found.recommended.tr, found.recommended.td) == (best.tr, chosen.td)
+    assert found.recommended.saving == pytest.approx(1 - (best.run_time_share or 0.0))
+    assert {"weights-by-analogy"} <= {one.code for one in found.warnings} & {one.code for one in chosen.warnings}
+    assert found.answer.endswith("and costs no run time")
 
 
 @pytest.mark.parametrize(

@@ -280,6 +280,11 @@ def test_a_verdict_has_a_page_too(tmp_path: Path) -> None:
     assert not page.unnamed
 
 
+def test_a_poor_pair_is_not_shown_as_a_good_one(tmp_path: Path) -> None:
+    page = page_of(tmp_path, "--tr", "0.0128853", "--td", "0.064", ENERGY, command="verify")
+    assert "Verified, but of poor quality" in page.text
+
+
 def test_a_pair_that_does_not_verify_gets_its_reasons_and_no_card(tmp_path: Path) -> None:
     page = page_of(tmp_path, "--tr", "0.0122659", "--td", "0.064", ENERGY, command="verify", code=1)
     assert "Not verified" in page.text

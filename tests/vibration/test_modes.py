@@ -10,11 +10,11 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
+from d2rpick.vibration.equivalent import replayed_residual
 from d2rpick.vibration.identify import identify, identify_several
 from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual
 from d2rpick.vibration.modes import Modes, sum_and_jacobian
 from d2rpick.vibration.one_mode import Mode
-from d2rpick.vibration.replay import replayed_residual
 from tests import chain
 from tests.records import noisy, printed
 from tests.shared import columns

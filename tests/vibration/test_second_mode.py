@@ -8,10 +8,10 @@ import pytest
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
+from d2rpick.vibration.equivalent import replayed_residual
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Modes
 from d2rpick.vibration.one_mode import Mode
-from d2rpick.vibration.replay import replayed_residual
 from d2rpick.vibration.second_mode import residual_bound, resolved
 from tests.benchmarks.identification import small_second_modes
 from tests.records import ENERGY, TIME, noisy, printed

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.deck.inventory import formulations
+from d2rpick.deck.inventory import formulations, joints
 from d2rpick.deck.inventory.columns import is_cut, layout, lines_of
 from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, some_of
 from d2rpick.deck.parts import read_parts
@@ -89,9 +89,11 @@ def read(deck: Deck) -> Inventory:
     )
     beyond = np.full((table.size - ids.size, 3), np.nan)
     notes = tuple(_notes(deck, cards, elements, parts, lost=len(beyond)))
+    held = joints.of_ls_dyna(deck)
     return Inventory(
         "ls-dyna", _parts(deck, parts, elements), elements, np.concatenate([coordinates, beyond]), notes,
         complete=parts.all_known and not notes,
+        joints=held.placed(table), ties=held.unknown,
     )  # fmt: skip
 
 

@@ -91,12 +91,21 @@ class Elements:
         return np.asarray(self.nodes[self.part == part])
 
 
+class Joint(NamedTuple):
+    """A weld, tie or nodal rigid body: ``kind`` is what to call it; places of its nodes, and parts that it names."""
+
+    kind: str
+    nodes: Places
+    parts: frozenset[int]
+
+
 @dataclass(frozen=True, eq=False)
 class Inventory:
     """All parts and elements of a deck; ``solver`` is "ls-dyna" or "radioss".
 
     ``coordinates`` is (nodes, 3), NaN for a node that the deck does not place.  ``notes`` say what was not followed;
-    ``complete`` is False where elements or parts may be missing because of it.
+    ``complete`` is False where elements or parts may be missing because of it.  ``joints`` hold parts together that
+    share no nodes; ``ties`` do too, but it is not known which.
     """
 
     solver: str
@@ -105,6 +114,8 @@ class Inventory:
     coordinates: Reals
     notes: tuple[str, ...] = ()
     complete: bool = True
+    joints: tuple[Joint, ...] = ()
+    ties: tuple[str, ...] = ()
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:
@@ -149,19 +160,58 @@ class Inventory:
                 found[part].update(other for other in together if other != part)
         return {part: frozenset(others) for part, others in found.items()}
 
+    @cached_property
+    def joined(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
+        """By part the others that welds, ties or nodal rigid bodies join to it, and what these are."""
+        wanted = np.zeros(len(self.coordinates), bool)
+        for _, nodes, _ in self.joints:
+            wanted[nodes] = True
+        owners: dict[int, set[int]] = {}
+        for part, nodes in self.nodes_by_part.items():
+            for node in nodes[wanted[nodes]].tolist():
+                owners.setdefault(node, set()).add(part)
+        found: dict[int, dict[int, frozenset[str]]] = {}
+        for kind, nodes, parts in self.joints:
+            together = parts.union(*(owners.get(node, ()) for node in nodes.tolist()))
+            for part in together:
+                own = found.setdefault(part, {})
+                own.update({other: own.get(other, frozenset()) | {kind} for other in together if other != part})
+        return found
+
     def bodies(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
         """Rigid bodies that these parts make: one where most of their nodes hang together, else a body per group.
 
         The parts of a car with an engine on its mounts are one body; an engine, a battery and wheels alone are several.
         """
-        groups = self.groups(parts)
+        rigid = [part for part in parts if not self._discrete(part)] or parts
+        groups = self.groups(rigid)
         largest = max((self.rigid_nodes(group) for group in groups), default=0)
-        if len(groups) > 1 and largest >= _ONE_BODY * self.rigid_nodes(parts):
+        if len(rigid) > 1 and (len(groups) == 1 or largest >= _ONE_BODY * self.rigid_nodes(rigid)):
             return (tuple(sorted(parts)),)
         return groups
 
+    def _discrete(self, part: int) -> bool:
+        """Whether a part has springs alone: these hold no rigid body together, and move with it."""
+        return part in self.counts and set(self.counts[part]) <= DISCRETE
+
+    def pieces(self, part: int) -> int:
+        """Number of pieces of a part that share no nodes; none without elements."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        nodes = self.nodes_by_part.get(part, np.empty(0, np.int64))
+        rows, columns = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+        for one in (elements.of(part) for elements in self.elements):
+            at, other = np.nonzero(one != NO_NODE)
+            first = np.repeat(one[:, :1], one.shape[1], axis=1)
+            rows.append(np.searchsorted(nodes, first[at, other]))
+            columns.append(np.searchsorted(nodes, one[at, other]))
+        joined = np.concatenate(rows), np.concatenate(columns)
+        links = coo_array((np.ones(joined[0].size, bool), joined), shape=(nodes.size, nodes.size))
+        return int(connected_components(links, directed=False, return_labels=False))
+
     def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
-        """Groups of these parts that share nodes, directly or not."""
+        """Groups of these parts that share nodes or are joined, directly or not."""
         left, found = set(parts), []
         while left:
             waiting, body = [min(left)], set[int]()
@@ -170,7 +220,7 @@ class Inventory:
                 if part in left:
                     left.discard(part)
                     body.add(part)
-                    waiting += self.neighbours.get(part, frozenset()) & left
+                    waiting += (self.neighbours.get(part, frozenset()) | self.joined.get(part, {}).keys()) & left
             found.append(tuple(sorted(body)))
         return tuple(sorted(found))
 

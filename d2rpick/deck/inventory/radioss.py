@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.deck.expression import ExpressionError, number
-from d2rpick.deck.inventory import formulations
+from d2rpick.deck.inventory import formulations, joints
 from d2rpick.deck.inventory.columns import is_cut, layout, lines_of
 from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, some_of
 from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
@@ -95,7 +95,11 @@ def read(run: Run) -> Inventory:
     beyond = np.full((table.size - ids.size, 3), np.nan)
     notes = tuple(_notes(run, worded, elements, starter, len(beyond)))
     parts = _parts(run, worded, elements)
-    return Inventory("radioss", parts, elements, np.concatenate([coordinates, beyond]), notes, complete=not notes)
+    held = joints.of_radioss(starter, worded)
+    return Inventory(
+        "radioss", parts, elements, np.concatenate([coordinates, beyond]), notes, complete=not notes,
+        joints=held.placed(table), ties=held.unknown,
+    )  # fmt: skip
 
 
 def _notes(

@@ -45,6 +45,8 @@ class Printing:
         Main nodes of the rigid bodies to be switched, for solvers that switch these.
     merge : int, optional
         Lead part that all others are merged into; without it each part becomes a body of its own.
+    bodies : tuple of tuple of int, optional
+        Parts that become one rigid body each; without ``merge`` those of a body are merged into its first.
     swset : pair of int
         Ids of the two switch sets of the first window; those of further windows follow the larger one.
     step_cap : float, optional
@@ -58,6 +60,7 @@ class Printing:
     part: tuple[int, ...] = ()
     node: tuple[int, ...] = ()
     merge: int | None = None
+    bodies: tuple[tuple[int, ...], ...] = ()
     swset: tuple[int, int] = (901, 902)
     step_cap: float | None = None
     end: float | None = None

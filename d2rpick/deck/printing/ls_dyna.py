@@ -68,15 +68,23 @@ def cards(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] =
 
 
 def _window(texts: tuple[str, str], sets: tuple[int, int], ids: Sequence[int], printing: Printing) -> Iterator[str]:
-    merge = printing.merge
+    leads = _leads(ids, printing)
     yield from _header(sets[0], texts[0], shortest(printing.step_cap or 0.0), (len(ids), 0))
     yield "$#     pid       lrb     ptype"
-    for part in sorted(ids, key=lambda part: part != merge):  # the lead first
-        yield f"{part:10d}{0 if merge is None or part == merge else merge:10d}      PART"
+    for part in sorted(ids, key=lambda part: part in leads):  # those that lead first
+        yield f"{part:10d}{leads.get(part, 0):10d}      PART"
     yield from _header(sets[1], texts[1], "0.0", (0, len(ids)))
     yield "$#     pid     ptype"
     for part in ids:
         yield f"{part:10d}      PART"
+
+
+def _leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
+    """Give the lead of each part that is merged into another."""
+    if printing.merge is not None:
+        return {part: printing.merge for part in ids if part != printing.merge}
+    bodies = [[part for part in body if part in ids] for body in printing.bodies]
+    return {part: body[0] for body in bodies for part in body[1:]}
 
 
 def _header(swset: int, time: str, step_cap: str, counts: tuple[int, int]) -> Iterator[str]:
@@ -116,7 +124,13 @@ def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
     yield from (*PHYSICS, *_SOLVER)
     if not printing.step_cap:
         yield from _UNCAPPED
-    if printing.merge is None and len(ids) > 1:
+    if printing.merge is None and printing.bodies:
+        yield from (
+            f"{len(body)} parts are one rigid body by the deck, led by part {body[0]} (LRB)."
+            for body in printing.bodies
+            if len(body) > 1
+        )
+    elif printing.merge is None and len(ids) > 1:
         yield from _UNMERGED
     elif printing.merge is not None and printing.merge not in ids:
         yield f"Part {printing.merge} is the lead: it must be rigid already."

@@ -24,7 +24,7 @@ from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, sp
 from d2rpick.histories.formats.order import not_a_restart
 from d2rpick.histories.formats.table_values import checked_values, line_of, plain_values
 from d2rpick.histories.formats.text import UTF16, Text
-from d2rpick.histories.names import listing
+from d2rpick.histories.names import listing, quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -169,12 +169,14 @@ class Table:
 
     def _values(self, column: int) -> Samples:
         if column not in self._read and self._plain:
-            # first what was asked for; who wants more mostly wants all
-            wanted = range(self._layout.columns) if self._read else sorted({*self._needed, column})
+            # first what was asked for, and what tells of the flight; who wants more mostly wants all the others
+            others = {*range(self._layout.columns)} - self._read.keys()
+            telling = [own for name, own in self._columns.items() if quantity_of(name)]
+            wanted = sorted(others if self._read else {*self._needed, *telling, column})
             columns = plain_values(self._text, self._begin, self._layout, wanted)
             self._plain = columns is not None
             found = zip(wanted, columns or (), strict=self._plain)
-            self._read |= {one: values for one, values in found if np.isfinite(values).all()}
+            self._read |= {one: _kept(values) for one, values in found if np.isfinite(values).all()}
         if column not in self._read:
             values = checked_values(self._text, self._begin, self._layout, (self._time, column))
             self._read |= {self._time: values[:, 0].copy(), column: values[:, 1].copy()}
@@ -182,6 +184,12 @@ class Table:
 
     def _no_parts(self) -> FormatError:
         return FormatError(f"{self.source}: a table has no parts; choose its columns with `energy`")
+
+
+def _kept(values: Samples) -> Samples:
+    """Make values read-only, so that nobody needs a copy of his own."""
+    values.flags.writeable = False
+    return values
 
 
 def _is_whole(line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]) -> bool:

@@ -9,9 +9,7 @@ curves; for each ``number 'name'`` and pairs.
 from __future__ import annotations
 
 import re
-from array import array
 from collections import Counter
-from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Final
@@ -32,18 +30,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.selection import Selection
 
 _POINTS: Final = "#pts="
-_DYNAFORM: Final = re.compile(r"\s*\d+\s+'([^']*)'\s*")
+_DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"  # compiled where it is needed
 _MOST_DIGITS: Final = 12  # no file has more pairs than such a number says
 
 
-@dataclass
 class _Curve:
     """Name of a curve, its pairs as cells, and the numbers of their lines."""
 
-    name: str
-    times: list[str] = field(default_factory=list)
-    values: list[str] = field(default_factory=list)
-    lines: array[int] = field(default_factory=lambda: array("q"))
+    def __init__(self, name: str) -> None:
+        from array import array  # not above: plain tables do without it
+
+        self.name = name
+        self.times: list[str] = []
+        self.values: list[str] = []
+        self.lines = array("q")
 
 
 def find_curves(text: Text, selection: Selection) -> Curves | None:
@@ -250,13 +250,14 @@ def _t_his(found: _Found) -> bool:
 
 def _dynaform(found: _Found) -> bool:
     top = found.top(2)
-    if len(top) < 2 or not top[0].strip().isdecimal() or not _DYNAFORM.fullmatch(top[1]):
+    if len(top) < 2 or not top[0].strip().isdecimal() or not re.fullmatch(_DYNAFORM, top[1]):
         return False
+    head = re.compile(_DYNAFORM)
     lines = found.lines()
     number, first = next(lines)
     expected = found.count(number, first.strip())
     for number, line in lines:
-        if start := _DYNAFORM.fullmatch(line):
+        if start := head.fullmatch(line):
             found.curves.append(_Curve(start[1].strip()))
         else:
             found.add(number, line)

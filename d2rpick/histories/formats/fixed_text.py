@@ -3,7 +3,8 @@
 glstat and matsum write one block per state.  Blocks of one file mostly have the same lines, hence the same
 number of bytes.  So a block is taken apart line by line once; the blocks after it are only compared with it,
 byte by byte where the text must be the same (labels, part numbers, line ends), and the numbers are then
-fetched by address.  Where a block differs, it is taken apart itself.
+fetched by address.  Where a block differs, it is taken apart itself.  The comparison also shows which numbers
+are the same in all blocks, as those of a part at rest: they are fetched once.
 """
 
 from __future__ import annotations
@@ -11,13 +12,14 @@ from __future__ import annotations
 from array import array
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.content import Content, content_of
+from d2rpick.histories.formats.alike import CHUNK, Stretch, like_example
 from d2rpick.histories.formats.fortran import decode
 
 if TYPE_CHECKING:
@@ -30,12 +32,11 @@ Addresses = NDArray[np.int64]
 
 UNSURE: Final = -1  # in place of an offset: the field is cut, or stands in the block twice
 
-_CHUNK: Final = 1 << 20  # bytes compared at a time: they stay in the cache between the two passes
-_FOLD: Final = 16  # blocks side by side compared as one row: saves half the time
-_BATCH: Final = 1 << 14  # numbers converted at a time, for the same reason
+_BATCH: Final = 1 << 14  # numbers converted at a time: they stay in the cache
 _RECENT: Final = 4  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
 _NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
+_MANY: Final = 64  # of so many blocks it is remembered what differs between them, a small share of the file
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,15 +72,6 @@ class Grammar:
     width: int
     decimals: int
     compare_all: bool
-
-
-class Stretch(NamedTuple):
-    """``repeats`` blocks of ``stride`` bytes from ``start`` on, laid out like the one at ``example``."""
-
-    start: int
-    stride: int
-    repeats: int
-    example: int
 
 
 class Blocks:
@@ -121,6 +113,7 @@ class Blocks:
         self.layout = lru_cache(maxsize=16)(lambda at, size: grammar.describe(data[at : min(at + size, end)]))
         self._compared = grammar.compare_all
         self._trusted = False  # whether a part of each block was compared for numbers that were asked for
+        self._varied: dict[int, Bytes] = {}  # by the start of a run of many blocks: 0 for the bytes that they share
         self.states, self.complete = 0, True
         self.notes: tuple[str, ...] = ()
         self.rest: Stretch | None = None
@@ -143,22 +136,22 @@ class Blocks:
         FormatError
             If a state lacks one of the numbers, has it twice, or has something else in its place.
         """
-        if self._trusted and not self._compared:  # who asks again will go on asking: one comparison is for all
-            self._compare_in_full()
-        values = np.empty((self.states, len(names)))
-        addresses = values.view(np.int64)  # each address gives way to the number found there
+        if anchors and not self._compared and (self._trusted or not self._alike(names, anchors)):
+            self._compare_in_full()  # who asks again will go on asking: one comparison is for all
+        self._trusted = self._trusted or bool(anchors)
+        moving = self._moving(names)
+        if 2 * np.count_nonzero(moving) > moving.size:
+            return self._table(names)
+        values = np.zeros((self.states, len(names)))  # memory that is never written costs nothing
+        still = [name for name, moves in zip(names, moving.tolist(), strict=True) if not moves]
         row = 0
         for run in self:
-            layout = self.layout(run.example, run.stride)
-            offsets = self._offsets(run, layout, names)
-            if not self._compared and not self._alike(run, layout, offsets, anchors):
-                self._compare_in_full()
-                return self.numbers(names)
-            starts = run.start + run.stride * np.arange(run.repeats)
-            np.add(starts[:, None], offsets, out=addresses[row : row + run.repeats])
+            first = (run.start + self._offsets(run, still)).view(np.float64)
+            self._fetch(first, still)
+            if first.view(np.int64).any():
+                values[row : row + run.repeats, ~moving] = first
             row += run.repeats
-        self._trusted = self._trusted or bool(anchors)
-        self._fetch(values.reshape(-1), names)
+        values[:, moving] = self._table([name for name, moves in zip(names, moving.tolist(), strict=True) if moves])
         return values
 
     def admit_rest(self, names: Sequence[Hashable]) -> None:
@@ -175,7 +168,7 @@ class Blocks:
 
     def line(self, address: int) -> int:
         """Find the number of the line at ``address``, from 1."""
-        return 1 + sum(self._data[at : min(at + _CHUNK, address)].count(b"\n") for at in range(0, address, _CHUNK))
+        return 1 + sum(self._data[at : min(at + CHUNK, address)].count(b"\n") for at in range(0, address, CHUNK))
 
     def text(self, start: int, size: int) -> bytes:
         """Copy a piece of the whole lines of the file."""
@@ -201,7 +194,34 @@ class Blocks:
                     "columns was expected; cut the file before this state"
                 )
 
-    def _offsets(self, run: Stretch, layout: BlockLayout, names: Sequence[Hashable]) -> Addresses:
+    def _moving(self, names: Sequence[Hashable]) -> NDArray[np.bool_]:
+        """Tell of each number whether it may differ from state to state, shape (len(names),)."""
+        moving = np.full(len(names), not self._varied)
+        for run in self:
+            if run.repeats == 1:
+                continue
+            varied = self._varied.get(run.start)
+            if varied is None:
+                return np.ones_like(moving)
+            before = np.concatenate([[0], np.cumsum(varied != 0)])
+            offsets = self._offsets(run, names)
+            moving |= before[offsets + self._grammar.width] > before[offsets]
+        return moving
+
+    def _table(self, names: Sequence[Hashable]) -> Samples:
+        """Fetch numbers of all states one by one, shape (states, len(names))."""
+        values = np.empty((self.states, len(names)))
+        addresses = values.view(np.int64)  # each address gives way to the number found there
+        row = 0
+        for run in self:
+            starts = run.start + run.stride * np.arange(run.repeats)
+            np.add(starts[:, None], self._offsets(run, names), out=addresses[row : row + run.repeats])
+            row += run.repeats
+        self._fetch(values.reshape(-1), names)
+        return values
+
+    def _offsets(self, run: Stretch, names: Sequence[Hashable]) -> Addresses:
+        layout = self.layout(run.example, run.stride)
         for name in names:
             if layout.fields.get(name, UNSURE) == UNSURE:
                 raise FormatError(
@@ -214,7 +234,7 @@ class Blocks:
 
     def _walk(self) -> None:
         """Find all runs of blocks, leaving out blocks that are not whole."""
-        self._runs = array("q")
+        self._runs, self._varied = array("q"), {}
         self.notes = ()
         self.complete = not self._data[self._end : self._end + 4096].strip()
         self.states, self.tail, self.rest = 0, self._begin, None
@@ -270,52 +290,39 @@ class Blocks:
         literal, start = self.layout(example, stride).literal, self._grammar.start
         run = Stretch(position, stride, (self._end - position) // stride, example)
         if self._compared:
-            count = self._like_example(run, 0, literal)
+            varied = np.zeros_like(literal) if run.repeats >= _MANY else None
+            count = like_example(self._data, run, 0, literal, varied)
+            if varied is not None and count > _MANY:
+                self._varied[position] = varied
         else:
             first_line = self.text(example, _LINE).find(b"\n") + 1
-            count = self._like_example(run, 0, literal[:first_line])
-            count = self._like_example(run._replace(repeats=count), stride - 1, literal[-1:])
+            count = like_example(self._data, run, 0, literal[:first_line])
+            count = like_example(self._data, run._replace(repeats=count), stride - 1, literal[-1:])
         return count if self.text(position + count * stride, len(start)) == start else max(0, count - 1)
 
-    def _like_example(self, run: Stretch, offset: int, literal: Bytes) -> int:
-        """Count the blocks of ``run`` that have, from ``offset`` on, the literal bytes of its example."""
-        size = literal.size
-        template = self._data.view(run.example + offset, run.example + offset + size) & literal
-        done, step = (0, 1) if size else (run.repeats, 1)
-        while done < run.repeats:
-            step = min(step, run.repeats - done)
-            first = run.start + done * run.stride + offset
-            rows = self._rows(first, run.stride, step, size)
-            if step < _FOLD or not _all_like(template, literal, rows):
-                differs = (rows & literal != template).any(axis=1)
-                if differs.any():
-                    return done + int(differs.argmax())
-            done += step
-            if 2 * step * size <= _CHUNK:
-                step *= 2
-        return done
+    def _alike(self, names: Sequence[Hashable], anchors: Sequence[Hashable]) -> bool:
+        """Tell whether in all blocks the text from anchors to numbers is that of their examples.
 
-    def _rows(self, first: int, stride: int, count: int, size: int) -> Bytes:
-        """``size`` bytes of each of ``count`` blocks, shape (count, size)."""
-        if 2 * size < stride:
-            return self._data.fields(first + stride * np.arange(count), size)
-        span = self._data.view(first, first + (count - 1) * stride + size)
-        return np.ndarray((count, size), np.uint8, span, strides=(stride, 1))
+        False without a look where that is most of a block: to compare all of it costs no more.
+        """
+        return all(self._alike_in(run, self._offsets(run, names), anchors) for run in self)
 
-    def _alike(self, run: Stretch, layout: BlockLayout, offsets: Addresses, anchors: Sequence[Hashable]) -> bool:
-        """Tell whether in all blocks of ``run`` the text from anchors to numbers is that of its example."""
-        if not anchors or (run.repeats == 1 and run.start == run.example):
+    def _alike_in(self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]) -> bool:
+        if run.repeats == 1 and run.start == run.example:
             return True
+        layout = self.layout(run.example, run.stride)
         first = np.array([layout.fields[anchor] for anchor in anchors])
         order = np.argsort(first)
         behind = offsets[order] + self._grammar.width + 1  # what follows a number is compared, too
         first, last = first[order], np.maximum.accumulate(behind)
         gaps = np.flatnonzero(first[1:] - last[:-1] > _NEAR) + 1
-        for piece_first, piece_last in zip(np.split(first, gaps), np.split(last, gaps), strict=True):
-            low, high = int(piece_first[0]), int(piece_last[-1])
-            if self._like_example(run, low, layout.literal[low:high]) < run.repeats:
-                return False
-        return True
+        pieces = [
+            (int(firsts[0]), int(lasts[-1]))
+            for firsts, lasts in zip(np.split(first, gaps), np.split(last, gaps), strict=True)
+        ]
+        return 2 * sum(high - low for low, high in pieces) <= run.stride and all(
+            like_example(self._data, run, low, layout.literal[low:high]) == run.repeats for low, high in pieces
+        )
 
     def _is_even(self) -> bool:
         """Tell whether all blocks but the last have one size, and look alike at both ends of the file."""
@@ -326,7 +333,7 @@ class Blocks:
         literal = self.layout(first.example, first.stride).literal
         last = first.repeats - 1
         return [run.start for run in runs[1:]] in ([], [self.tail]) and all(
-            self._like_example(first._replace(start=first.start + block * first.stride, repeats=1), 0, literal)
+            like_example(self._data, first._replace(start=first.start + block * first.stride, repeats=1), 0, literal)
             for block in (min(1, last), last)
         )
 
@@ -342,34 +349,19 @@ class Blocks:
         start = self._grammar.start
         if position == 0 and self.text(0, len(start)) == start:
             return 0
-        for at in range(max(0, position - 1), self._end, _CHUNK):
-            found = self.text(at, _CHUNK + len(start)).find(b"\n" + start)
+        for at in range(max(0, position - 1), self._end, CHUNK):
+            found = self.text(at, CHUNK + len(start)).find(b"\n" + start)
             if found >= 0:
                 return at + found + 1
         return None
 
     def _end_of_last_line(self) -> int:
-        for stop in range(len(self._data), 0, -_CHUNK):
-            first = max(0, stop - _CHUNK)
+        for stop in range(len(self._data), 0, -CHUNK):
+            first = max(0, stop - CHUNK)
             found = self._data[first:stop].rfind(b"\n")
             if found >= 0:
                 return first + found + 1
         return 0
-
-
-def _all_like(template: Bytes, literal: Bytes, rows: Bytes) -> bool:
-    """Tell whether the literal bytes of all rows are those of the template, without storing anything.
-
-    A column is constant where its AND and its OR agree.
-    """
-    count, size = rows.shape
-    if count % _FOLD == 0 and rows.flags.c_contiguous:
-        rows = rows.reshape(count // _FOLD, _FOLD * size)
-    for together in (np.bitwise_and, np.bitwise_or):
-        constant = together.reduce(rows, axis=0).reshape(-1, size)
-        if np.any(constant & literal != template):
-            return False
-    return True
 
 
 def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: int, behind: int) -> None:
@@ -384,20 +376,3 @@ def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: in
 def _spoken(name: Hashable) -> str:
     """Name a field in a message."""
     return f"{name[1]} of part {name[0]}" if isinstance(name, tuple) else f"{name!r}"
-
-
-def head(data: bytes | Content) -> tuple[str, str, int]:
-    """Read the head of an LS-DYNA text database.
-
-    Returns
-    -------
-    title, version : str
-        Empty if there is no head.
-    begin : int
-        Address behind it.
-    """
-    lines = data[:4096].split(b"\n")
-    if len(lines) < 3 or b"ls-dyna" not in lines[1]:
-        return "", "", 0
-    title, version = (line.decode("latin-1") for line in lines[:2])
-    return title.strip(), " ".join(version.split()), len(title) + len(version) + 2

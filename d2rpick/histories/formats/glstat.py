@@ -15,8 +15,8 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
-from d2rpick.histories.formats.fixed_text import UNSURE, BlockLayout, Blocks, Grammar, head, release
-from d2rpick.histories.formats.written_head import written_head
+from d2rpick.histories.formats.fixed_text import UNSURE, BlockLayout, Blocks, Grammar, release
+from d2rpick.histories.formats.text_head import head, written_head
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Mapping, Sequence

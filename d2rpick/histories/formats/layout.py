@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from itertools import islice
+from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import FormatError
@@ -144,7 +145,7 @@ def _find_rows(lines: Sequence[str], first: int, separator: str) -> Layout | Non
             kinds = [(i, row, kind) for i, row in cells if (kind := _kind(row, decimal, only_numbers))]
             if not kinds:
                 continue
-            common, times = Counter(kind for _, _, kind in kinds).most_common(1)[0]
+            common, times = max(Counter(kind for _, _, kind in kinds).items(), key=itemgetter(1))
             alike = [(i, row) for i, row, kind in kinds if _is_like(kind, common)]
             closed = not any(row[-1] for _, row in alike)  # every row ends with a separator
             if len(common) - closed > 1 and times > most:
@@ -156,6 +157,8 @@ def _find_rows(lines: Sequence[str], first: int, separator: str) -> Layout | Non
 
 def _kind(cells: list[str], decimal: str, only_numbers: bool) -> tuple[bool, ...]:
     """Which cells of a row are numbers or empty; nothing for what is no row."""
+    if len(cells) < 2:  # as with most separators
+        return ()
     numbers = tuple(cell.casefold() in _MISSING or as_number(cell, decimal) is not None for cell in cells)
     words = [cell for cell, number in zip(cells, numbers, strict=True) if not number]
     # A word begins with a letter: "5 load 1" is a piece of "0,5 load 1,5", cut at the wrong places.

@@ -18,7 +18,7 @@ _PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
 
 # Digits that restore every double, and numbers that are not written with an exponent.
 _LONGEST = 17
-_PLAIN = re.compile(r"[+-]?(?:0|[1-9]\d+)\.\d+", re.ASCII)
+_PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"  # compiled where it is needed
 
 # 15 significant digits are what every double keeps; a writer that shows so many meant to lose nothing.
 _FULL = 15
@@ -45,9 +45,11 @@ def precisions(time: Sequence[str], energy: Sequence[str], moments: Samples) -> 
     >>> precisions(["0.001", "0.0025", "0.0041"], ["1.25000e+01"], np.array([0.001, 0.0025, 0.0041]))
     (Precision(digits=6, decimals=None), Precision(digits=6, decimals=None))
     """
-    digits = max(_significant(field) for field in (*time, *energy))
-    if digits >= _FULL:
-        return EXACT, EXACT
+    digits = 0
+    for field in (*energy, *time):
+        digits = max(digits, _significant(field))
+        if digits >= _FULL:
+            return EXACT, EXACT
     general = Precision(digits=max(digits, 1))
     time_decimals, energy_decimals = _fixed_decimals(time), _fixed_decimals(energy)
     time_fixed = time_decimals and not _is_finer_than_its_grid(time_decimals, moments)
@@ -74,7 +76,7 @@ def is_whole(field: str, above: Sequence[str]) -> bool:
     (True, False)
     """
     if above and _significant(field) == _LONGEST == max(_LONGEST, *map(_significant, above)):
-        return _PLAIN.fullmatch(field) is not None
+        return re.fullmatch(_PLAIN, field, re.ASCII) is not None
     parts = [_PARTS.fullmatch(text) for text in (field, *above)]
     shapes = {(len(part[2]), _exponent_width(part[3])) for part in parts if part}
     if None in parts or len(shapes) != 1:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,9 +42,9 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
     if piece.isspace() or b'"' in piece:
         return None  # numpy warns of the one, and a separator in quotes is none
     whole = piece.decode("latin-1")  # no other character than those of latin-1 belongs to a number
-    lines, taken = whole.split("\n")[:-1], [*range(layout.columns)]
-    closed = False
-    if layout.separator:
+    lines, taken, chosen = whole.split("\n")[:-1], [*range(layout.columns)], None
+    if layout.separator and not (sorted(used) == taken and not lines[0].endswith(layout.separator)):
+        # otherwise numpy sees to it that each row has its cells
         marks = _separators(piece, layout)
         if marks is None:
             return None
@@ -55,7 +54,7 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
             starts = np.cumsum([0, *(len(line) + 1 for line in lines[:-1])]).tolist()
             cuts = marks[:, taken[-1]].tolist()
             lines = [whole[start:cut] for start, cut in zip(starts, cuts, strict=True)]
-    chosen = taken if closed or len(taken) < layout.columns else None
+        chosen = taken if closed or len(taken) < layout.columns else None
     try:
         table = np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=chosen)
     except ValueError:
@@ -85,6 +84,8 @@ def checked_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) 
     Where all cells are empty the curve has ended: another one beside it goes on.  FormatError with the line that is
     wrong.
     """
+    from array import array  # not above: most tables are read in columns
+
     values = array("d")
     for _, state in _states(text, begin, layout, used):
         values.extend(state)

@@ -11,8 +11,9 @@ if TYPE_CHECKING:
 
 
 class Bars:
-    """Bars of a truss as they are: their plastic elongation and work; ``points`` in the model.
+    """Bars of a truss as they are: lengths at ``rest`` with the plastic elongation, ``plastic_work`` [m], [J].
 
+    ``points`` is the number of those in the model.
     A bar knows its length only, so after a phase in which its points moved as one body it carries on with the
     elongation it had, turned with the body.
     """
@@ -20,8 +21,8 @@ class Bars:
     def __init__(self, truss: Truss, points: int) -> None:
         self._first, self._second = truss.ends[:, 0].copy(), truss.ends[:, 1].copy()
         self._stiffness, self._strength = truss.stiffness, truss.strength
-        self._rest = truss.rest.copy()  # with the plastic elongation
-        self._plastic_work = 0.0
+        self.rest = truss.rest.copy()
+        self.plastic_work = 0.0
         # a bar pulls its first point towards its second, and the second back
         self._pulls = np.zeros((points, truss.rest.size))
         self._pulls[self._first, np.arange(truss.rest.size)] = 1.0
@@ -32,25 +33,30 @@ class Bars:
         """Forces on all points at ``places``, shape (n,) [N]; bars beyond their strength yield."""
         along = places[self._second] - places[self._first]
         length = np.abs(along)
-        tension = self._stiffness * (length - self._rest)
+        tension = self._stiffness * (length - self.rest)
         held = np.minimum(np.maximum(tension, -self._strength), self._strength)
         excess = tension - held
         if excess.any():
             flow = excess / self._stiffness
-            self._rest += flow
-            self._plastic_work += float(held @ flow)
+            self.rest += flow
+            self.plastic_work += float(held @ flow)
         along *= held / length
         self.evaluations += length.size
         return (self._pulls @ along.view(np.float64).reshape(-1, 2)).view(np.complex128).ravel()
 
-    def elastic_energy(self, places: Plane) -> float:
-        """Energy that the bars give back when they are released [J]."""
-        elongation = np.abs(places[self._second] - places[self._first]) - self._rest
-        return float(self._stiffness @ elongation**2) / 2
+    def elastic_energy(self, places: Plane, rest: Values | None = None) -> Values:
+        """Energy that the bars give back when they are released, of the shape (...) for places (..., n) [J].
 
-    def internal_energy(self, places: Plane) -> float:
-        """Elastic energy and plastic work, as solvers report them [J]."""
-        return self.elastic_energy(places) + self._plastic_work
+        ``rest`` are their lengths then, if others than now (..., bars) [m].
+        """
+        elongation = np.abs(places[..., self._second] - places[..., self._first]) - (
+            self.rest if rest is None else rest
+        )
+        return np.asarray(elongation**2 @ self._stiffness) / 2
+
+    def internal_energy(self, places: Plane, rest: Values | None = None, plastic_work: Values | None = None) -> Values:
+        """Elastic energy and plastic work, as solvers report them, of now or of then (...) [J]."""
+        return self.elastic_energy(places, rest) + (self.plastic_work if plastic_work is None else plastic_work)
 
 
 def stiffest_rate(masses: Values, *trusses: Truss, extra: Values) -> float:

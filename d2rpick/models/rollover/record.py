@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 PARTS: Final = ("box", "step")
 BOX: Final = 0
 _REALS, _PLANES = 12, 4
+# States that are worked out together: for a single one, calling numpy takes longer than what it does.
+_BLOCK: Final = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,27 +96,45 @@ class Recorder:
         self._box_masses = s.masses[: s.of_box]
         self._box_mass = float(self._box_masses.sum())
         self._start = self._box_masses * self._arms(s.places)
+        self._places, self._means = np.zeros((2, _BLOCK, s.places.size), dtype=np.complex128)
+        self._rests = [np.zeros((_BLOCK, bars.rest.size)) for bars in (motion.box, motion.step)]
 
     def note(self, mean: Plane) -> None:
         """Note the state of the motion, with the velocities ``mean`` (n,) [m/s] over the step around it."""
-        motion, s = self._motion, self._motion.structure
-        n, places, momenta, accounts = s.of_box, motion.places, s.masses * mean, motion.accounts
-        arms = self._arms(places)
-        of_box, of_step = complex(momenta[:n].sum()), complex(momenta[n:].sum())
-        spin = np.vdot(arms, momenta[:n]).imag / (self._box_masses @ np.abs(arms) ** 2)
-        kinetic = (np.conj(mean) * momenta).real / 2
+        motion, accounts, at = self._motion, self._motion.accounts, self._next % _BLOCK
+        self._places[at], self._means[at] = motion.places, mean
+        self._rests[0][at], self._rests[1][at] = motion.box.rest, motion.step.rest
         self._reals[self._next] = (
-            motion.time, np.angle(np.vdot(arms, self._start)), -spin,
-            motion.box.internal_energy(places), motion.step.internal_energy(places), kinetic[:n].sum(),
-            kinetic[n:].sum(), accounts.external_work, accounts.friction, accounts.walls, accounts.damping,
-            accounts.lost,
+            motion.time, 0.0, 0.0, motion.box.plastic_work, motion.step.plastic_work, 0.0, 0.0, accounts.external_work,
+            accounts.friction, accounts.walls, accounts.damping, accounts.lost,
         )  # fmt: skip
-        self._planes[self._next] = complex(places[0] - arms[0]), of_box / self._box_mass, of_box, of_step
-        self._outline[self._next] = places[: n // 2]
         self._next += 1
+        if at == _BLOCK - 1:
+            self._work_out()
+
+    def _work_out(self) -> None:
+        """Work out the states noted since the last block was full."""
+        count = (self._next - 1) % _BLOCK + 1
+        states, s = slice(self._next - count, self._next), self._motion.structure
+        n, places, means = s.of_box, self._places[:count], self._means[:count]
+        momenta, arms = s.masses * means, self._arms(places)
+        kinetic = (np.conj(means) * momenta).real / 2
+        of_box, of_step = momenta[:, :n].sum(axis=1), momenta[:, n:].sum(axis=1)
+        spin = (np.conj(arms) * momenta[:, :n]).imag.sum(axis=1)
+        reals = self._reals[states].T
+        reals[1] = np.angle(np.conj(arms) @ self._start)
+        reals[2] = -spin / (np.abs(arms) ** 2 @ self._box_masses)
+        for place, (bars, rest) in enumerate(zip((self._motion.box, self._motion.step), self._rests, strict=True)):
+            reals[3 + place] = bars.internal_energy(places, rest[:count], reals[3 + place])
+        reals[5], reals[6] = kinetic[:, :n].sum(axis=1), kinetic[:, n:].sum(axis=1)
+        centre = places[:, 0] - arms[:, 0]
+        self._planes[states] = np.stack([centre, of_box / self._box_mass, of_box, of_step], axis=1)
+        self._outline[states] = places[:, : n // 2]
 
     def record(self) -> Record:
         """Give what was collected; RangeError where a number is not finite."""
+        if self._next % _BLOCK:
+            self._work_out()
         motion, real, plane = self._motion, self._reals.T, self._planes.T
         if not (np.isfinite(real).all() and np.isfinite(plane).all()):
             raise RangeError(
@@ -144,9 +164,9 @@ class Recorder:
         )
 
     def _arms(self, places: Plane) -> Plane:
-        """From the centre of mass of the box to its points [m]."""
-        of_box = places[: self._box_masses.size]
-        return np.asarray(of_box - self._box_masses @ of_box / self._box_mass)
+        """From the centre of mass of the box to its points, of the shape (..., points of the box) [m]."""
+        of_box = places[..., : self._box_masses.size]
+        return np.asarray(of_box - (of_box @ self._box_masses / self._box_mass)[..., np.newaxis])
 
 
 def _updates(motion: Motion) -> int:

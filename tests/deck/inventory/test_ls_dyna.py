@@ -229,3 +229,10 @@ def test_the_sample_decks_are_what_their_module_writes() -> None:
     assert {name: (FLYING / name).read_text("utf-8") for name in radioss()} == radioss()
     found = read_inventory(str(DECK))
     assert counted(found) == {1: {"shell": 94}, 2: {"shell": 15}, 3: {"shell": 4}}
+
+
+def test_pieces_of_a_part_are_those_that_share_no_nodes(tmp_path: Path) -> None:
+    shells = [(7, 1, 2, 4, 3), (7, 3, 4, 6, 5), (7, 9, 10, 11, 11), (9, 13, 14, 15, 16), (9, 16, 17, 18, 18)]
+    mesh = "".join(row(number, *one) for number, one in enumerate(shells, 1))
+    found = inventory(tmp_path, HEAD + "*NODE\n" + nodes() + "*ELEMENT_SHELL\n" + mesh + "*END\n")
+    assert [found.pieces(part) for part in (7, 9, 3)] == [2, 1, 0]

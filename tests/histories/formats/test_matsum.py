@@ -17,6 +17,7 @@ TEXT = matsum_text(TIMES, IDS, ENERGIES)
 MASS = b"       Maximum mass increase in solid elements      =   0.2122E-07 ID=   36456\n"
 LUMPED = matsum_part(0, 0.0, lines=3)
 STATES = [matsum_state(time, IDS, row) for time, row in zip(TIMES, ENERGIES, strict=True)]
+LONG = 150  # states, enough to remember what differs between them
 BEHIND_HEAD = TEXT.index(b"{BEGIN")
 
 
@@ -127,6 +128,36 @@ def test_damaged_id_makes_no_other_part(id_text: bytes) -> None:
     with pytest.raises(FormatError, match="inten of part 10 is missing"):
         run.part_channel("internal_energy", [10])
     assert run.part_channel("internal_energy", [1])[:, 0].tolist() == ENERGIES[:, 1].tolist()
+
+
+@pytest.mark.parametrize("changed", [None, 1, 64, LONG - 2, LONG - 1])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_numbers_that_are_the_same_in_most_states(changed: int | None, swapped: bool) -> None:
+    """Whether a number changes in no state, in one or in all, each state has its own."""
+    times, ids = np.arange(LONG) / 8, [11, 12, 13, 14]
+    energies = np.tile([0.0, -0.0, 2.5, 0.0], (LONG, 1))
+    energies[:, 3] = np.arange(LONG)
+    if changed is not None:
+        energies[changed, :3] = [1e-22, 3.0, -0.0]
+    states = [matsum_state(time, ids, row) for time, row in zip(times, energies, strict=True)]
+    if swapped:
+        states[100] = matsum_state(times[100], ids[::-1], energies[100, ::-1])
+    run = read(matsum_head(ids) + b"".join(states))
+    for _ in range(2):  # the whole file is compared when it is asked for the second time, if not before
+        for chosen in ([11], [12, 13], ids, ids[:3]):
+            found = run.part_channel("internal_energy", chosen)
+            assert found.tobytes() == energies[:, [ids.index(id_) for id_ in chosen]].tobytes()
+        assert not run.part_channel("y_momentum", ids).any()
+
+
+def test_what_is_no_number_in_all_states_is_refused_with_the_line_of_the_first() -> None:
+    text = matsum_text(np.arange(LONG), [11, 12], np.zeros((LONG, 2)))
+    text = text.replace(b"y-mom=   0.0000E+00", b"y-mom=" + b"*" * 13)
+    run = read(text)
+    assert run.part_channel("internal_energy", [11, 12]).shape == (LONG, 2)
+    line = 1 + text[: text.index(b"y-mom=*")].count(b"\n")
+    with pytest.raises(FormatError, match=rf"matsum:{line}: y-mom of part 11 is '\*+', a number in its columns"):
+        run.part_channel("y_momentum", [11, 12])
 
 
 @pytest.mark.parametrize("field", [b"*************", b"          NaN", b"             ", b"   6.0000E+0 "])

@@ -1,4 +1,4 @@
-"""Whether a deck is that of the run whose history is at hand."""
+"""What may be wrong with what a deck says: of another model, not followed as a whole, weights taken over."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 from d2rpick.choice.warnings import Caution
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
+    from d2rpick.choice.cost import CostModel
     from d2rpick.deck.inventory.model import Inventory
     from d2rpick.histories.history import Part
 
@@ -20,6 +21,23 @@ def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
         first, more = other[0], f", and {len(other) - 1} more" if len(other) > 1 else ""
         named = f"part {first.id} is {first.title!r} in the history and {_title(first, inventory)!r} in the deck{more}"
         yield Caution("deck-of-another-model", f"{named}: is this the deck of the run?")
+
+
+def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
+    """Say so where ties that are not followed may join the rigid bodies that parts become."""
+    if inventory.ties and len(inventory.groups(parts)) > 1:
+        more = f" and {len(inventory.ties) - 1} more ties" if len(inventory.ties) > 1 else ""
+        found = f"{inventory.ties[0]}{more} may join parts that share no nodes, which is not followed"
+        yield Caution("ties-not-followed", f"{found}; parts that are tied belong in one rigid body")
+
+
+def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
+    """Say what was not followed of a deck and, where its cost is ``used``, which weights were not measured."""
+    for note in model.inventory.notes:
+        yield Caution("deck-not-followed", note)
+    if used and model.assumed:
+        taken = f"the cost of {', '.join(model.assumed)} was not measured; that of a formulation alike was taken"
+        yield Caution("weights-by-analogy", taken)
 
 
 def _title(part: Part, inventory: Inventory) -> str:
