@@ -201,6 +201,7 @@ def _rows(
 ) -> Iterator[Planned]:
     """Give every flight with its window, as if each were the first."""
     last = max((one.td for one in known), default=None)
+    landed: float | None = None  # of the flight before
     for number, flight in enumerate(flights, start=1):
         start, end = bounds(reference.history, flight)
         margin = margin_before_contact(reference.history, flight, settings.margin)
@@ -216,16 +217,24 @@ def _rows(
         elif end - margin.time - start < shortest:
             yield replace(row, reason=_too_short(end - margin.time - start, shortest, margin))
         else:
-            yield _asked(reference, row, settings, shortest, fits)
+            yield _asked(reference, row, settings, shortest, landed, fits)
+        landed = flight.end
 
 
-def _asked(reference: Reference, row: Planned, settings: Settings, shortest: float, fits: Fits) -> Planned:
-    """Ask ``suggest`` for the window of a flight."""
+def _asked(
+    reference: Reference, row: Planned, settings: Settings, shortest: float, landed: float | None, fits: Fits
+) -> Planned:
+    """Ask ``suggest`` for the window of a flight, which does not reach back beyond the landing of the one before.
+
+    The energy alone shows another beginning to each td: the flight begins where the td that is chosen has it.
+    """
     own = settings.after is not None and row.start <= settings.after <= row.end
     asked = settings if own else replace(settings, after=None)
-    # the energy alone shows another beginning to each td, and that of an earlier td may lie before this flight
-    answer = suggest_of(reference, (row.start, row.end), asked, since=row.start, fits=fits)
+    answer = suggest_of(reference, (row.start, row.end), asked, since=landed, fits=fits)
+    begins = answer.situation.flight.start
     row = replace(row, answer=answer)
+    if begins is not None and begins < row.start:
+        row = replace(row, flight=row.flight._replace(start=begins), start=begins)
     if answer.recommended is None:
         why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
         return replace(row, reason="; ".join(why))

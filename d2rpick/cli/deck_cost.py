@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 DECK = click.option(
     "--deck", metavar="DECK", type=shared.FILE,
-    help="Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): gives the cost of the parts.",
+    help="Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): gives the cost of the parts, "
+    "and which of them become one rigid body.",
 )  # fmt: skip
 WEIGHTS = click.option(
     "--weights", metavar="FILE", type=shared.FILE,

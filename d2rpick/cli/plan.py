@@ -33,7 +33,10 @@ Examples:
 
 @click.command("plan", epilog=EXAMPLES)
 @click.option(
-    "--min-rigid", type=shared.NOT_NEGATIVE, metavar="T", help="Leave shorter windows out.  [default: 5% of the record]"
+    "--min-rigid",
+    type=shared.NOT_NEGATIVE,
+    metavar="T",
+    help="Leave shorter windows out.  [default: 5% of the record, and where one behind is more than twice as long]",
 )
 @click.option(
     "--all",

@@ -105,7 +105,8 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
         curve=bool(plot or report),
     )  # fmt: skip
     asked, rows = fingerprint(question), []
-    streaming = output_format == "ndjson" and output.file is None
+    by_line = output_format == "ndjson"
+    streaming = by_line and output.file is None
     for row in _rows(question, sources, work, quiet=output.quiet or (streaming and sys.stdout.isatty())):
         rows.append(row)
         if streaming:
@@ -113,7 +114,7 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
     answer = summarise(question.td, rows)
     output.notes((), answer.cautions)
     _write_files(answer, plot, report, output._replace(inputs=_files_of(rows)))
-    before = [] if streaming else [line(row, asked) for row in rows]
+    before = [line(row, asked) for row in rows] if by_line and not streaming else []
     text = write("study", output_format, answer, Shown(ctx.meta["d2rpick.command"], lines=before))
     output.result(in_words(text, output_format))
     if not answer.judged:

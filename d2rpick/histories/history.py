@@ -364,13 +364,11 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
 
 
 def _frozen(values: ArrayLike) -> Samples:
-    """Copy what could change."""
-    if (
-        isinstance(values, np.ndarray)
-        and values.dtype == np.float64
-        and not (values.flags.writeable or values.base is not None)
-    ):
-        return values
+    """Copy what could change, or holds more in memory than itself."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64 and not values.flags.writeable:
+        whole = values if values.base is None else values.base
+        if isinstance(whole, np.ndarray) and whole.size == values.size and not whole.flags.writeable:
+            return values
     copy = np.array(values, dtype=np.float64)
     copy.flags.writeable = False
     return copy

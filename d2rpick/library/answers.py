@@ -235,7 +235,8 @@ def suggest(
     flying : number, title or several, optional
         What flies together with them.
     deck : path, optional
-        Main deck of the run: tells what the parts cost, which are springs, and the parts of ``"recommended"``.
+        Main deck of the run: tells what the parts cost, which are springs, which rigid bodies they become, and the
+        parts of ``"recommended"``.  Without it they are taken for one body: ``position_error_assumes`` of a candidate.
     weights : Weights or path, optional
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     **choosing

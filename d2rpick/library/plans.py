@@ -110,7 +110,8 @@ def plan(
     parts, flying, deck, weights, **choosing
         As for `suggest`.
     min_rigid : float, optional
-        Leave shorter windows out [time].  Default: 5 % of the record.
+        Leave shorter windows out [time].  Default: 5 % of the record, and a window that locks in energy before one more
+        than twice as long.
     done : pairs of float
         Windows (tr, td) in which the run was switched [time].
     before : Run, optional

@@ -76,7 +76,7 @@
     },
     trade: {
       below: () => {},
-      above: (chart) => row.error !== null && dot(chart, row.rigid, row.error),
+      above: (chart) => row.error !== null && dot(chart, row.saved, row.error),
     },
   };
 
@@ -113,7 +113,7 @@
     trade: () => ({
       height: 320, scales: { x: { time: false, range: (_, low, high) => padded(low, high) }, y: { range: (_, low, high) => [0, 1.08 * (high || 1)] } },
       series: [{}, points("soft", 4), { ...points("good", 8), stroke: () => colour("good") }],
-      axes: [axis("rigid, % of the record", { values: times }), axis(flight.error, { size: 54 })], data: trade(),
+      axes: [axis(flight.saved, { values: times }), axis(flight.error, { size: 54 })], data: trade(),
     }),
   };
   const padded = (low, high) => {
@@ -133,11 +133,11 @@
     return [time, reference, switched];
   }
 
-  // Errors over rigid time, those of pairs that another one beats and of the others.
+  // Errors over what is saved, those of pairs that another one beats and of the others.
   function trade() {
-    const known = flight.rows.filter((one) => one.error !== null).sort((one, other) => one.rigid - other.rigid);
+    const known = flight.rows.filter((one) => one.error !== null).sort((one, other) => one.saved - other.saved);
     const column = (unbeaten) => known.map((one) => Boolean(one.unbeaten) === unbeaten ? one.error : null);
-    return [known.map((one) => one.rigid), column(false), column(true)];
+    return [known.map((one) => one.saved), column(false), column(true)];
   }
 
   function build(name) {
@@ -241,7 +241,7 @@
     charts.trade.over.addEventListener("click", (event) => {
       const box = charts.trade.over.getBoundingClientRect();
       const away = (one) => Math.hypot(
-        charts.trade.valToPos(one.rigid, "x") - event.clientX + box.left, charts.trade.valToPos(one.error, "y") - event.clientY + box.top,
+        charts.trade.valToPos(one.saved, "x") - event.clientX + box.left, charts.trade.valToPos(one.error, "y") - event.clientY + box.top,
       );
       const known = flight.rows.filter((one) => one.error !== null);
       if (!known.length) return;

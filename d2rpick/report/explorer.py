@@ -16,7 +16,7 @@ import numpy as np
 from d2rpick.choice.replayed import locked_in, response
 from d2rpick.choice.view import scale_of, view_of
 from d2rpick.histories.outline import outline
-from d2rpick.report.explorer_rows import VALUES, error_name, row_of, table_of
+from d2rpick.report.explorer_rows import VALUES, error_name, row_of, saved_name, table_of
 from d2rpick.report.html import Markup, join, resource, tag
 
 if TYPE_CHECKING:
@@ -90,8 +90,8 @@ _ENERGY: Final = (
     ("flight", "flight"), ("", "internal energy"), ("level", "level at td; dashed: tr"), ("windows", "acceptable tr"),
 )  # fmt: skip
 _MOTION: Final = (("", "without switching"), ("switched", "switched"))
-_CAPTION: Final = "Error against rigid time"
-_TRADE: Final = (("point", "no other td has both less error and more rigid time"), ("beaten", "other td"))
+_CAPTION: Final = "Error against saving"
+_TRADE: Final = (("point", "no other td has less error and saves more"), ("beaten", "other td"))
 
 
 def _controls(trade_offs: Sequence[TradeOff]) -> Markup:
@@ -166,6 +166,7 @@ def _flight(found: TradeOff) -> dict[str, Any]:
         "caption": f"Internal energy in the flight{cut}",
         "time": f"time [{unit}]" if unit else "time",
         "error": error_name(found.offers),
+        "saved": saved_name(found.offers),
         "view": [seen.start, seen.end],
         "flight": [
             seen.start if flight.start is None else flight.start,

@@ -66,14 +66,14 @@ def row_of(offer: Offer, start: Offer, view: View, unit: str, deformation: float
     deformation : float or None
         What the recommended tr locks in [square root of energy].
     """
-    best = offer.best
+    best, saving = offer.best, offer.saving
     numbers = {
         "td": offer.td,
         "tr": None if best is None else _brief(best.tr),
         "level": _brief(offer.energy_td),
         "locked": _brief(best.energy) if best else None,
         "deformation": None if deformation is None else _brief(deformation),
-        "rigid": _brief(100 * best.rigid_fraction) if best else None,
+        "saved": None if best is None else _brief(100 * (best.rigid_fraction if saving is None else saving)),
         "error": None if offer.error is None else _brief(offer.error),
         "windows": _columns(offer.windows or (), view),
         "peak": int(offer.peak),
@@ -103,6 +103,12 @@ def _brief(value: float) -> float:
 def error_name(offers: Sequence[Offer]) -> str:
     """Name what offers are compared by."""
     return "shortfall of the level at td" if all(one.basis == "energy" for one in offers) else "residual"
+
+
+def saved_name(offers: Sequence[Offer]) -> str:
+    """Name what their errors are held against: the saving of run time, or the rigid time where no cost is known."""
+    known = any(one.saving is not None for one in offers)
+    return "saved, % of the run time" if known else "rigid, % of the record"
 
 
 def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:

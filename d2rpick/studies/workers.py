@@ -163,6 +163,8 @@ class Cores:
 def _begin_work(held: Connection) -> None:
     """End this process, whatever it does, when the other end of ``held`` is closed; without a word on interrupts."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if _METHOD == "forkserver":  # from which the block was inherited
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
 
     def follow() -> None:
         held.poll(None)  # nothing is ever sent
@@ -180,10 +182,20 @@ def begin(processes: int, module: str) -> None:
         # read when a process imports numpy: with several of them, threads would only fight over the cores
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         if _METHOD == "forkserver":
-            from multiprocessing.forkserver import ensure_running  # not on every system
+            _start_server(module)
 
-            set_forkserver_preload([module])
-            ensure_running()
+
+def _start_server(module: str) -> None:
+    """Start the process that others are forked from; it never hears of interrupts, not even while it imports."""
+    from multiprocessing import forkserver, resource_tracker  # not on every system
+
+    set_forkserver_preload([module])
+    resource_tracker.ensure_running()  # its start would lift what is blocked here
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def on_cores(processes: int, module: str) -> Farm:

@@ -130,8 +130,8 @@ class OfModes:
 
     @cached_property
     def profile(self) -> Profile | None:
-        """Lock-in error over the span before td; None for one mode, for which all has a closed form."""
-        if isinstance(self.mode, Mode):
+        """Lock-in error over the span before td; None without one, or for one mode, of which all has a closed form."""
+        if isinstance(self.mode, Mode) or self.td <= self.span.start:
             return None
         step = 2 * np.pi / self.mode.fastest / _POINTS_PER_PERIOD
         count = max(3, int(np.ceil((self.td - self.span.start) / step)) + 1)

@@ -235,9 +235,15 @@ def bouncing(seed: int, folder: Path) -> list[str]:
 @given(seed=st.integers(0, 100_000))
 def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     """The energy shows another beginning of the flight to each td; a window began before the flight of its row."""
-    plan = plan_of(read(bouncing(seed, tmp_path_factory.getbasetemp())), Settings(replay=False))
+    reference, asked = read(bouncing(seed, tmp_path_factory.getbasetemp())), Settings(replay=False)
+    plan = plan_of(reference, asked)
     for row in plan.rows:
         assert row.window is None or row.start <= row.window[0] < row.window[1] <= row.end
+    assert all(one.end <= other.start for one, other in pairwise(plan.rows))
+    if len(plan.rows) == 1 and plan.rows[0].window:
+        alone = suggest_of(reference, None, asked).recommended
+        assert alone is not None
+        assert plan.rows[0].window == (alone.tr, alone.td)
 
 
 # ---- a short window before a longer one

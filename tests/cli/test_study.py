@@ -9,6 +9,7 @@ import os
 import signal
 import time
 from importlib.resources import files
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -367,9 +368,9 @@ def test_a_file_in_the_folder_of_a_run_is_never_written_to(tmp_path: Path, optio
     assert (tmp_path / "glstat").read_bytes() == before
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
-@pytest.mark.parametrize("number", [1, 3, 60])
-def test_a_plot_shows_the_runs(runs: list[str], tmp_path: Path, suffix: str, number: int) -> None:
+# Svg grows most with the number of curves; from eleven runs on they are drawn as many.
+@pytest.mark.parametrize(("number", "suffix"), [*product((1, 3, 12), ("png", "pdf")), *product((1, 3, 60), ("svg",))])
+def test_a_plot_shows_the_runs(runs: list[str], tmp_path: Path, number: int, suffix: str) -> None:
     figure = tmp_path / f"figure.{suffix}"
     sources = (runs * 20)[:number]
     assert run(*STUDY, *sources, "absent.csv", "--plot", str(figure)).exit_code == 1

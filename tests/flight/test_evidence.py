@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -78,10 +79,10 @@ def test_every_format_of_a_run_tells_its_flight_within_a_millisecond(rolled: Rol
 def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, form: str, tmp_path: Path) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
     file, td = str(rolled.files[form]), rolled.end + 0.02
-    result = run("suggest", "--td", str(td), *part, file)
+    result = run("suggest", "--td", str(td), "-f", "json", *part, file)
     assert result.exit_code == 1
     assert "no free flight at td" in result.stderr
-    assert f"to {answer('suggest', '--td', str(td), *part, file)['flight']['end']:.6g}" in result.stderr
+    assert f"to {json.loads(result.stdout)['flight']['end']:.6g}" in result.stderr
     judged = answer("verify", "--tr", "0.2", "--td", str(td), *part, file)
     assert (judged["verified"], judged["td_ok"]) == (False, False)
     rows = answer("study", "--td", str(td), *part, file)["runs"]

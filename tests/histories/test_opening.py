@@ -50,6 +50,33 @@ def test_content_decides_and_not_the_name(file: Write, data: bytes, name: str) -
     assert history.source == (str(Path(history.source[0]).parent / name),)
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        b"*KEYWORD\n",
+        b"\xef\xbb\xbf$ roof\r\n \t\n  $\n*NODE",
+        b"#RADIOSS STARTER\n",
+        b"$ d\n/BEGIN\n",
+        b"*DEFINE_CURVE\n",
+    ],
+)
+def test_a_deck_is_told_behind_comments(file: Write, head: bytes) -> None:
+    with pytest.raises(FormatError, match="this is a deck, an energy history was expected"):
+        read_history([file(head + b"1,2\n")])
+
+
+@pytest.mark.parametrize("head", [b"# RADIOSS\n", b"#\n", b"$ only a comment\n", b"// BEGIN\n"])
+def test_comments_of_a_table_make_no_deck_of_it(file: Write, head: bytes) -> None:
+    assert read_history([file(head + CSV)]).energy.tolist() == [1.0, 2.0, 1.5]
+
+
+def test_what_is_no_number_in_a_column_beside_it_does_not_keep_the_energy_from_being_read(file: Write) -> None:
+    table = b"time,internal_energy,kinetic_energy\n0.0,1.0,n/a\n0.1,2.0,x\n0.2,1.5,3.0\n"
+    history = read_history([file(table)])
+    assert history.energy.tolist() == [1.0, 2.0, 1.5]
+    assert history.balance is None or history.balance.kinetic is None
+
+
 def test_a_gzipped_file_is_read_and_hashed_as_it_lies_there(file: Write) -> None:
     packed = gzip.compress(CSV)
     name = file(packed, "history.gz")

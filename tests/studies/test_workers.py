@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -14,6 +16,7 @@ from d2rpick.studies.workers import Cores, Farm, Here, answers, cores
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
 FARMS = [Here, lambda: Cores(2, __name__)]
 
@@ -72,3 +75,21 @@ def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
 
 def test_there_is_a_core() -> None:
     assert cores() >= 1
+
+
+def test_an_interrupt_while_the_first_process_imports_is_no_traceback(tmp_path: Path) -> None:
+    (tmp_path / "slow.py").write_text("import time; print('importing', flush=True); time.sleep(0.3); print('imported')")
+    code = (
+        "import signal; from d2rpick.studies.workers import Cores, begin\n"
+        "signal.signal(signal.SIGINT, lambda *_: None)\n"  # an ignored one would be inherited
+        "begin(2, 'slow')\n"
+        "with Cores(2, 'slow') as farm: print(farm.submit(abs, -7).result())\n"
+    )
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        assert process.stdout
+        assert process.stdout.readline() == "importing\n"
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
+        assert process.communicate(timeout=30) == ("imported\n7\n", "")

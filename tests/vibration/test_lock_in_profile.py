@@ -5,9 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from d2rpick.histories.history import History
 from d2rpick.vibration import measures
+from d2rpick.vibration.identify import identify_several
 from d2rpick.vibration.lock_in_profile import Profile
+from d2rpick.vibration.modes import Modes
+from d2rpick.vibration.of_modes import OfModes
 from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.span import Span
 
 MODE = Mode(omega=2 * np.pi, alpha=0.2, cosine=0.0, sine=1.0, origin=0.0)
 TD = 5.1
@@ -45,3 +50,15 @@ def test_an_error_that_grows_at_once_leaves_the_way_to_the_next_time() -> None:
     steep = Profile(np.linspace(0, 4, 5), np.array([1.0, 1.0, 0.0, 1.0, 1.0]))
     assert steep.tolerance(2.0, 0.0) == pytest.approx(0.05)
     assert steep.tolerance(0.5, 0.2) == pytest.approx(0.5)
+
+
+def test_a_td_at_which_two_modes_set_in_has_nothing_before_it_to_compare() -> None:
+    modes = Modes((Mode(8.0, 0.05, 1.0, 0.4, 0.0), Mode(19.0, 0.05, 0.3, 0.6, 0.0)))
+    time = np.linspace(0.0, 6.0, 1201)
+    history = History(time, np.asarray(modes.energy(time)), ("made",), "made", "energy")
+    fit = identify_several(time, history.energy)
+    vibration = OfModes(history, 2.0, fit, Span(2.0, 6.0))
+    crossings = vibration.moments(0.2)
+    assert all(one.tr < 2.0 and one.kind == "crossing" for one in crossings)
+    assert np.isfinite(vibration.reach(crossings)).all()
+    assert vibration.measured(np.array([one.tr for one in crossings])) == [None] * len(crossings)

@@ -146,10 +146,14 @@ class Table:
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """How finely the times and these columns were printed."""
-        fields = [row for row in self._sample() if row[self._time]]  # not behind a curve's end
-        times = [row[self._time] for row in fields]
-        energies = [row[self._columns[name]] for row in fields for name in names]
+        times = [row[self._time] for row in self._printed]
+        energies = [row[self._columns[name]] for row in self._printed for name in names]
         return printed.precisions(times, energies, self.time)
+
+    @cached_property
+    def _printed(self) -> list[list[str]]:
+        """Sampled rows that show how numbers were printed."""
+        return [row for row in self._sample() if row[self._time]]  # not behind a curve's end
 
     def _asked(self, selection: Selection) -> list[int]:
         """Columns that must be whole in a last line without end: those asked for, or what is taken by default."""

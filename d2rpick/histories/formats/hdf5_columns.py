@@ -73,7 +73,7 @@ class Column:
 
 
 def finite(values: Any, path: str, source: str) -> Samples:
-    """``values`` as doubles; FormatError unless all are finite."""
+    """``values`` as doubles, read-only so that nobody needs a copy of his own; FormatError unless all are finite."""
     numbers = np.asarray(values, dtype=np.float64)
     bad = np.argwhere(~np.isfinite(numbers))
     if bad.size:
@@ -81,6 +81,7 @@ def finite(values: Any, path: str, source: str) -> Samples:
             f"{source}: {path} is {numbers[tuple(bad[0])]} at state {bad[0][0] + 1}, not a finite number; "
             "choose another dataset"
         )
+    numbers.flags.writeable = False
     return numbers
 
 

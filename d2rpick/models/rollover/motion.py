@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.errors import RangeError
 from d2rpick.models.rollover.bars import Bars, stiffest_rate
 from d2rpick.models.rollover.contact import STIFFNESS, Contact
 from d2rpick.models.rollover.model import GRAVITY, build
@@ -45,15 +46,19 @@ class Accounts:
 class Motion:
     """The state of a run: ``places`` (n,) at step ``count``, ``velocities`` (n,) half a step before it.
 
-    Steps take ``dt`` [s], a whole fraction (``every``) of the ``interval`` in which states are given out.  ``body`` is
-    the box while it is rigid.
+    Steps take ``dt`` [s], a whole fraction (``every``) of the ``interval`` in which states are given out; RangeError
+    where that holds no number of them.  ``body`` is the box while it is rigid.
     """
 
     def __init__(self, parameters: Parameters, interval: float) -> None:
         s = self.structure = build(parameters)
         touching = np.zeros(s.places.size)
         touching[s.skin] = max(STIFFNESS, parameters.ground_stiffness)
-        limit = 2 / stiffest_rate(s.masses, s.box, s.step, extra=touching)
+        rate = stiffest_rate(s.masses, s.box, s.step, extra=touching)
+        limit = 2 / rate
+        if not (limit > 0 and np.isfinite(interval / limit)):
+            found = f"an output interval of {interval:g} s holds no number of steps at a rate of {rate:g} 1/s"
+            raise RangeError(f"{found}; choose a shorter one, or softer bars")
         self.every = int(np.ceil(interval / (_SAFETY * limit)))
         self.dt = interval / self.every
         self.damping = parameters.damping

@@ -46,7 +46,8 @@ def simulate(parameters: Parameters, t_end: float, *windows: RigidWindow, interv
     >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
-    motion = Motion(parameters, interval)
+    with np.errstate(over="ignore"):  # the number of steps tells whether it can be computed
+        motion = Motion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
         raise RangeError(f"steps of {motion.dt:.3g} s make more than {MOST_STEPS} until {t_end:g}; choose softer bars")
     for one, following in pairwise(windows):
