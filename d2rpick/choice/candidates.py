@@ -9,13 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
 import numpy as np
 
 from d2rpick.choice.objections import objections
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import Moment
+from d2rpick.vibration.together import measured_of, moments_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_shares import PartMatch
 
 
+# Candidates that are looked at together, at most: arrays of more are no faster, and noise makes tens of thousands a td.
+_MOST: Final = 20_000
 # A residual that may be so much higher is worth a note.
 _MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
@@ -110,16 +113,16 @@ class Candidates(Sequence[Candidate]):
     ranked: bool = False
 
     @classmethod
-    def of(cls, situation: Situation, moments: Sequence[Moment]) -> Candidates:
-        """Measure each tr and hold it against flight, sign and tolerance."""
+    def of(cls, situation: Situation, moments: Sequence[Moment], known: Sequence[Measured | None]) -> Candidates:
+        """Hold each tr, of which is ``known`` what was measured, against flight, sign and tolerance."""
         vibration = situation.vibration
         tr = np.array([one.tr for one in moments])
-        known, energy = tuple(vibration.measured(tr)), vibration.energies(tr)
+        energy = vibration.energies(tr)
         level_error = measures.level_errors(energy, situation.energy_td)
         return cls(
             situation=situation,
             moments=tuple(moments),
-            known=known,
+            known=tuple(known),
             tr=tr,
             energy=energy,
             level_error=level_error,
@@ -163,6 +166,11 @@ class Candidates(Sequence[Candidate]):
             objections=tuple(one.ordered(order) for one in self.objections),
             ranked=True,
         )
+
+    @cached_property
+    def chosen(self) -> Candidate | None:
+        """The one that is recommended."""
+        return None if self.recommended is None else self[self.recommended]
 
     @property
     def out_of_place(self) -> NDArray[np.bool_]:
@@ -234,22 +242,48 @@ def find_candidates(situation: Situation, *, in_flight: bool = False) -> Candida
     Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
     acceptable, may be left out: noise in a long record makes tens of thousands.
     """
+    return next(candidates_of([situation], in_flight=in_flight))
+
+
+def candidates_of(situations: Sequence[Situation], *, in_flight: bool = False) -> Iterator[Candidates]:
+    """The same of many td of one record, by one set of rules: so many td at once as have few candidates."""
+    first, together = 0, 1
+    while first < len(situations):
+        found = _found_together(situations[first : first + together], in_flight=in_flight)
+        yield from found
+        first, together = first + together, max(1, _MOST // max(1, *map(len, found)))
+
+
+def _found_together(situations: Sequence[Situation], *, in_flight: bool) -> list[Candidates]:
+    vibrations = [one.vibration for one in situations]
+    starts = [one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf for one in situations]
+    found = moments_of(vibrations, situations[0].settings.tolerance, starts)
+    kept = [_at_start(one) or _distinct(one, moments) for one, moments in zip(situations, found, strict=True)]
+    known = measured_of(vibrations, [np.array([one.tr for one in moments]) for moments in kept])
+    return [Candidates.of(*row) for row in zip(situations, kept, known, strict=True)]
+
+
+def judge(situation: Situation, found: Sequence[Moment]) -> Candidates:
+    """Measure each tr and hold it against flight, sign and tolerance."""
+    return Candidates.of(situation, found, situation.vibration.measured(np.array([one.tr for one in found])))
+
+
+def _at_start(situation: Situation) -> list[Moment]:
+    """Where nothing vibrates in the flight, its start; else nothing."""
     start = situation.earliest_tr
-    if start is not None and situation.at_rest:
-        return judge(situation, [Moment(max(start, float(situation.history.time[0])), "start", None)])
-    since = start if in_flight and start is not None else -np.inf
-    found = situation.vibration.moments(situation.settings.tolerance, since)
+    if start is None or not situation.at_rest:
+        return []
+    return [Moment(max(start, float(situation.history.time[0])), "start", None)]
+
+
+def _distinct(situation: Situation, found: Sequence[Moment]) -> list[Moment]:
+    """Give the moments in time order, without the matches that lie next to a crossing or an extremum."""
     matches = [one for one in found if one.kind == "match"]
     if matches:
         of_level = np.array([one.tr for one in found if one.kind != "match"])
         known = {one for one in matches if not np.all(np.abs(of_level - one.tr) > situation.history.step)}
         found = [one for one in found if one not in known]
-    return judge(situation, sorted(found, key=itemgetter(0)))  # a Moment begins with its time
-
-
-def judge(situation: Situation, found: Sequence[Moment]) -> Candidates:
-    """Measure each tr and hold it against flight, sign and tolerance."""
-    return Candidates.of(situation, found)
+    return sorted(found, key=itemgetter(0))  # a Moment begins with its time
 
 
 def _remarks(situation: Situation, reach: float, known: Measured | None, parts: Sequence[PartMatch]) -> Iterator[str]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.choice.suggest_td import bounds
-from d2rpick.choice.trade_off import STEPS, TradeOff, explore_of
+from d2rpick.choice.trade_off import TradeOff, explore_of
 from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
@@ -13,21 +13,23 @@ if TYPE_CHECKING:
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.situation import Situation
 
+# td on the grid of a page: some pixels of a screen apart, and finer than anybody drags.
+_STEPS: Final = 120
 # td of a flight in a plan of many: a curve of fewer points tells little.
-_LEAST = 40
+_LEAST: Final = 40
 
 
 def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
     """Find what other td cost than those of a plan, for each of its flights; its grids are the coarser the more."""
     answers = [row.answer for row in plan.rows if row.answer and row.window]
     reference = reference._replace(history=plan.history)
-    steps = max(STEPS // max(len(answers), 1), _LEAST)
+    steps = max(_STEPS // max(len(answers), 1), _LEAST)
     found = (explored_around(reference, one.situation, one.td_window, steps=steps) for one in answers)
     return tuple(one for one in found if one)
 
 
 def explored_around(
-    reference: Reference, situation: Situation, window: tuple[float, float] | None = None, *, steps: int | None = None
+    reference: Reference, situation: Situation, window: tuple[float, float] | None = None, *, steps: int = _STEPS
 ) -> TradeOff | None:
     """Find what other td cost than that of a situation.
 
@@ -39,7 +41,7 @@ def explored_around(
     window : (float, float), optional
         Where td was looked for [time].  Default: the flight that td lies in.
     steps : int, optional
-        So many td on an even grid.  Default: as many as a curve needs.
+        So many td on an even grid.
 
     Returns
     -------
@@ -51,6 +53,6 @@ def explored_around(
         return None
     try:
         span = window or bounds(situation.history, flight)
-        return explore_of(reference, situation.settings, span, td=situation.td, steps=steps or STEPS)
+        return explore_of(reference, situation.settings, span, td=situation.td, steps=steps)
     except RangeError:  # the window holds no state
         return None

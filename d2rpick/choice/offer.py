@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from d2rpick.choice.candidates import candidates_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.suggest import suggest_at
 
 if TYPE_CHECKING:
-    from d2rpick.choice.candidates import Candidate
+    from collections.abc import Container, Iterator, Sequence
+
+    from d2rpick.choice.candidates import Candidate, Candidates
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.quality import Quality
     from d2rpick.choice.situation import Situation
@@ -57,9 +60,14 @@ class Offer:
         return None if share is None else 1 - share
 
 
-def offer_of(situation: Situation, *, peak: bool) -> Offer:
-    """Give what ``suggest`` says of a td; ``peak`` tells whether the energy peaks there."""
-    answer = suggest_at(situation, with_better=False, in_flight=True)
+def offers_of(situations: Sequence[Situation], peaks: Container[float]) -> Iterator[Offer]:
+    """Give what ``suggest`` says of each td; ``peaks`` are the times where the energy peaks."""
+    found = candidates_of(situations, in_flight=True)
+    yield from (_offer(one, candidates, one.td in peaks) for one, candidates in zip(situations, found, strict=True))
+
+
+def _offer(situation: Situation, found: Candidates, peak: bool) -> Offer:
+    answer = suggest_at(situation, with_better=False, found=found)
     if answer.chosen is None:  # the reason tells of all candidates
         answer = suggest_at(situation, with_better=False)
     best = answer.chosen

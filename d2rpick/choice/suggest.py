@@ -68,8 +68,7 @@ class Suggestion(NamedTuple):
     @property
     def chosen(self) -> Candidate | None:
         """The candidate that is recommended."""
-        place = self.candidates.recommended
-        return None if place is None else self.candidates[place]
+        return self.candidates.chosen
 
     @property
     def acceptable_windows(self) -> tuple[tuple[float, float], ...]:
@@ -114,12 +113,12 @@ def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     return suggest_at(examine(history, td, settings))
 
 
-def suggest_at(situation: Situation, *, with_better: bool = True, in_flight: bool = False) -> Suggestion:
+def suggest_at(situation: Situation, *, with_better: bool = True, found: Candidates | None = None) -> Suggestion:
     """Rank the candidates for tr in a situation that is known, and recommend one; look for a better td too.
 
-    With ``in_flight`` candidates before the flight may be left out.
+    ``found`` are the candidates where they are known; those before the flight may be missing.
     """
-    candidates = rank(find_candidates(situation, in_flight=in_flight))
+    candidates = rank(find_candidates(situation) if found is None else found)
     best = best_of(situation, candidates)
     if best:
         candidates = candidates.recommending(best.rank - 1)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice.candidates import find_candidates
+from d2rpick.choice.candidates import candidates_of
 from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import find_flights
@@ -208,7 +208,9 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
 
 def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
-    found = ((there, best_of(there, rank(find_candidates(there, in_flight=True)))) for there in situations)
+    asked = list(situations)
+    candidates = candidates_of(asked, in_flight=True)
+    found = ((there, best_of(there, rank(some))) for there, some in zip(asked, candidates, strict=True))
     return [(there, best) for there, best in found if best and not best.same_swing]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.choice.of_run import suggest_of
-from d2rpick.choice.offer import offer_of
+from d2rpick.choice.offer import offers_of
 from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.suggest_td import longest_flight, looking, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
@@ -89,8 +89,8 @@ def explore_of(
     chosen = suggestion.recommended.td if suggestion.recommended else None
     times, peaks = _times(situation, inside, steps)
     named = [time for time in (td, chosen) if time is not None]
-    offers = [offer_of(look(time), peak=time in peaks) for time in np.unique([*times, *named]).tolist()]
-    offers = [replace(one, recommended=one.td == chosen) for one in _marked(offers)]
+    situations = [look(time) for time in np.unique([*times, *named]).tolist()]
+    offers = [replace(one, recommended=one.td == chosen) for one in _marked([*offers_of(situations, peaks)])]
     asked = next((one for one in offers if one.td == td), None)
     start = asked or max(filter(_found, offers), key=lambda one: one.rigid_time or 0.0, default=None)
     return TradeOff(

@@ -78,12 +78,11 @@ def scale_of(low: float, high: float, level: float) -> Scale:
     return Scale(low - room, high + room, logarithmic=False)
 
 
-def view_of(situation: Situation, tr: float | None = None) -> View:
-    """Give what shows the flight of a situation, its td and a tr."""
+def view_of(situation: Situation, *times: float) -> View:
+    """Give what shows the flight of a situation, its td and other ``times`` [time]."""
     span = situation.evidence.span
-    times = [situation.td, *(() if tr is None else (tr,))]
     known = max(span.end, situation.td) if span else None
-    return view(situation.history, situation.flight, times, known)
+    return view(situation.history, situation.flight, [situation.td, *times], known)
 
 
 def view(history: History, flight: Flight, times: list[float], known: float | None = None) -> View:

@@ -100,7 +100,7 @@ def command(
 
 
 def _page(found: TradeOff, run: Run, options: dict[str, Any]) -> str:
-    """Draw the figures, wide and narrow, and write the page around them."""
+    """Draw the figures, and write the page around them."""
     from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import PageContext
     from d2rpick.report.trade_off_page import as_page, drawn

@@ -193,9 +193,10 @@ def _write_files(answer: Study, plot: str | None, report: str | None, output: Ou
     if plot is not None:
         output.write(plot, figures.render(figures_study.draw_study(answer), plot))
     if report is not None:
+        from d2rpick.report.figures_page import svg_element
         from d2rpick.report.study_page import as_page
 
-        drawing = figures.both_widths(figures_study.draw_study, answer, "runs")
+        drawing = svg_element(figures_study.draw_study(answer, page=True), "runs-")
         output.write(report, text_bytes(with_options(as_page(answer, typed.repeat(), drawing))))
 
 

@@ -118,7 +118,7 @@ def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: 
 
 
 def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> str:
-    """Draw the figures, wide and narrow, explore the flight, and write the page around them."""
+    """Draw the figure, explore the flight, and write the page around them."""
     from d2rpick.choice.explored import explored_around
     from d2rpick.choice.judged_card import input_for
     from d2rpick.cli.explorer import explorer_of

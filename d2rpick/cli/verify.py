@@ -98,7 +98,7 @@ def command(
 
 
 def _page(answer: Verdict, reference: Reference, switched: Run | None, options: dict[str, Any]) -> str:
-    """Draw the figure, wide and narrow, explore the flight, and write the page around it."""
+    """Draw the figure, explore the flight, and write the page around it."""
     from d2rpick.choice.explored import explored_around
     from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import PageContext

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from d2rpick.flight.energy_alone import quiet_time
-from d2rpick.flight.window import all_windows
+from d2rpick.flight.window import all_windows, marks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -61,14 +61,21 @@ class Witness(NamedTuple):
     """
 
     source: str
+    time: Samples
     around: Callable[[float], FreeFlight | None]
     flights: Callable[[], tuple[FreeFlight, ...]]
     decisive: bool
 
     @classmethod
     def of(cls, source: str, time: Samples, around: Callable[[float], FreeFlight | None], *, decisive: bool) -> Witness:
-        """Give the source that shows flights over ``time`` (n,), which looks for all of them only once."""
-        return cls(source, around, cache(partial(all_windows, time, around)), decisive)
+        """Give the source that shows flights over ``time`` (n,), which looks around no time, and for all, only once."""
+        once = cache(around)
+        return cls(source, time, once, cache(partial(all_windows, time, once)), decisive)
+
+    def holding(self, td: float) -> FreeFlight | None:
+        """Give the flight that it shows around td: that of the first mark whose flight holds td, else td's own."""
+        shared = filter(None, map(self.around, marks(self.time, td)))
+        return next((flight for flight in shared if flight.start <= td <= flight.end), None) or self.around(td)
 
     def counts(self) -> bool:
         """Whether there is no flight where it shows none."""
@@ -76,6 +83,8 @@ class Witness(NamedTuple):
 
 
 _WITNESSES: WeakKeyDictionary[History, tuple[Witness, ...]] = WeakKeyDictionary()
+# What was confirmed of the flights that witnesses show: many td lie in the same.
+_CONFIRMED: WeakKeyDictionary[History, dict[tuple[tuple[str, FreeFlight], ...], Seen]] = WeakKeyDictionary()
 
 
 class Seen(NamedTuple):
@@ -117,13 +126,16 @@ def seen_flight(history: History, td: float) -> Seen:
     """
     found: list[tuple[str, FreeFlight]] = []
     for witness in witnesses(history):
-        flight = witness.around(td)
+        flight = witness.holding(td)
         if flight:
             found.append((witness.source, flight))
         elif (not found or witness.source in _AGREEING) and witness.counts():
             doubts = _contradicting(found, witness, td)
             return _nearest(witness, td, _no_flight(witness.source, td), doubts)
-    return _confirmed(history, found) if found else Seen(None, None)
+    known = _CONFIRMED.setdefault(history, {})
+    if found and tuple(found) not in known:
+        known[tuple(found)] = _confirmed(history, found)
+    return known[tuple(found)] if found else Seen(None, None)
 
 
 def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,6 +24,8 @@ SHORTEST, FEWEST = 0.05, 12
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
 # Nothing is known more exactly than this share of its range: solvers add up in single precision.
 _ROUND_OFF = 1e-7
+# Every so many moments there is one from which a long flight is looked for.
+_FAR: Final = 5
 # Each time the window shrinks its middle is clearer of the contacts; it soon stays.
 _MOST_SHRINKS = 8
 
@@ -119,6 +121,17 @@ def longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
 def moments(time: Samples) -> Iterator[float]:
     """Give times so close together that each flight that is long enough holds one."""
     yield from np.linspace(time[0], time[-1], round(1 / SHORTEST) + 1).tolist()
+
+
+def marks(time: Samples, td: float) -> tuple[float, ...]:
+    """Give the moments from which the flight around ``td`` is looked for, so that many td share what is found.
+
+    First the nearest of those far apart, whose long flight may hold td; then the two about td, of which each flight
+    that is long enough holds one.
+    """
+    times = tuple(moments(time))
+    near = sorted(times, key=lambda moment: abs(moment - td))[:2]
+    return min(times[::_FAR], key=lambda moment: abs(moment - td)), *near
 
 
 def all_windows(time: Samples, around: Callable[[float], FreeFlight | None]) -> tuple[FreeFlight, ...]:

@@ -73,7 +73,7 @@ class Answer(Document):
 
     def _record(
         self,
-        figures: dict[str, tuple[str, str]],
+        figures: dict[str, str],
         tr: float | None,
         td_window: tuple[float, float] | None = None,
     ) -> PageContext:
@@ -366,7 +366,7 @@ def explorer_of(found: Iterable[TradeOff | None], asking: Sequence[str]) -> Expl
 def page_record(
     run: Run,
     command: Sequence[str],
-    figures: dict[str, tuple[str, str]],
+    figures: dict[str, str],
     card: SolverInput | None,
     explorer: Explorer | None,
 ) -> PageContext:

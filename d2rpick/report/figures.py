@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import io
-import re
 import warnings
 from contextlib import contextmanager
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import matplotlib as mpl
-from matplotlib.ticker import LogFormatter
+from matplotlib.ticker import LogFormatter, NullLocator
 
 from d2rpick.choice.view import BELOW_LEVEL, LOGARITHMIC
 from d2rpick.errors import FormatError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator, Sequence
 
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -25,11 +25,13 @@ if TYPE_CHECKING:
 
 FORMATS = ("png", "svg", "pdf")
 # Okabe and Ito's palette: told apart with any colour vision.
-REFERENCE, SWITCHED, GOOD, FLIGHT = "#000000", "#d55e00", "#009e73", "#56b4e9"
-# Width of a figure, and the height of one panel and of two [inch]; on a narrow page letters keep their size.
-SIZES: Final = {False: (10.0, 4.0, 6.5), True: (4.2, 3.9, 6.6)}
-# Share of the axes that the label of a switch time takes up, at most.
-LABEL: Final = {False: 0.14, True: 0.3}
+REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = "#000000", "#d55e00", "#009e73", "#56b4e9", "#0072b2"
+# Width of a figure that is written to a file [inch].
+WIDTH: Final = 10.0
+# Share of the axes that the label of a switch time takes up, at most: in a file and on a page.
+LABEL: Final = {False: 0.14, True: 0.28}
+# From this ratio on a logarithmic axis has marks enough without those between powers of ten, each of which costs time.
+_DECADES: Final = 100.0
 # Stretches of a curve, each with its lowest and highest value: as many as paper and screen tell apart.
 STRETCHES: Final = 400
 # Of a name from a file, what fits into a legend; in full it stands in the result.
@@ -48,56 +50,33 @@ def render(figure: Figure, name: str) -> bytes:
     """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for, always the same."""
     content, form = io.BytesIO(), picture_format(name)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
-    with mpl.rc_context({"svg.hashsalt": "d2rpick"}), _any_letters():
+    with mpl.rc_context({"svg.hashsalt": "d2rpick"}), any_letters():
         figure.savefig(content, format=form, dpi=150, metadata=undated)
     return content.getvalue()
 
 
-def svg_element(figure: Figure, prefix: str) -> str:
-    """Turn a figure into an SVG element for a page, whose ids all begin with ``prefix``; letters stay letters.
-
-    It has no style sheet of its own: that of the page holds what matplotlib writes into it.
-    """
-    content = io.StringIO()
-    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": prefix}), _any_letters():
-        figure.savefig(content, format="svg", metadata=nothing)
-    element = content.getvalue()
-    element = element[element.index("<svg") :]
-    element = re.sub(r' (?:width|height)="[\d.]+pt"', "", element, count=2)  # the page says how wide
-    # a hundredth of a point is finer than any screen
-    element = re.sub(r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), element)
-    element = re.sub(r"<style.*?</style>", "", element, flags=re.DOTALL)
-    return re.sub(r'(?<= id=")|(?<=href="#)|(?<=url\(#)', prefix, element)
-
-
-def both_widths(draw: Callable[..., Figure], answer: Any, name: str) -> tuple[str, str]:
-    """Give what ``draw`` draws of an answer as SVG elements for a wide and a narrow page; ``name`` tells them apart."""
-    return (
-        svg_element(draw(answer), f"{name}-wide-"),
-        svg_element(draw(answer, narrow=True), f"{name}-narrow-"),
-    )
-
-
 @contextmanager
-def _any_letters() -> Iterator[None]:
+def any_letters() -> Iterator[None]:
     """Let letters of a name that the font lacks be boxes, without a warning."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from", UserWarning)
         yield
 
 
-def make_logarithmic(axes: Axes) -> None:
+def make_logarithmic(axes: Axes, low: float, high: float) -> None:
     """Make the vertical axis logarithmic, with plain numbers: typesetting powers takes a third of a figure's time."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_formatter(LogFormatter())
+    if high > _DECADES * low:
+        axes.yaxis.set_minor_locator(NullLocator())
+    else:
+        axes.yaxis.set_minor_formatter(LogFormatter())
 
 
 def show_level(axes: Axes, level: float, highest: float) -> None:
     """Make the axis logarithmic where the level would vanish on a linear one."""
     if level > 0 and highest > LOGARITHMIC * level:
-        make_logarithmic(axes)
+        make_logarithmic(axes, level / BELOW_LEVEL, highest)
         axes.set_ylim(bottom=level / BELOW_LEVEL)
 
 
@@ -115,7 +94,7 @@ def show_span(axes: Axes, span: tuple[float, float], scale: Scale, cut: tuple[st
     """
     axes.set_xlim(*span)
     if scale.logarithmic:
-        make_logarithmic(axes)
+        make_logarithmic(axes, scale.low, scale.high)
     axes.set_ylim(scale.low, scale.high)
     what, highest = cut
     if what and highest > scale.high:
@@ -128,12 +107,12 @@ def show_span(axes: Axes, span: tuple[float, float], scale: Scale, cut: tuple[st
         )  # fmt: skip
 
 
-def mark_times(axes: Axes, tr: float | None, td: float | None, *, narrow: bool) -> None:
-    """Mark the switch times; their labels stand above the axes, away from each other and from the edges.
+def mark_times(panels: Sequence[Axes], tr: float | None, td: float | None, *, page: bool) -> None:
+    """Mark the switch times; their labels stand above the first axes, away from each other and from the edges.
 
     Where a label would reach over an edge it changes its side if there is room.
     """
-    width, (low, high) = LABEL[narrow], axes.get_xlim()
+    width, (low, high) = LABEL[page], panels[0].get_xlim()
     places = [None if time is None else (time - low) / (high - low) for time in (tr, td)]
     room = 1.0 if places[0] is None or places[1] is None else places[1] - places[0]
     sides = ["right", "left"]
@@ -143,19 +122,30 @@ def mark_times(axes: Axes, tr: float | None, td: float | None, *, narrow: bool) 
         sides[1] = "right"
     for name, time, side in zip(("tr", "td"), (tr, td), sides, strict=True):
         if time is not None:
-            axes.axvline(time, color=SWITCHED, linestyle="--", linewidth=0.8)
-            axes.annotate(
+            for axes in panels:
+                axes.axvline(time, color=SWITCHED, linestyle="--", linewidth=0.8)
+            panels[0].annotate(
                 f" {name} = {time:.6g} ", (time, 1), xycoords=("data", "axes fraction"), xytext=(0, 3),
                 textcoords="offset points", ha=side, fontsize="small", color=SWITCHED,
             )  # fmt: skip
 
 
 def finish(axes: Axes, *, legend: bool = True) -> None:
-    """Draw the grid, keep the time axis tight, and put the legend beside the axes."""
+    """Draw the grid, keep the time axis tight, and put the legend beside the axes.
+
+    A power of ten of the numbers stands above them, clear of the labels of the switch times.
+    """
     axes.grid(visible=True, linewidth=0.3)
+    axes.yaxis.get_offset_text().set_horizontalalignment("right")
     axes.margins(x=0)
     if legend:
         axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def entries(panels: Sequence[Axes]) -> dict[str, Artist]:
+    """What a legend of several panels names, each thing once."""
+    known = (zip(*panel.get_legend_handles_labels(), strict=True) for panel in panels)
+    return {name: handle for pairs in known for handle, name in pairs}
 
 
 def plain(name: str) -> str:

@@ -10,17 +10,19 @@ from d2rpick.choice.replayed import replayed_motion
 from d2rpick.choice.view import merged, scale_of, view_of
 from d2rpick.histories.outline import outline
 from d2rpick.report.figures import (
+    BETTER,
     FLIGHT,
     GOOD,
     REFERENCE,
-    SIZES,
     STRETCHES,
     SWITCHED,
+    WIDTH,
     finish,
     mark_times,
     plain,
     show_span,
 )  # fmt: skip
+from d2rpick.report.figures_page import arrange
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,34 +32,35 @@ if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.replayed import Motion
     from d2rpick.choice.situation import Situation
-    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.choice.suggest import Pair, Suggestion
     from d2rpick.choice.verify import Verdict
     from d2rpick.choice.view import View
 
+# Height of a file's figure of the energy alone, and with the motion; on a page, that of a panel [inch].
+_HEIGHTS: Final = (4.0, 6.5)
+_PANELS: Final = (2.6, 2.0)
 # Up to so many candidates are told apart as marks; beyond, what is acceptable is a band.
 _FEW: Final = 20
 # Share of the axes at their foot in which the band lies, clear of the curve.
 _BAND: Final = 0.045
 
 
-def draw_suggestion(answer: Suggestion, *, narrow: bool = False) -> Figure:
-    """Energy in the flight with its level at td, candidates or acceptable windows, the choice; below it the motion."""
+def draw_suggestion(answer: Suggestion, *, page: bool = False) -> Figure:
+    """Energy in the flight with its level at td, candidates or acceptable windows, the choice; below it the motion.
+
+    On a page, where nobody asks for two figures that are nearly the same, a better pair too.
+    """
     best = answer.chosen
     few = answer.windows is None and len(answer.candidates) <= _FEW
     shown = tuple(answer.candidates) if few else (best,) if best else ()
     bands = () if few else answer.acceptable_windows
-    return _draw(answer.situation, best.tr if best else None, shown, bands, narrow=narrow)
+    better = answer.clearly_better if page else None
+    return _draw(answer.situation, best.tr if best else None, shown, bands, better, page=page)
 
 
-def draw_better(answer: Suggestion, *, narrow: bool = False) -> Figure:
-    """Draw the same for the better pair; there must be one."""
-    assert answer.better_pair is not None
-    return _draw(answer.situation.at(answer.better_pair.td), answer.better_pair.tr, narrow=narrow)
-
-
-def draw_verdict(answer: Verdict, *, narrow: bool = False) -> Figure:
+def draw_verdict(answer: Verdict, *, page: bool = False) -> Figure:
     """Energy in the flight with its level at td and the pair that was judged; below it the motion after that pair."""
-    return _draw(answer.situation, answer.candidate.tr, (answer.candidate,), narrow=narrow)
+    return _draw(answer.situation, answer.candidate.tr, (answer.candidate,), page=page)
 
 
 def _draw(
@@ -65,26 +68,27 @@ def _draw(
     tr: float | None,
     candidates: Sequence[Candidate] = (),
     bands: Sequence[tuple[float, float]] = (),
+    better: Pair | None = None,
     *,
-    narrow: bool = False,
+    page: bool = False,
 ) -> Figure:
     motion = None if tr is None else replayed_motion(situation, tr)
-    width, one, two = SIZES[narrow]
-    figure = Figure(figsize=(width, two if motion else one), layout="constrained")
+    figure = Figure(figsize=(WIDTH, _HEIGHTS[bool(motion)]), layout=None if page else "constrained")
     panels = list(figure.subplots(2 if motion else 1, 1, sharex=True, squeeze=False)[:, 0])
-    seen = view_of(situation, tr)
+    seen = view_of(situation, *(() if tr is None else (tr,)), *(better[:2] if better else ()))
     _draw_energy(panels[0], situation, seen, candidates, bands)
     if motion:
         _draw_motion(panels[1], motion)
+    if better:
+        _draw_better(panels, situation.at(better.td), better.tr)
     unit = situation.history.time_unit
     panels[-1].set_xlabel(f"time [{unit}]" if unit else "time")
     for panel in panels:
-        finish(panel, legend=not narrow)
+        finish(panel, legend=not page)
     _show(panels[0], situation, seen)
-    for panel in panels:
-        mark_times(panel, tr, situation.td, narrow=narrow)
-    if narrow:  # a legend inside would hide the curves
-        _legend_below(figure, panels)
+    if page:
+        arrange(figure, panels, _PANELS[bool(motion)])
+    mark_times(panels, tr, situation.td, page=page)
     return figure
 
 
@@ -124,6 +128,17 @@ def _draw_energy(
     axes.set_ylabel("internal energy")
 
 
+def _draw_better(panels: Sequence[Axes], there: Situation, tr: float) -> None:
+    """Draw a better pair, seen from its td: level, times and what follows, in a colour and a pattern of their own."""
+    lines = [panels[0].axhline(there.energy_td)]
+    lines += [panel.axvline(time) for panel in panels for time in (tr, there.td)]
+    motion = replayed_motion(there, tr)
+    if motion and len(panels) > 1:
+        lines += panels[1].plot(motion.time, motion.switched)
+    for line in lines:
+        line.set(color=BETTER, linestyle="-.", linewidth=0.8, label="better pair")
+
+
 def _draw_motion(axes: Axes, motion: Motion) -> None:
     for values, colour, name in (
         (motion.reference, REFERENCE, "without switching"),
@@ -131,11 +146,3 @@ def _draw_motion(axes: Axes, motion: Motion) -> None:
     ):
         axes.plot(motion.time, values, color=colour, linewidth=1, label=name)
     axes.set_ylabel("deformation [√energy]")
-
-
-def _legend_below(figure: Figure, panels: Sequence[Axes]) -> None:
-    """Put one legend of all panels below them, and leave fewer numbers on the time axis."""
-    panels[-1].locator_params(axis="x", nbins=4)
-    known = [dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True)) for panel in panels]
-    handles = {name: handle for one in known for name, handle in one.items()}
-    figure.legend(handles.values(), handles, loc="outside lower left", ncols=2, fontsize="small", frameon=False)

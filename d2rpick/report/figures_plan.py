@@ -6,21 +6,23 @@ from typing import TYPE_CHECKING, Final
 
 from matplotlib.figure import Figure
 
-from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, finish
+from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, WIDTH, entries, finish
+from d2rpick.report.figures_page import arrange
 
 if TYPE_CHECKING:
     from d2rpick.choice.plan import Plan
 
 _COLOURS: Final = {"supported": GOOD, "re-plan": SWITCHED, "done": "#999999"}
 _HATCHES: Final = {"supported": None, "re-plan": "//", "done": None}  # told apart without colour, too
-_SIZES: Final = {False: (10.0, 4.0), True: (4.2, 3.9)}
+# Of the figure in a file, and of the axes on a page [inch].
+_HEIGHT, _PANEL = 4.0, 2.8
 # Share of the axes below the energy in which the windows are drawn.
 _STRIP: Final = 0.07
 
 
-def draw_plan(plan: Plan, *, narrow: bool = False) -> Figure:
+def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
     """Draw the energy over time, the flights behind it and the rigid windows below it."""
-    figure = Figure(figsize=_SIZES[narrow], layout="constrained")
+    figure = Figure(figsize=(WIDTH, _HEIGHT), layout=None if page else "constrained")
     axes = figure.subplots()
     history = plan.history
     axes.plot(history.time, history.energy, color=REFERENCE, linewidth=1, label="internal energy")
@@ -40,8 +42,9 @@ def draw_plan(plan: Plan, *, narrow: bool = False) -> Figure:
     unit = history.time_unit
     axes.set(xlabel=f"time [{unit}]" if unit else "time", ylabel="internal energy")
     finish(axes, legend=False)
-    known = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    figure.legend(
-        known.values(), known, loc="outside lower left", ncols=2 if narrow else 4, fontsize="small", frameon=False
-    )
+    if page:
+        arrange(figure, [axes], _PANEL)
+    else:
+        known = entries([axes])
+        figure.legend(known.values(), known, loc="outside lower left", ncols=4, fontsize="small", frameon=False)
     return figure

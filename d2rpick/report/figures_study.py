@@ -9,7 +9,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from d2rpick.choice.view import scale_of
-from d2rpick.report.figures import GOOD, REFERENCE, SIZES, SWITCHED, finish, mark_times, plain, show_span
+from d2rpick.report.figures import GOOD, REFERENCE, SWITCHED, WIDTH, finish, mark_times, plain, show_span
+from d2rpick.report.figures_page import WIDTH as PAGE
 from d2rpick.studies.common import runs_of
 from d2rpick.studies.outliers import outliers, short_names
 
@@ -35,6 +36,8 @@ _DARK, _FAINTEST = 10, 0.02
 _MANY: Final = 40
 # Shown before the first tr and after td, as shares of the time between.
 _BEFORE, _AFTER = 0.25, 0.15
+# Height of the figure [inch].
+_HEIGHT: Final = 4.0
 # Height of a name, as a share of the axes.
 _LINE: Final = 0.055
 # A line to a name begins at the left of it.
@@ -50,10 +53,10 @@ class _Named(NamedTuple):
     pattern: str
 
 
-def draw_study(answer: Study, *, narrow: bool = False) -> Figure:
+def draw_study(answer: Study, *, page: bool = False) -> Figure:
     """Draw energies around td over each other, the tr of each, the common one and td."""
-    width, height, _ = SIZES[narrow]
-    figure = Figure(figsize=(width, height), layout="constrained")
+    # names of runs stand beside the axes, so that the margins are not known, on a page neither
+    figure = Figure(figsize=(PAGE if page else WIDTH, _HEIGHT), layout="constrained")
     axes = figure.subplots()
     drawn = [row for row in answer.rows if row.curve is not None]
     named = _named(drawn)
@@ -69,10 +72,10 @@ def draw_study(answer: Study, *, narrow: bool = False) -> Figure:
     axes.set(xlabel=f"time [{unit}]" if unit else "time", ylabel="internal energy")
     finish(axes, legend=False)
     _show(axes, answer, drawn)
-    _name(axes, named, narrow=narrow)
+    _name(axes, named, page=page)
     if axes.get_legend_handles_labels()[0]:
-        figure.legend(loc="outside lower left", ncols=1 if narrow else 4, fontsize="small", frameon=False)
-    mark_times(axes, answer.common.tr, answer.td, narrow=narrow)
+        figure.legend(loc="outside lower left", ncols=1 if page else 4, fontsize="small", frameon=False)
+    mark_times([axes], answer.common.tr, answer.td, page=page)
     return figure
 
 
@@ -135,7 +138,7 @@ def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[S
         yield energy[(start <= time) & (time <= end)]
 
 
-def _name(axes: Axes, named: Sequence[_Named], *, narrow: bool) -> None:
+def _name(axes: Axes, named: Sequence[_Named], *, page: bool) -> None:
     """Write the names of runs beside the axes, in the order of their curves there, with a line to each."""
     end, free = axes.get_xlim()[1], 0.0
     places = ((_height(axes, float(np.interp(end, *one.row.curve))), one) for one in named if one.row.curve is not None)
@@ -144,7 +147,7 @@ def _name(axes: Axes, named: Sequence[_Named], *, narrow: bool) -> None:
         free = at + _LINE
         axes.annotate(
             one.name, (1, place), xycoords="axes fraction", xytext=(1.03, at), textcoords="axes fraction", va="center",
-            fontsize="x-small" if narrow else "small", color=one.colour, annotation_clip=False,
+            fontsize="x-small" if page else "small", color=one.colour, annotation_clip=False,
             arrowprops={"arrowstyle": "-", "color": one.colour, "linewidth": 0.6, "linestyle": one.pattern, **_ENDS},
         )  # fmt: skip
 

@@ -8,20 +8,22 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from d2rpick.histories.outline import outline
-from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, STRETCHES, SWITCHED, finish
+from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, STRETCHES, SWITCHED, WIDTH, entries, finish
+from d2rpick.report.figures_page import arrange
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from d2rpick.choice.trade_off import TradeOff
 
-_SIZES: Final = {False: (10.0, 7.0), True: (4.2, 7.5)}
+# Of the figure in a file, and of one of its axes on a page [inch].
+_HEIGHT, _PANEL = 7.0, 1.9
 _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
 
 
-def draw_trade_off(found: TradeOff, *, narrow: bool = False) -> Figure:
+def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
     """Draw the energy in the window of td, and below it error and saving of the best pair for each td."""
-    figure = Figure(figsize=_SIZES[narrow], layout="constrained")
+    figure = Figure(figsize=(WIDTH, _HEIGHT), layout=None if page else "constrained")
     energy, error, rigid = figure.subplots(3, sharex=True)
     history = found.situation.history
     inner = history.between(*found.td_window)
@@ -35,13 +37,17 @@ def draw_trade_off(found: TradeOff, *, narrow: bool = False) -> Figure:
     _curve(rigid, found, saved if cost else [one.rigid_time for one in found.offers])
     td = f"td [{history.time_unit}]" if history.time_unit else "td"
     rigid.set(ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None))
-    for axes in (energy, error, rigid):
+    panels = (energy, error, rigid)
+    for axes in panels:
         for one, colour, name in ((found.asked, FLIGHT, "td asked for"), (found.recommended, SWITCHED, "recommended")):
             if one:
                 axes.axvline(one.td, color=colour, linewidth=1, linestyle="--", label=name)
         finish(axes, legend=False)
-    known = dict(zip(*reversed(error.get_legend_handles_labels()), strict=True))
-    figure.legend(known.values(), known, loc="outside lower left", ncols=2 if narrow else 4, frameon=False)
+    if page:
+        arrange(figure, panels, _PANEL)
+    else:
+        known = entries(panels)
+        figure.legend(known.values(), known, loc="outside lower left", ncols=4, frameon=False)
     return figure
 
 

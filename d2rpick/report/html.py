@@ -96,9 +96,9 @@ def section(title: str, *content: str) -> Markup:
     return tag("section", tag("h2", title), *content)
 
 
-def drawings(figures: Mapping[str, tuple[str, str]]) -> Markup:
-    """Show SVG elements, each for a wide and a narrow page, with their captions."""
-    return join(_figure(caption, *svg) for caption, svg in figures.items())
+def drawings(figures: Mapping[str, str]) -> Markup:
+    """Show SVG elements with their captions."""
+    return join(_figure(caption, svg) for caption, svg in figures.items())
 
 
 def remarks(cautions: Iterable[Caution], reasons: Iterable[str] = ()) -> Markup:
@@ -150,9 +150,6 @@ def _text(cell: Cell) -> str:
     return cell if isinstance(cell, Markup) else short(cell)
 
 
-def _figure(caption: str, wide: str, narrow: str) -> Markup:
-    drawn = (
-        tag("div", Markup(svg), class_=name, role="img", aria_label=caption)
-        for svg, name in ((wide, "wide"), (narrow, "narrow"))
-    )
-    return tag("figure", *drawn, tag("figcaption", caption), class_="drawn")
+def _figure(caption: str, svg: str) -> Markup:
+    drawn = tag("div", Markup(svg), role="img", aria_label=caption)
+    return tag("figure", drawn, tag("figcaption", caption), class_="drawn")

@@ -31,15 +31,14 @@ class PageContext:
     """What a page shows besides the answer.
 
     ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the
-    options of ``card`` that judge by the same history.  ``figures`` are SVG elements by caption, for a wide and for a
-    narrow page, with ids of their own.  ``card`` is the solver input of a pair that is recommended or verified;
-    ``explorer`` makes the page live.
+    options of ``card`` that judge by the same history.  ``figures`` are SVG elements by caption.  ``card`` is the
+    solver input of a pair that is recommended or verified; ``explorer`` makes the page live.
     """
 
     run: Run
     command: Sequence[str]
     judging: Sequence[str]
-    figures: Mapping[str, tuple[str, str]]
+    figures: Mapping[str, str]
     card: SolverInput | None = None
     switched: Run | None = None
     explorer: Explorer | None = None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.report import page
 from d2rpick.report.explorer import explorer
-from d2rpick.report.figures import svg_element
+from d2rpick.report.figures_page import svg_element
 from d2rpick.report.figures_plan import draw_plan
 from d2rpick.report.html import Markup, drawings, pairs, remarks, resource, section, table, tag
 from d2rpick.report.plan import head, heading, outlook, quality, rows
@@ -50,8 +50,7 @@ def _sections(
     yield tag("section", tag("div", *cards, class_="choice"), remarks(plan.cautions), pairs(outlook(plan)))
     if explored:
         yield explorer(explored)
-    drawn = tuple(svg_element(draw_plan(plan, narrow=narrow), f"plan-{narrow}-") for narrow in (False, True))
-    yield drawings({_CAPTION: (drawn[0], drawn[1])})
+    yield drawings({_CAPTION: svg_element(draw_plan(plan, page=True), "plan-")})
     reasons = pairs([(f"flight {row.number}", row.reason) for row in plan.rows if row.reason])
     yield section("Flights", table("Flights", head(plan)[1:], [row[1:] for row in rows(plan)]), reasons)
     if card:

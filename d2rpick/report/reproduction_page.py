@@ -6,8 +6,8 @@ import shlex
 from typing import TYPE_CHECKING
 
 from d2rpick.models.published import MISPRINTS
-from d2rpick.report.figures import svg_element
 from d2rpick.report.figures_models import draw_exhibit
+from d2rpick.report.figures_page import svg_element
 from d2rpick.report.html import Markup, document, section, table, tag
 from d2rpick.report.reproduction import HEAD, MODEL, cells, heading, pairs_of, verdict
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.studies.study import Study
 
 
-def as_page(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> str:
+def as_page(answer: Study, command: Sequence[str], drawing: str) -> str:
     """Write the page.
 
     Parameters
@@ -24,15 +24,15 @@ def as_page(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> 
     answer : Study
     command : sequence of str
         Arguments that repeat the answer.
-    drawing : (str, str)
-        SVG element for a wide and for a narrow page, with ids of their own.
+    drawing : str
+        SVG element.
     """
     title = f"Switch times of {runs_of(len(answer.rows))}"
     sections = _sections(answer, command, drawing)
     return document(title, *sections, signed=("checked by", "date", "signature"))
 
 
-def _sections(answer: Study, command: Sequence[str], drawing: tuple[str, str]) -> Iterator[Markup]:
+def _sections(answer: Study, command: Sequence[str], drawing: str) -> Iterator[Markup]:
     yield tag("section", _common(answer), remarks(answer.cautions), pairs(outcome(answer)))
     yield drawings({"Internal energies of all runs, with the tr of each, the common one and td": drawing})
     head = [name.replace("+-", "\u00b1") for name in HEAD]

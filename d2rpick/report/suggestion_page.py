@@ -21,18 +21,14 @@ _MOST_ROWS = 20
 _TOLD = ("quality", "keeps", "saves")
 
 
-def drawn(answer: Suggestion) -> dict[str, tuple[str, str]]:
-    """Draw the figures of the page, wide and narrow."""
-    from d2rpick.report import figures, figures_choice
+def drawn(answer: Suggestion) -> dict[str, str]:
+    """Draw the figure of the page."""
+    from d2rpick.report.figures_choice import draw_suggestion
+    from d2rpick.report.figures_page import svg_element
 
-    found = {
-        "Internal energy with its level at td, and the choice": figures.both_widths(
-            figures_choice.draw_suggestion, answer, "choice"
-        )
-    }
-    if answer.clearly_better:
-        found["The better pair"] = figures.both_widths(figures_choice.draw_better, answer, "better")
-    return found
+    shown = "the choice, and a better pair" if answer.clearly_better else "and the choice"
+    caption = f"Internal energy with its level at td, {shown}"
+    return {caption: svg_element(draw_suggestion(answer, page=True), "choice-")}
 
 
 def as_page(answer: Suggestion, record: page.PageContext) -> str:

@@ -20,16 +20,13 @@ if TYPE_CHECKING:
 _MOST_ROWS = 20
 
 
-def drawn(found: TradeOff) -> dict[str, tuple[str, str]]:
-    """Draw the figures of the page, wide and narrow."""
-    from d2rpick.report.figures import svg_element
+def drawn(found: TradeOff) -> dict[str, str]:
+    """Draw the figures of the page."""
+    from d2rpick.report.figures_page import svg_element
     from d2rpick.report.figures_trade_off import draw_trade_off
 
-    curve = [svg_element(draw_trade_off(found, narrow=narrow), f"explore-{narrow}-") for narrow in (False, True)]
-    return {
-        **suggestion_page.drawn(found.suggestion),
-        "Error and rigid time of the best pair for each td": (curve[0], curve[1]),
-    }
+    curve = svg_element(draw_trade_off(found, page=True), "explore-")
+    return {**suggestion_page.drawn(found.suggestion), "Error and rigid time of the best pair for each td": curve}
 
 
 def as_page(found: TradeOff, record: page.PageContext) -> str:

@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 from d2rpick.report.html import Markup
 
 
-def drawn(answer: Verdict) -> dict[str, tuple[str, str]]:
-    """Draw the figure of the page, wide and narrow."""
-    from d2rpick.report import figures, figures_choice
+def drawn(answer: Verdict) -> dict[str, str]:
+    """Draw the figure of the page."""
+    from d2rpick.report.figures_choice import draw_verdict
+    from d2rpick.report.figures_page import svg_element
 
     caption = "Internal energy with its level at td, and the pair"
-    return {caption: figures.both_widths(figures_choice.draw_verdict, answer, "pair")}
+    return {caption: svg_element(draw_verdict(answer, page=True), "pair-")}
 
 
 def as_page(answer: Verdict, record: page.PageContext) -> str:

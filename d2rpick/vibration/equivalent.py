@@ -22,21 +22,22 @@ def lacking_energy(oscillator: Oscillator, reference: State, switched: State) ->
     return oscillator.vibration_energy(lack)
 
 
-def replayed_residual(vibration: Mode | Modes, tr: Samples, td: float) -> Samples:
+def replayed_residual(vibration: Mode | Modes, tr: Samples, td: Samples | float) -> Samples:
     """Replay each tr of shape (n,) up to ``td`` and give the residual there, of all modes together [-].
 
-    Energy norm of what the switched run lacks at td, over that of the reference vibration.
+    ``td`` is one for all, or one for each.  Energy norm of what the switched run lacks at td, over that of the
+    reference vibration.
     """
-    lack, whole = np.zeros(tr.shape), 0.0
+    lack, whole = np.zeros(tr.shape), np.zeros(tr.shape)
     for mode in vibration.modes:
         oscillator, at_td = from_mode(mode, td)
         at_tr = oscillator.free(at_td, tr - td)  # the closed form runs backwards as well
         lack += lacking_energy(oscillator, at_td, oscillator.rigid(at_tr, td - tr))
-        whole += float(oscillator.vibration_energy(at_td))
+        whole += oscillator.vibration_energy(at_td)
     return np.sqrt(lack / whole)
 
 
-def from_mode(mode: Mode, time: float) -> tuple[Oscillator, State]:
+def from_mode(mode: Mode, time: Samples | float) -> tuple[Oscillator, State]:
     """Give an oscillator whose deformation is that of ``mode`` about its preload, and its state at ``time``.
 
     An energy history tells neither masses nor the motion of the whole; they are chosen so that the deformation

@@ -50,7 +50,7 @@ class Measured(NamedTuple):
 def measured(
     vibration: Deformation,
     tr: Samples,
-    td: float,
+    td: Samples | float,
     *,
     residual: Samples,
     residual_high: Samples,
@@ -101,20 +101,21 @@ def kinetic_share(vibration: Deformation, td: float) -> float:
     return float(vibration.kinetic_energy(td) / vibration.vibration_energy(td))
 
 
-def lock_in_error(vibration: Deformation, tr: Samples | float, td: float) -> Samples:
+def lock_in_error(vibration: Deformation, tr: Samples | float, td: Samples | float) -> Samples:
     """L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the deformation that is locked in, of the shape of ``tr``.
 
     The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1; for
-    several modes or parts the root of the sum of squares over them, since their energies add up.
+    several modes or parts the root of the sum of squares over them, since their energies add up.  ``td`` is one for all
+    tr, or one for each.
     """
     apart = np.linalg.norm(_apart(vibration, tr, td), axis=0)
     return np.asarray(apart / np.sqrt(vibration.vibration_energy(td)))
 
 
-def part_mismatch(vibration: Deformation, tr: Samples | float, td: float) -> Samples:
+def part_mismatch(vibration: Deformation, tr: Samples | float, td: Samples | float) -> Samples:
     """D = L/sqrt(1 - K) [-]: the same error against the internal energy at td alone, of the shape of ``tr``."""
     apart = np.linalg.norm(_apart(vibration, tr, td), axis=0)
-    return np.asarray(apart / np.linalg.norm(vibration.amplitudes(td)))
+    return np.asarray(apart / np.linalg.norm(vibration.amplitudes(td), axis=0))
 
 
 def mismatch_shares(vibration: Deformation, tr: float, td: float) -> Samples:
@@ -124,20 +125,19 @@ def mismatch_shares(vibration: Deformation, tr: float, td: float) -> Samples:
     return square / total if total > 0 else square
 
 
-def sign_match(vibration: Deformation, tr: Samples | float, td: float) -> NDArray[np.bool_]:
+def sign_match(vibration: Deformation, tr: Samples | float, td: Samples | float) -> NDArray[np.bool_]:
     """Whether the deformations at tr and td point the same way, of the shape of ``tr``.
 
     For one mode or part: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a part which is
     hardly deformed does not decide.
     """
-    at_td = vibration.amplitudes(td)
-    return np.asarray(np.tensordot(at_td, vibration.amplitudes(tr), axes=1) >= 0)
+    return np.asarray(np.einsum("k...,k...->...", vibration.amplitudes(td), vibration.amplitudes(tr)) >= 0)
 
 
-def _apart(vibration: Deformation, tr: Samples | float, td: float) -> Samples:
+def _apart(vibration: Deformation, tr: Samples | float, td: Samples | float) -> Samples:
     """q(tr) - q(td), of the shape of ``tr`` with an axis for modes or parts before it [sqrt(energy)]."""
     at_tr = vibration.amplitudes(tr)
-    return np.asarray((at_tr.T - vibration.amplitudes(td)).T)
+    return np.asarray((at_tr.T - vibration.amplitudes(td).T).T)
 
 
 def residual(lock_in: float, kinetic: float) -> float:
@@ -174,31 +174,38 @@ def run_time_share(rigid_fraction: float, cost_share: float, step_ratio: float) 
     return 1 - rigid_fraction * (1 - (1 - cost_share) / step_ratio)
 
 
-def timing_tolerance(mode: Mode, tr: Samples, td: float) -> Samples:
-    """How far each tr of shape (n,) may be off, to either side, before L grows by 0.05 [time].
+def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
+    """How far each tr of shape (n,) may be off, to either side, before L grows by 0.05 [time]; td as for L.
 
     That is the nearest time where q leaves the band about q(td) that is wider than the deviation at tr by the
     tolerated growth; a period where q stays inside, since all it does it has done then.
     """
-    wanted, scale = mode.deformation(td), np.sqrt(mode.vibration_energy(td))
-    room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * scale
-    half = np.pi / mode.omega
-    ahead = mode.standstill_after(tr) + half * np.arange(3)[:, np.newaxis]
-    behind = mode.standstill_after(tr) - half * np.arange(1, 4)[:, np.newaxis]
-    distances = _leaving(mode, np.tile(tr, 2), np.hstack([ahead, behind]), wanted, np.tile(room, 2))
+    wanted = np.broadcast_to(mode.deformation(td), tr.shape)
+    room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * np.sqrt(mode.vibration_energy(td))
+    half, still = np.pi / mode.omega, mode.standstill_after(tr)
+    # on both sides of tr, in columns side by side, the standstills between which q is monotone
+    steps = np.repeat([[0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]], tr.size, axis=0).T * half
+    edges = np.vstack([np.tile(tr, 2), np.tile(still, 2) + steps])
+    distances = _leaving(mode, edges, np.tile(wanted, 2), np.tile(room, 2))
     return np.asarray(np.minimum(distances.reshape(2, -1).min(axis=0), 2 * half))
 
 
-def _leaving(mode: Mode, tr: Samples, turns: Samples, wanted: Samples, room: Samples) -> Samples:
-    """Distance from tr to where |q - wanted| exceeds ``room``, over the standstills ``turns``; infinite if nowhere.
+def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samples:
+    """Distance from the first of some ``edges`` to where |q - wanted| exceeds ``room``; infinite if nowhere.
 
-    Between neighbouring standstills q is monotone, so the first one outside has the place just before it.
+    Between neighbouring edges q is monotone, so the first one outside has the place just before it.
     """
-    edges = np.vstack([tr, turns])
     outside = np.abs(mode.deformation(edges) - wanted) > room
     outside[0] = False  # tr itself, whatever rounding says
     first = np.argmax(outside, axis=0)
-    column = np.arange(tr.size)
-    inner, outer = edges[np.maximum(first - 1, 0), column], edges[first, column]
-    found = narrow(lambda t: ~(np.abs(mode.deformation(t) - wanted) > room), inner, outer)
-    return np.where(first > 0, np.abs(found.within - tr), np.inf)
+    column = np.flatnonzero(first > 0)
+    inner, outer = edges[first[column] - 1, column], edges[first[column], column]
+    # beyond the band on the side where q leaves it
+    middle, most = wanted[column], room[column]
+    side = np.sign(mode.deformation(outer) - middle)
+    found = narrow(
+        lambda t: most - side * (mode.deformation(t) - middle), inner, outer, slope=lambda t: -side * mode.velocity(t)
+    )
+    distances = np.full(room.size, np.inf)
+    distances[column] = np.abs(found.at - edges[0, column])
+    return distances

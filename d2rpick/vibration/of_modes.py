@@ -17,12 +17,15 @@ from d2rpick.vibration.second_mode import residual_bound
 from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
+
+    from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.lock_in_profile import Profile
     from d2rpick.vibration.measures import Measured
+    from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.span import Span
 
@@ -80,8 +83,7 @@ class OfModes:
 
     def energies(self, times: Samples) -> Samples:
         """E at many times, of their shape [energy]."""
-        described = (times >= self.span.start) & (times <= self.span.end)
-        return np.where(described, self.mode.energy(times), self.history.energies_at(times))
+        return self._each(times, self.mode.energy, self.history.energies_at)
 
     def described(self, time: float) -> bool:
         """Whether ``time`` lies in the window that the mode describes."""
@@ -93,26 +95,37 @@ class OfModes:
 
     def moments(self, tolerance: float, since: float = -np.inf) -> list[Moment]:  # noqa: ARG002  they are few
         """Crossings of the level at td, standstills near it and closest matches."""
+        return self.moments_with(self.mode.level_crossings(self.td, self.before), tolerance)
+
+    def moments_with(self, passed: Sequence[float] | Samples, tolerance: float) -> list[Moment]:
+        """The same where it is known at which times the mode ``passed`` the level [time]."""
         turns = np.array(self.standstills())
         near = measures.lock_in_error(self.mode, turns, self.td) <= tolerance
         turning = [Moment(t, "extremum", None) for t in turns[near].tolist()]
         matches = [Moment(t, "match", None) for t in (self.profile.minima() if self.profile else ())]
-        return [*self.crossings(), *turning, *matches]
+        return [*self.crossings(passed), *turning, *matches]
 
-    def crossings(self) -> list[Moment]:
-        """Crossings of the level at td: of the samples before the span, exact ones within it."""
+    @property
+    def before(self) -> float:
+        """Just before the span: its first sample counts like any other [time]."""
+        return self.span.start - _ZERO / self.mode.fastest
+
+    def crossings(self, passed: Sequence[float] | Samples | None = None) -> list[Moment]:
+        """Crossings of the level at td: of the samples before the span, exact ones, which may be known, within it."""
         start, level = self.span.start, self.energy(self.td)
-        sampled = find_crossings(*sampled_before(self.history, self.td, level), level)
-        found = [Moment(one.time, "crossing", one.rising) for one in sampled if one.time < start]
-        before = start - _ZERO / self.mode.fastest  # the first sample counts like any other
-        times = np.maximum(self.mode.level_crossings(self.td, before), start)
+        found = []
+        if start > self.history.time[0]:
+            sampled = find_crossings(*sampled_before(self.history, self.td, level), level)
+            found = [Moment(one.time, "crossing", one.rising) for one in sampled if one.time < start]
+        passed = self.mode.level_crossings(self.td, self.before) if passed is None else passed
+        times = np.maximum(passed, start)
         slopes = self.mode.energy_slopes(times)[0]
         return found + [Moment(t, "crossing", bool(up > 0)) for t, up in zip(times.tolist(), slopes, strict=True)]
 
     def standstills(self) -> list[float]:
         """Times within the span, up to td itself, where the energy turns [time]."""
         start, after = self.span.start, self.td - _ZERO / self.mode.fastest  # td may be an extremum itself
-        times = np.maximum(self.mode.extrema(start - _ZERO / self.mode.fastest, after), start)
+        times = np.maximum(self.mode.extrema(self.before, after), start)
         return [t for t in times if self.described(float(t))]
 
     @cached_property
@@ -128,7 +141,7 @@ class OfModes:
 
     def measured(self, times: Samples) -> list[Measured | None]:
         """Measures of each time, None outside of the span."""
-        inside = [self.described(float(t)) for t in times]
+        inside = self.inside(times)
         tr = times[inside]
         if not tr.size:
             return [None] * times.size
@@ -136,21 +149,16 @@ class OfModes:
             tolerance = measures.timing_tolerance(self.mode, tr, self.td)
         else:
             assert self.profile is not None
-            lock_in = measures.lock_in_error(self.mode, tr, self.td)
-            tolerance = self.profile.tolerances(tr, lock_in)
-        residual = replayed_residual(self.mode, tr, self.td)
-        highest = residual_bound(residual, self.fit, tr, self.td)
-        found = iter(
-            measures.measured(
-                self.mode, tr, self.td,
-                residual=residual, residual_high=highest, timing_tolerance=tolerance, of_parts=False,
-            )
-        )  # fmt: skip
-        return [next(found) if one else None for one in inside]
+            tolerance = self.profile.tolerances(tr, measures.lock_in_error(self.mode, tr, self.td))
+        return spread(measured(self.fit, self.mode, tr, self.td, tolerance), inside)
+
+    def inside(self, times: Samples) -> NDArray[np.bool_]:
+        """Which times lie in the window that the mode describes."""
+        return (times >= self.span.start) & (times <= self.span.end)
 
     def errors(self, times: Samples) -> Samples:
         """Lock-in errors where the signs match and the mode describes the record, else infinite [-]."""
-        comparable = (times >= self.span.start) & (times <= self.span.end)
+        comparable = self.inside(times)
         comparable &= measures.sign_match(self.mode, times, self.td)
         return np.where(comparable, measures.lock_in_error(self.mode, times, self.td), np.inf)
 
@@ -169,10 +177,40 @@ class OfModes:
 
     def level_reach(self, times: Samples) -> Samples:
         """How far from each time the energy may have the level at td [time]."""
-        sampled = sampled_reach(self.history, times, self.td, self.energy(self.td))
-        described = np.array([self.described(float(t)) for t in times])
-        return np.where(described, fitted_reach(self.history, self.fit, self.mode, times, self.td), sampled)
+        return self._each(
+            times,
+            lambda inside: fitted_reach(self.history, self.fit, self.mode, inside, self.td),
+            lambda outside: sampled_reach(self.history, outside, self.td, self.energy(self.td)),
+        )
+
+    def _each(
+        self, times: Samples, inside: Callable[[Samples], Samples], outside: Callable[[Samples], Samples]
+    ) -> Samples:
+        """Give one thing for times in the window that the mode describes, another for those outside, of their shape."""
+        here = self.inside(times)
+        if here.all():  # as nearly always
+            return inside(times)
+        found = np.empty(times.shape)
+        found[here], found[~here] = inside(times[here]), outside(times[~here])
+        return found
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:  # noqa: ARG002  by the protocol
         """Nothing: single parts are not known."""
         return ()
+
+
+def measured(
+    fit: Identification, mode: Mode | Modes, tr: Samples, td: Samples | float, tolerance: Samples
+) -> Iterator[Measured]:
+    """Give the measures of each tr of shape (n,), for one ``td`` or each for its own, with its timing tolerance."""
+    residual = replayed_residual(mode, tr, td)
+    highest = residual_bound(residual, fit, tr, td)
+    found = measures.measured(
+        mode, tr, td, residual=residual, residual_high=highest, timing_tolerance=tolerance, of_parts=False
+    )
+    return iter(found)
+
+
+def spread(found: Iterator[Measured], inside: NDArray[np.bool_]) -> list[Measured | None]:
+    """Put what was found in its places, None beside them."""
+    return [next(found) if one else None for one in inside.tolist()]

@@ -10,6 +10,8 @@ import numpy as np
 from d2rpick.vibration.roots import narrow
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from d2rpick.histories.history import Samples
 
 # Beyond, squares of energies are no numbers any more; no unit system comes near.
@@ -164,24 +166,42 @@ class Mode:
 
         An extremum that only touches the level (to rounding) is no crossing, nor are ``start`` and ``end``.
         """
-        edges = np.array([start, *self.extrema(start, end), end])
-        above = self.deformation(edges) - level_q
-        scale = abs(level_q) + abs(self.preload) + np.sqrt(self.vibration_energy(edges))
-        above[np.abs(above) <= 8 * _EPS * scale] = 0.0
-        cells = np.flatnonzero(above[:-1] * above[1:] < 0)  # between neighbouring extrema q is monotone
-        side = np.sign(above[cells])
-        found = narrow(
-            lambda t: side * (self.deformation(t) - level_q), edges[cells], edges[cells + 1],
-            slope=lambda t: side * self.velocity(t), steps=_STEPS,
-        )  # fmt: skip
-        return tuple(found.at.tolist())
+        return tuple(self._passages(np.array([level_q]), start, np.array([end]))[1].tolist())
 
     def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
         """Find the times in (start, td), ascending, where the energy passes its level at ``td`` [time]."""
-        level = float(self.deformation(td))
+        return tuple(self.all_level_crossings(np.array([td]), start)[0].tolist())
+
+    def all_level_crossings(self, td: Samples, start: float) -> list[Samples]:
+        """Find the same for each ``td`` of shape (n,), all at once."""
+        level = self.deformation(td)
         # a level of zero is met once by each passage, whatever rounding makes of its sign
-        levels = {level, -level} if abs(level) > _ZERO * np.sqrt(self.vibration_energy(td)) else {0.0}
-        return tuple(sorted(t for q in levels for t in self.crossings(q, start, td)))
+        zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
+        level = np.where(zero, 0.0, level)
+        ends = np.append(td, np.where(zero, start, td))
+        place, times = self._passages(np.append(level, -level), start, ends)
+        place %= td.size
+        order = np.lexsort((times, place))
+        return np.split(times[order], np.searchsorted(place[order], np.arange(1, td.size)))
+
+    def _passages(self, levels: Samples, start: float, ends: Samples) -> tuple[NDArray[np.intp], Samples]:
+        """Find the times in (start, end) where q passes a level, for each level and its end, both of shape (n,).
+
+        Places of the levels and times, ascending in both.
+        """
+        inner = np.array(self.extrema(start, float(ends.max(initial=start))))
+        rows = np.broadcast_to(inner, (ends.size, inner.size))
+        edges = np.column_stack([np.full(ends.size, start), np.minimum(rows, ends[:, np.newaxis]), ends])
+        above = self.deformation(edges) - levels[:, np.newaxis]
+        scale = np.abs(levels)[:, np.newaxis] + abs(self.preload) + np.sqrt(self.vibration_energy(edges))
+        above[np.abs(above) <= 8 * _EPS * scale] = 0.0
+        place, cell = np.nonzero(above[:, :-1] * above[:, 1:] < 0)  # between neighbouring extrema q is monotone
+        side, wanted = np.sign(above[place, cell]), levels[place]
+        found = narrow(
+            lambda t: side * (self.deformation(t) - wanted), edges[place, cell], edges[place, cell + 1],
+            slope=lambda t: side * self.velocity(t), steps=_STEPS,
+        )  # fmt: skip
+        return place, found.at
 
     @property
     def _velocity_parts(self) -> tuple[float, float]:

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-_EPS: Final = float(np.finfo(np.float64).eps)
+# Of a time: a place that moves by less has been found, but for rounding.
+_STILL: Final = 8 * float(np.finfo(np.float64).eps)
 HALVINGS: Final = 50  # to rounding
 
 
@@ -43,7 +44,7 @@ def narrow(
         Ends of the brackets, in either order.
     slope : callable, optional
         Derivative of ``inside``, which is then a smooth function: Newton's steps are taken where they stay inside of
-        their bracket, ``within`` must lie below ``beyond``, and it ends once no place moves any more.
+        their bracket, and each place stays once it hardly moves, whatever other places are looked for beside it.
     steps : int
         At most.
 
@@ -53,7 +54,7 @@ def narrow(
     >>> f"{found.at[0]:.12f}"
     '1.414213562373'
     """
-    at = (within + beyond) / 2
+    at, still = (within + beyond) / 2, np.zeros(np.shape(within), dtype=bool)
     for _ in range(steps):
         value = inside(at)
         good = value > 0
@@ -62,9 +63,11 @@ def narrow(
         if slope is not None:
             rise = slope(at)
             newton = at - value / np.where(rise == 0, np.inf, rise)
-            following = np.where((newton >= within) & (newton <= beyond), newton, following)
-        still = slope is not None and bool(np.all(np.abs(following - at) <= 2 * _EPS * np.abs(at)))
+            inner = (newton >= np.minimum(within, beyond)) & (newton <= np.maximum(within, beyond))
+            following = np.where(inner, newton, following)
+            following = np.where(still, at, following)
+            still |= np.abs(following - at) <= _STILL * np.abs(at)
         at = following
-        if still:
+        if still.all():
             break
     return Roots(within, beyond, at)

@@ -277,3 +277,20 @@ def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout
             assert answer("verify", "--tr", repr(tr), *ALONE)["verified"]
     assert f"{own['start']:.6g} to {own['end']:.6g}" in run("suggest", *ALONE).stdout
     assert answer("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None
+
+
+@pytest.mark.parametrize("form", ["glstat", "matsum"])
+def test_a_flight_is_the_same_from_any_td_in_it_and_what_was_seen_before_changes_nothing(
+    rolled: Rolled, form: str
+) -> None:
+    def fresh() -> History:
+        return open_run([str(rolled.files[form])]).history(Selection(parts=("box",) if form == "matsum" else ()))
+
+    history, length = fresh(), rolled.end - rolled.start
+    times = [rolled.start + share * length for share in (0.9, 0.02, 0.5, 0.98, 0.3)]
+    seen = [seen_flight(history, td) for td in times]
+    assert seen == [seen_flight(fresh(), td) for td in times]
+    assert len({one.flight and one.flight[:2] for one in seen}) == 1
+    after = rolled.end + 0.02
+    assert seen_flight(history, after) == seen_flight(fresh(), after)
+    assert seen_flight(history, after).refusal

@@ -9,6 +9,10 @@ import pytest
 from matplotlib.patches import Rectangle
 
 import d2rpick as d2
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.histories.history import History
+from d2rpick.report.figures_choice import draw_suggestion
 from d2rpick.report.figures_study import draw_study
 from d2rpick.studies.common import Common
 from d2rpick.studies.row import StudyRow
@@ -59,6 +63,34 @@ def test_few_candidates_are_marks_acceptable_or_not() -> None:
     assert len(motion.lines) == 4  # both motions, tr and td
 
 
+def test_the_figure_of_a_page_holds_the_better_pair_in_a_look_of_its_own() -> None:
+    answer = d2.suggest(d2.read(ENERGY), td=0.064)._core
+    better = answer.clearly_better
+    assert better is not None
+    figure = draw_suggestion(answer, page=True)
+    energy, motion = figure.axes
+    lines = [line for line in (*energy.lines, *motion.lines) if line.get_label() == "better pair"]
+    assert len(lines) == 6  # its level, its times in both axes, and what follows
+    assert np.unique(lines[0].get_ydata()).tolist() == [answer.situation.at(better.td).energy_td]
+    assert np.unique([line.get_xdata() for line in lines[1:3]]).tolist() == [better.tr, better.td]
+    assert {line.get_linestyle() for line in lines} == {"-."}
+    assert not any(line.get_label() == "better pair" for axes in draw_suggestion(answer).axes for line in axes.lines)
+    (legend,) = figure.legends
+    assert "better pair" in {text.get_text() for text in legend.get_texts()}
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1.0, 7e4, 1e15])
+def test_nothing_of_a_pages_figure_lies_outside_of_it_whatever_the_unit(scale: float) -> None:
+    time, energy = np.loadtxt(ENERGY, delimiter=",", skiprows=1, usecols=(0, 5)).T
+    history = History(time * scale, (energy + energy.max()) * scale, ("made",), "made", "E")
+    figure = draw_suggestion(suggest(history, 0.064 * scale, Settings()), page=True)
+    box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+    assert box.x0 >= -0.01
+    assert box.y0 >= -0.01
+    assert box.x1 <= width + 0.01
+    assert box.y1 <= height + 0.01
+
+
 def row(name: str, tr: float, level: float = 1.0) -> StudyRow:
     time = np.linspace(0, 1, 50)
     energy = level * (1 + 0.1 * np.sin(20 * time)) + 500 * (time > 0.95)
@@ -87,9 +119,9 @@ def test_of_many_runs_those_that_stand_out_are_named() -> None:
     assert axes.collections[0].get_label() == "internal energy of 31 runs"
 
 
-@pytest.mark.parametrize("narrow", [False, True])
-def test_runs_of_any_energy_can_be_drawn(narrow: bool) -> None:
+@pytest.mark.parametrize("page", [False, True])
+def test_runs_of_any_energy_can_be_drawn(page: bool) -> None:
     rows = [row("zero", 0.2, 0.0), row("one", 0.2), row("large", 0.3, 1e6)]
-    figure = draw_study(study(*rows), narrow=narrow)
+    figure = draw_study(study(*rows), page=page)
     figure.canvas.draw()
     assert draw_study(study()).axes

@@ -125,7 +125,7 @@ def test_ids_are_unique_and_all_that_is_referred_to_is_there(paper: Page) -> Non
 def test_who_does_not_see_it_can_follow_it(paper: Page) -> None:
     assert paper.headings[0] == 1
     assert all(after <= before + 1 for before, after in pairwise(paper.headings))
-    assert paper.source.count('role="img"') == 7  # two figures of two widths, and three charts
+    assert paper.source.count('role="img"') == 4  # a figure and three charts
     assert not paper.unnamed
 
 

@@ -31,3 +31,12 @@ def test_what_is_within_stays_within_either_way_round(roots: np.ndarray) -> None
     assert np.all(upwards.within < roots)
     assert np.all(downwards.within >= roots)
     np.testing.assert_allclose(upwards.within, downwards.within, atol=1e-12)
+
+
+@given(ROOTS)
+def test_a_root_is_the_same_to_the_last_digit_alone_and_beside_others(roots: np.ndarray) -> None:
+    def found(some: np.ndarray) -> list[float]:
+        ends = np.zeros(some.size), np.ones(some.size)
+        return [*map(float, narrow(lambda t: some**3 - t**3, *ends, slope=lambda t: -3 * t**2).at)]
+
+    assert found(roots) == [found(roots[i : i + 1])[0] for i in range(roots.size)]
