@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -20,6 +21,7 @@ BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 def test_the_same_as_the_command() -> None:
     found = d2.parts(d2.read(BOX), deck=DECK, td=0.37)
     assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
+    assert json.loads(found.to_json()) == found.to_dict()
     assert found.recommended is not None
     assert found.to_frame()["verdict"].tolist() == ["switch", "merge", "keep"]
     sets = found.sets_frame()
