@@ -79,7 +79,8 @@ def command(
         output.write(options["report"], text_bytes(with_options(as_page(found, typed.repeat()))))
     text = write("parts", output_format, found, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))
-    return finish(ctx, objection=model is not None and found.recommended is None, exit_zero=exit_zero)
+    wanted = model is not None or output_format == "value"  # without a deck the table promises no set
+    return finish(ctx, objection=wanted and found.recommended is None, exit_zero=exit_zero)
 
 
 def _times(tr: float | None, td: float | None) -> Times | float | None:

@@ -199,4 +199,5 @@ def settings(choosing: Choosing, *, with_deck: bool = False) -> Settings:
 def _each(name: str, value: Any, expected: str) -> Iterable[Any]:
     if not hasattr(value, "__iter__"):
         raise TypeError(f"{name} is {value!r}; {expected} were expected")
-    return value
+    found: Iterable[Any] = value
+    return found

@@ -34,7 +34,10 @@ def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
     found = d2.parts(d2.read(BOX), deck=DECK, weights=Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0), step_ratio=2.0)
     assert found.rows[0].cost_share == pytest.approx(94 / 109)
     assert d2.parts(d2.read(BOX), deck=DECK, given=2).sets[-1].parts == (2,)
-    assert "all that may" in found.report(tmp_path / "parts.html").read_text("utf-8")
+    page = found.report(tmp_path / "parts.html").read_text("utf-8")
+    assert "all that may" in page
+    assert "<h1>Parts to switch: rollover box</h1>" in page
+    assert "<span>signature</span>" in page
 
 
 def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
