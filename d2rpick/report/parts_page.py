@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # Columns of the sets, and of the parts in two tables: as many as a screen and a sheet hold side by side.
 _SETS: Final = ("set", "parts", "saved of a step", "tr", "td", "run time", "saved", "out of place", "turned [deg]")
 _TABLES: Final = {
-    "Parts": ("part", "title", "verdict", "energy", "scatter", "flies", "deforms", "why"),
+    "Parts": ("part", "title", "verdict", "why", "flies", "deforms", "energy", "scatter"),
     "Elements": ("part", "title", "elements", "formulation", "material", "mass", "cost", "step", "shares nodes with"),
 }
 
