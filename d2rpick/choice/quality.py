@@ -22,6 +22,7 @@ GRADES: Final = ("poor", "fair", "good")
 _MOST_FAIR, _MOST_GOOD = 0.5, 0.2
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
 _BAND: Final = 0.25
+_NOT_CERTAIN: Final = "the flight is not certain"
 
 
 class Quality(NamedTuple):
@@ -42,7 +43,7 @@ def quality_of(situation: Situation, best: Candidate, expected: Expectation | No
     ``expected`` is what the energy alone tells of the time after td, None on another basis.
     """
     if situation.at_rest:
-        return Quality("good")
+        return Quality("good") if situation.flight.certain else Quality("fair", (_NOT_CERTAIN,))
     poor = tuple(_poor(situation, best, expected))
     if poor:
         return Quality("poor", poor)
@@ -85,7 +86,7 @@ def _fair(situation: Situation, best: Candidate) -> list[str]:
     if best.residual_high is not None and best.residual_high > _MOST_FAIR:
         found.append(f"with a further mode hidden in the record it may be off by {best.residual_high:.0%}")
     if not situation.flight.certain:
-        found.append("the flight is not certain")
+        found.append(_NOT_CERTAIN)
     return found
 
 

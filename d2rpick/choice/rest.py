@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.flight.energy_alone import round_off
+from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History
@@ -27,6 +28,8 @@ def nothing_vibrates(history: History, start: float, td: float, tolerance: float
     least = round_off(history)  # 0 where no energy is written at all: that tells nothing
     if least > 0 and float(np.abs(inside).max()) <= least:
         return True
+    if inside.size < MIN_SAMPLES_PER_PERIOD:  # between so few a vibration is not seen
+        return False
     level = history.energy_at(td)
     if deformed or level <= 0 or inside.min() < 0:
         return False

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.quality import GRADES, quality_of, states_per_period
+from d2rpick.choice.quality import GRADES, Quality, quality_of, states_per_period
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
@@ -107,3 +109,24 @@ def test_without_a_period_there_are_no_states_of_one() -> None:
     assert states_per_period(np.ones(10)) is None
     assert states_per_period(np.linspace(0, 1, 50)) is None
     assert states_per_period(np.zeros(0)) is None
+
+
+def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
+    time = np.linspace(0, 1, 201)
+    energy = np.where(time < 0.2, 50 * time, 10.0) + 0.02 * np.random.default_rng(1).random(201)
+    found = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(after=0.25))
+    assert found.situation.at_rest
+    assert found.quality == Quality("good")
+    assert found.chosen is not None
+    guessed = replace(found.situation, flight=found.situation.flight._replace(source="energy"))
+    assert guessed.at_rest
+    assert quality_of(guessed, found.chosen, None) == Quality("fair", ("the flight is not certain",))
+
+
+def test_between_few_states_nothing_is_called_at_rest() -> None:
+    """One state and td in the same output interval say nothing of what happens between them."""
+    energy = np.tile([1.5, 2.5, 1.0, 2.5], 10)
+    record = History(np.linspace(0, 3.9, 40), energy, ("coarse",), "made", "E")
+    found = suggest(record, 2.2, Settings(after=2.15))
+    assert not found.situation.at_rest
+    assert found.quality is None or found.quality.grade != "good"

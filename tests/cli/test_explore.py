@@ -9,6 +9,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import jsonschema
+import numpy as np
+import pandas as pd
 import pytest
 
 import d2rpick as d2
@@ -72,9 +74,14 @@ def test_the_sentence_says_what_a_step_changes() -> None:
     assert good == "td = 0.0687534: residual 0.000; no other td in the window is better"
 
 
-def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so() -> None:
-    found = answer("explore", "--td", "0.37", "--part", "box", MATSUM)
-    (start,) = (one for one in found["offers"] if one["td"] == 0.37)
+def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(tmp_path: Path) -> None:
+    time = np.linspace(0, 1, 501)
+    later = np.maximum(time - 0.2, 0.0)  # at rest, then two modes of their own
+    energy = 1 + 0.3 * np.sin(41 * later) ** 2 + 0.2 * np.sin(97 * later) ** 2
+    file = tmp_path / "run.csv"
+    pd.DataFrame({"time": time, "internal_energy": energy}).to_csv(file, index=False)
+    found = answer("explore", "--td", "0.996", "--after", "0", "--no-verify", "--steps", "20", str(file))
+    (start,) = (one for one in found["offers"] if one["td"] == 0.996)
     halved = [one for one in found["offers"] if one["error"] is not None and one["error"] <= start["error"] / 2]
     assert halved
     assert max(one["rigid_time"] for one in halved) < start["rigid_time"] / 2
