@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 # coarser database are at times of the other one, both may be of one run.
 _FEWEST = 0.5
 
+# A run ends in all its databases within their output intervals; so many of the longest one are left for what a run that
+# is killed has not written yet.
+_ENDS_APART = 2.0
+
 # Energies of two legs at a time that both have are the same within this share of the largest, else the runs differ.
 _SAME = 0.01
 # Parts that are compared.
@@ -57,11 +61,16 @@ def check_legs(legs: Sequence[Database]) -> None:
 
 
 def doubts(databases: Sequence[Legs]) -> Iterator[str]:
-    """Say which databases have hardly a state at the same time, within their printed digits."""
+    """Say which databases have hardly a state at the same time, within their printed digits, or end apart."""
     for one, other in combinations(databases, 2):
         if not (one.span and other.span):
             continue
         times = [_times(database) for database in (one, other)]
+        if abs(times[0][-1] - times[1][-1]) > _ENDS_APART * max(np.diff(t).max(initial=0.0) for t in times):
+            yield (
+                f"{one.source} ends at {times[0][-1]:.6g} and {other.source} at {times[1][-1]:.6g}; "
+                "are they from the same run, or is one cut?"
+            )
         room = sum(d.precisions(())[0].quantum(float(t[-1])) for d, t in zip((one, other), times, strict=True))
         coarse, fine = sorted(_common(*times), key=np.size)
         shared = coinciding(coarse, fine, room / 2)

@@ -165,6 +165,9 @@ def test_companions_of_other_times_are_doubted() -> None:
     shifted = matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))
     (note,) = opened({"glstat": GLSTAT, "matsum": shifted}).notes
     assert note == "glstat and matsum have only 0 of 7 states at the same times; are they from the same run?"
+    longer = np.arange(30) * (TIMES[1] - TIMES[0]) + TIMES[0]
+    (note,) = opened({"glstat": GLSTAT, "matsum": matsum_text(longer, [7, 3], np.ones((30, 2)))}).notes
+    assert note.startswith(f"glstat ends at {TIMES[-1]:.6g} and matsum at {longer[-1]:.6g}; are they from the same run")
     with pytest.raises(FormatError, match="glstat and matsum have no time in common, files of one run were expected"):
         opened({"glstat": GLSTAT, "matsum": matsum_text(TIMES + 5, [7], np.ones((8, 1)))})
 
