@@ -108,7 +108,9 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
     """
     if value is None:
         return ()
-    listed = [value] if isinstance(value, str | int) else list(value)
+    from d2rpick.histories.history import Part
+
+    listed = [value] if isinstance(value, str | int | Part) else list(value)  # a Part holds its number and its title
     for one in listed:
         if isinstance(one, bool) or not (isinstance(one, str) or hasattr(one, "__index__")):
             raise TypeError(f"{name} holds {one!r}; numbers and titles of parts were expected")
