@@ -92,9 +92,9 @@ class Candidate(NamedTuple):
 class Candidates(Sequence[Candidate]):
     """Candidates of one td in some order: columns of what decides, each of shape (n,), made for all of them at once.
 
-    ``tr`` [time]; ``energy`` [energy]; ``level_error`` [-], NaN where an energy is not positive; ``reach``: how far
-    the true time may lie away [time]; ``same_swing``; ``position_error`` [length], NaN where unknown; ``moments`` and
-    ``known``, as the vibration gave them, None where nothing was measured.
+    ``tr`` [time]; ``energy`` [energy]; ``level_error`` [-], NaN where an energy is not positive; ``same_swing``;
+    ``position_error`` [length], NaN where unknown; ``moments`` and ``known``, as the vibration gave them, None where
+    nothing was measured.
     ``recommended`` is the place of the one that is, ``ranked`` tells whether the order is that of the ranks.
     """
 
@@ -104,7 +104,6 @@ class Candidates(Sequence[Candidate]):
     tr: Samples
     energy: Samples
     level_error: Samples
-    reach: Samples
     same_swing: NDArray[np.bool_]
     position_error: Samples
     objections: tuple[Objection, ...]
@@ -125,7 +124,6 @@ class Candidates(Sequence[Candidate]):
             tr=tr,
             energy=energy,
             level_error=level_error,
-            reach=vibration.reach(moments),
             same_swing=(situation.turns_since(tr) < 2) & (not situation.at_rest),
             position_error=situation.position_errors(tr),
             objections=tuple(objections(situation, tr, measured, level_error)),
@@ -159,7 +157,6 @@ class Candidates(Sequence[Candidate]):
             tr=self.tr[order],
             energy=self.energy[order],
             level_error=self.level_error[order],
-            reach=self.reach[order],
             same_swing=self.same_swing[order],
             position_error=self.position_error[order],
             objections=tuple(one.ordered(order) for one in self.objections),
@@ -192,16 +189,21 @@ class Candidates(Sequence[Candidate]):
     def __getitem__(self, place: slice) -> tuple[Candidate, ...]: ...
     def __getitem__(self, place: int | slice) -> Candidate | tuple[Candidate, ...]:
         """Make the candidate, or the candidates, at some place."""
-        if isinstance(place, slice):
-            return tuple(map(self._made, range(len(self))[place]))
-        return self._made(range(len(self))[place])
+        if not isinstance(place, slice):
+            i = range(len(self))[place]
+            return self[i : i + 1][0]
+        # how far the true time may lie away is asked of these only: of all it takes longer than the choice
+        reach = self.situation.vibration.reach(self.moments[place])
+        return tuple(map(self._made, range(len(self))[place], reach.tolist()))
 
-    def _made(self, i: int) -> Candidate:
+    def __iter__(self) -> Iterator[Candidate]:
+        return iter(self[:])
+
+    def _made(self, i: int, reach: float) -> Candidate:
         situation, found, known = self.situation, self.moments[i], self.known[i]
         history, td, tr = situation.history, situation.td, found.tr
-        energy, level, reach, same_swing, off = (
-            column[i].item()
-            for column in (self.energy, self.level_error, self.reach, self.same_swing, self.position_error)
+        energy, level, same_swing, off = (
+            column[i].item() for column in (self.energy, self.level_error, self.same_swing, self.position_error)
         )
         worst = None if np.isnan(off) or situation.bodies is None else situation.bodies.worst(tr, td)
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])

@@ -67,18 +67,33 @@ def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst:
     return best
 
 
+def hopeless(poles: NDArray[np.complex128], s: Samples, e: Samples, worst: float) -> bool:
+    """Whether the richest model leaves more than ``worst`` of the variance of a few samples: the others leave more."""
+
+    def model(parameters: Samples, times: Samples) -> tuple[Samples, Samples]:
+        return energy_and_jacobian(parameters, times, WITH_PRELOAD)
+
+    few_s, few_e = _few(s, e)
+    return refine(_starts(poles, few_s, few_e, size=WITH_PRELOAD), model, few_s, few_e, worst) is None
+
+
 def best_of_starts(
     starts: Callable[[Samples, Samples], Sequence[Samples]], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
     """Return the best fit to all samples from what ``starts`` gives for a few of them; None as for `fit`."""
-    stride = -(-s.size // COARSE)
-    coarse_s, coarse_e = s[::stride], e[::stride]
+    coarse_s, coarse_e = _few(s, e)
     best = refine(starts(coarse_s, coarse_e), model, coarse_s, coarse_e, worst)
     if best is None:
         return None
     if np.isfinite(worst) and (_structured(best, model, coarse_s, coarse_e) or fails(best, model, s, e)):
         return None
-    return best if stride == 1 else minimise(best, model, s, e)[0]
+    return best if coarse_s.size == s.size else minimise(best, model, s, e)[0]
+
+
+def _few(s: Samples, e: Samples) -> tuple[Samples, Samples]:
+    """Give the few of the samples on which starts are compared."""
+    stride = -(-s.size // COARSE)
+    return s[::stride], e[::stride]
 
 
 def refine(starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float) -> Samples | None:
@@ -120,11 +135,12 @@ def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[
     each by exp(p h).  Means over cells of an exponential are the same exponential, so cells also serve
     dense records.
     """
-    fine = cell_means(s, e, min(s.size - 1, _MAX_CELLS))
+    running = integral(s, e)
+    fine = _means_of_cells(s, running, min(s.size - 1, _MAX_CELLS))
     power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
     periods = int(np.argmax(power * np.arange(power.size)))  # per octave: decay alone must not win
     count = min(max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS)
-    cells = cell_means(s, e, count)
+    cells = _means_of_cells(s, running, count)
     hankel = np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
     vectors = np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1]
     found = []
@@ -139,7 +155,12 @@ def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[
 
 def cell_means(s: Samples, e: Samples, count: int) -> Samples:
     """Means of E(s) over equal cells of [0, 1]."""
-    return np.asarray(np.diff(np.interp(np.linspace(0, 1, count + 1), s, integral(s, e))) * count)
+    return _means_of_cells(s, integral(s, e), count)
+
+
+def _means_of_cells(s: Samples, running: Samples, count: int) -> Samples:
+    """The same of the ``running`` integral of E(s)."""
+    return np.asarray(np.diff(np.interp(np.linspace(0, 1, count + 1), s, running)) * count)
 
 
 def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, *, size: int) -> list[Samples]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.vibration.fit_one import COARSE, VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, minimise, rates
+from d2rpick.vibration.fit_one import COARSE, VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, hopeless, minimise, rates
 from d2rpick.vibration.one_mode import Mode, energy_and_jacobian
 from d2rpick.vibration.structure import MAX_STRUCTURE, structure_of
 
@@ -135,6 +135,8 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False) -> Identifi
     poles = rates(record.s, record.e)
     if poles.size == 0:
         return _nothing(time, "the energy does not oscillate: nothing vibrates, or it is overdamped")
+    if quick and hopeless(poles, record.s, record.e, HOPELESS):
+        return _least_wrong([], time)
     refused = []
     for size, least_periods in _MODELS:
         parameters = fit(poles, record.s, record.e, size, HOPELESS if quick else np.inf)
