@@ -9,7 +9,7 @@ vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -126,31 +126,43 @@ def _structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bo
     return surely_structured(e - model(parameters, s)[0], float(np.std(e)))
 
 
-def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
-    """Read the complex rates p = -damping + i frequency of exp(p s) that E may consist of, frequency > 0.
+class Pencil(NamedTuple):
+    """What the exponentials that E may consist of span, over so many cells: ``vectors`` of shape (lags, lags).
 
-    ``orders`` are the numbers of exponentials that are tried.
     Matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 1990): the leading right singular vectors of the
     Hankel matrix of equidistant values span the exponentials, and shifting them by one cell multiplies
     each by exp(p h).  Means over cells of an exponential are the same exponential, so cells also serve
     dense records.
     """
-    running = integral(s, e)
-    fine = _means_of_cells(s, running, min(s.size - 1, _MAX_CELLS))
-    power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
-    periods = int(np.argmax(power * np.arange(power.size)))  # per octave: decay alone must not win
-    count = min(max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS)
-    cells = _means_of_cells(s, running, count)
-    hankel = np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
-    vectors = np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1]
-    found = []
-    for order in orders:
-        v = vectors[:, :order]
-        found.append(np.linalg.eigvals(np.linalg.lstsq(v[:-1], v[1:], rcond=None)[0]))
-    z = np.concatenate(found).astype(np.complex128)
-    z = z[(z.imag > 0) & (np.abs(z) > 0)]
-    poles: NDArray[np.complex128] = np.log(z) * count
-    return poles
+
+    vectors: Samples
+    cells: int
+
+    @classmethod
+    def of(cls, s: Samples, e: Samples) -> Pencil:
+        """Find the vectors, those that hold most of E first."""
+        running = integral(s, e)
+        fine = _means_of_cells(s, running, min(s.size - 1, _MAX_CELLS))
+        power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
+        periods = int(np.argmax(power * np.arange(power.size)))  # per octave: decay alone must not win
+        count = min(max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS)
+        cells = _means_of_cells(s, running, count)
+        hankel = np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
+        return cls(np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1], count)
+
+    def rates(self, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
+        """Read the complex rates p = -damping + i frequency of exp(p s) that E may consist of, frequency > 0.
+
+        ``orders`` are the numbers of exponentials that are tried.
+        """
+        found = []
+        for order in orders:
+            v = self.vectors[:, :order]
+            found.append(np.linalg.eigvals(np.linalg.lstsq(v[:-1], v[1:], rcond=None)[0]))
+        z = np.concatenate(found).astype(np.complex128)
+        z = z[(z.imag > 0) & (np.abs(z) > 0)]
+        poles: NDArray[np.complex128] = np.log(z) * self.cells
+        return poles
 
 
 def cell_means(s: Samples, e: Samples, count: int) -> Samples:
