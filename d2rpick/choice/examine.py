@@ -80,7 +80,7 @@ def _oscillator(
         return fit, span
     span, fit = described_span(history, td, bounds, fits.remembered("one", identify), whole=whole)
     if span is None:
-        fitter = fits.remembered("several", identify_several)
+        fitter = partial(fits.remembered("several", identify_several), quick=True)  # nobody asks why it is refused
         span, several = described_span(history, td, bounds, fitter, whole=whole)
         fit = several if span else fit
     return _resolved(history, fit, fits), span
