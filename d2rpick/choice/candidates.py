@@ -8,14 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
 import numpy as np
 
 from d2rpick.choice.objections import objections
 from d2rpick.vibration import measures
-from d2rpick.vibration.moments import Moment
+from d2rpick.vibration.moments import Moment, Moments
 from d2rpick.vibration.together import measured_of, moments_of
 
 if TYPE_CHECKING:
@@ -93,19 +92,18 @@ class Candidate(NamedTuple):
 class Candidates(Sequence[Candidate]):
     """Candidates of one td in some order: columns of what decides, each of shape (n,), made for all of them at once.
 
-    ``tr`` [time]; ``energy`` [energy]; ``level_error`` [-], NaN where an energy is not positive; ``reach``: how far
-    the true time may lie away [time]; ``same_swing``; ``position_error`` [length], NaN where unknown; ``moments`` and
-    ``known``, as the vibration gave them.
+    ``tr`` [time]; ``energy`` [energy]; ``level_error`` [-], NaN where an energy is not positive; ``same_swing``;
+    ``position_error`` [length], NaN where unknown; ``moments`` and ``known``, as the vibration gave them, None where
+    nothing was measured.
     ``recommended`` is the place of the one that is, ``ranked`` tells whether the order is that of the ranks.
     """
 
     situation: Situation
-    moments: tuple[Moment, ...]
-    known: tuple[Measured | None, ...]
+    moments: Moments
+    known: NDArray[np.object_]
     tr: Samples
     energy: Samples
     level_error: Samples
-    reach: Samples
     same_swing: NDArray[np.bool_]
     position_error: Samples
     objections: tuple[Objection, ...]
@@ -113,23 +111,22 @@ class Candidates(Sequence[Candidate]):
     ranked: bool = False
 
     @classmethod
-    def of(cls, situation: Situation, moments: Sequence[Moment], known: Sequence[Measured | None]) -> Candidates:
+    def of(cls, situation: Situation, moments: Moments, known: Sequence[Measured | None]) -> Candidates:
         """Hold each tr, of which is ``known`` what was measured, against flight, sign and tolerance."""
         vibration = situation.vibration
-        tr = np.array([one.tr for one in moments])
+        tr, measured = moments.tr, np.fromiter(known, dtype=object, count=len(known))
         energy = vibration.energies(tr)
         level_error = measures.level_errors(energy, situation.energy_td)
         return cls(
             situation=situation,
-            moments=tuple(moments),
-            known=tuple(known),
+            moments=moments,
+            known=measured,
             tr=tr,
             energy=energy,
             level_error=level_error,
-            reach=vibration.reach(moments),
             same_swing=(situation.turns_since(tr) < 2) & (not situation.at_rest),
             position_error=situation.position_errors(tr),
-            objections=tuple(objections(situation, tr, known, level_error)),
+            objections=tuple(objections(situation, tr, measured, level_error)),
         )
 
     @cached_property
@@ -143,7 +140,7 @@ class Candidates(Sequence[Candidate]):
     @cached_property
     def residual(self) -> Samples:
         """Residuals, NaN where unknown [-]."""
-        return np.array([np.nan if one is None else one.residual for one in self.known])
+        return measures.column_of(self.known, "residual")
 
     @property
     def error(self) -> Samples:
@@ -155,12 +152,11 @@ class Candidates(Sequence[Candidate]):
         """Give the same, ranked in this order of their places."""
         return replace(
             self,
-            moments=tuple(map(self.moments.__getitem__, order.tolist())),
-            known=tuple(map(self.known.__getitem__, order.tolist())),
+            moments=self.moments.at(order),
+            known=self.known[order],
             tr=self.tr[order],
             energy=self.energy[order],
             level_error=self.level_error[order],
-            reach=self.reach[order],
             same_swing=self.same_swing[order],
             position_error=self.position_error[order],
             objections=tuple(one.ordered(order) for one in self.objections),
@@ -193,16 +189,21 @@ class Candidates(Sequence[Candidate]):
     def __getitem__(self, place: slice) -> tuple[Candidate, ...]: ...
     def __getitem__(self, place: int | slice) -> Candidate | tuple[Candidate, ...]:
         """Make the candidate, or the candidates, at some place."""
-        if isinstance(place, slice):
-            return tuple(map(self._made, range(len(self))[place]))
-        return self._made(range(len(self))[place])
+        if not isinstance(place, slice):
+            i = range(len(self))[place]
+            return self[i : i + 1][0]
+        # how far the true time may lie away is asked of these only: of all it takes longer than the choice
+        reach = self.situation.vibration.reach(self.moments[place])
+        return tuple(map(self._made, range(len(self))[place], reach.tolist()))
 
-    def _made(self, i: int) -> Candidate:
+    def __iter__(self) -> Iterator[Candidate]:
+        return iter(self[:])
+
+    def _made(self, i: int, reach: float) -> Candidate:
         situation, found, known = self.situation, self.moments[i], self.known[i]
         history, td, tr = situation.history, situation.td, found.tr
-        energy, level, reach, same_swing, off = (
-            column[i].item()
-            for column in (self.energy, self.level_error, self.reach, self.same_swing, self.position_error)
+        energy, level, same_swing, off = (
+            column[i].item() for column in (self.energy, self.level_error, self.same_swing, self.position_error)
         )
         worst = None if np.isnan(off) or situation.bodies is None else situation.bodies.worst(tr, td)
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
@@ -258,32 +259,35 @@ def _found_together(situations: Sequence[Situation], *, in_flight: bool) -> list
     vibrations = [one.vibration for one in situations]
     starts = [one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf for one in situations]
     found = moments_of(vibrations, situations[0].settings.tolerance, starts)
-    kept = [_at_start(one) or _distinct(one, moments) for one, moments in zip(situations, found, strict=True)]
-    known = measured_of(vibrations, [np.array([one.tr for one in moments]) for moments in kept])
+    kept = [
+        _at_start(one) or _distinct(one, Moments.of(moments)) for one, moments in zip(situations, found, strict=True)
+    ]
+    known = measured_of(vibrations, [moments.tr for moments in kept])
     return [Candidates.of(*row) for row in zip(situations, kept, known, strict=True)]
 
 
 def judge(situation: Situation, found: Sequence[Moment]) -> Candidates:
     """Measure each tr and hold it against flight, sign and tolerance."""
-    return Candidates.of(situation, found, situation.vibration.measured(np.array([one.tr for one in found])))
+    moments = Moments.of(found)
+    return Candidates.of(situation, moments, situation.vibration.measured(moments.tr))
 
 
-def _at_start(situation: Situation) -> list[Moment]:
+def _at_start(situation: Situation) -> Moments | None:
     """Where nothing vibrates in the flight, its start; else nothing."""
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
-        return []
-    return [Moment(max(start, float(situation.history.time[0])), "start", None)]
+        return None
+    return Moments.of([Moment(max(start, float(situation.history.time[0])), "start", None)])
 
 
-def _distinct(situation: Situation, found: Sequence[Moment]) -> list[Moment]:
+def _distinct(situation: Situation, found: Moments) -> Moments:
     """Give the moments in time order, without the matches that lie next to a crossing or an extremum."""
-    matches = [one for one in found if one.kind == "match"]
-    if matches:
-        of_level = np.array([one.tr for one in found if one.kind != "match"])
-        known = {one for one in matches if not np.all(np.abs(of_level - one.tr) > situation.history.step)}
-        found = [one for one in found if one not in known]
-    return sorted(found, key=itemgetter(0))  # a Moment begins with its time
+    kept, matches = np.ones(len(found), dtype=bool), found.are("match")
+    of_level = found.tr[~matches]
+    for place in np.flatnonzero(matches).tolist():
+        kept[place] = np.all(np.abs(of_level - found.tr[place]) > situation.history.step)
+    found = found.at(kept)
+    return found.at(np.argsort(found.tr, kind="stable"))
 
 
 def _remarks(situation: Situation, reach: float, known: Measured | None, parts: Sequence[PartMatch]) -> Iterator[str]:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def examine(history: History, td: float, settings: Settings, fits: Fits | None = None) -> Situation:
     """Find the flight around ``td`` and the oscillator in it.
 
-    ``fits`` are those of an earlier look at the same record with the same settings.
+    ``fits`` are those of an earlier look at the same record with the same settings, but for ``after``.
 
     RangeError when td, ``after`` or the fit window lie outside the record, or it has fewer than 3 states.
     """
@@ -80,7 +80,7 @@ def _oscillator(
         return fit, span
     span, fit = described_span(history, td, bounds, fits.remembered("one", identify), whole=whole)
     if span is None:
-        fitter = fits.remembered("several", identify_several)
+        fitter = partial(fits.remembered("several", identify_several), quick=True)  # nobody asks why it is refused
         span, several = described_span(history, td, bounds, fitter, whole=whole)
         fit = several if span else fit
     return _resolved(history, fit, fits), span

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.choice.warnings import end_of_flight, end_of_load
+from d2rpick.vibration.measures import column_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.measures import Measured
 
 
 class Objection(NamedTuple):
@@ -35,7 +35,7 @@ class Objection(NamedTuple):
 
 
 def objections(
-    situation: Situation, tr: Samples, known: Sequence[Measured | None], level_error: Samples
+    situation: Situation, tr: Samples, known: NDArray[np.object_], level_error: Samples
 ) -> Iterator[Objection]:
     """Give every reason against some of the candidates.
 
@@ -44,8 +44,8 @@ def objections(
     situation : Situation
     tr : array of shape (n,)
         [time]
-    known : sequence of length n
-        What was measured of each, None where it cannot be compared with td.
+    known : array of shape (n,)
+        `Measured` of each, None where it cannot be compared with td.
     level_error : array of shape (n,)
         NaN where an energy is not positive [-].
     """
@@ -56,15 +56,14 @@ def objections(
     else:
         yield Objection(tr < earliest, f"before {end_of_load(situation)}")
     yield from (Objection(everywhere, reason) for reason in _against_td(situation))
-    compared = np.array([one is not None for one in known], dtype=bool)
+    compared = known.astype(bool)
     described = compared | bool(vibration.unknown)
-    same_sign = ~np.array([one is not None and not one.sign_match for one in known], dtype=bool)
+    same_sign = column_of(known, "sign_match") != 0
     yield Objection(~described, vibration.undescribed)
     yield Objection(~same_sign, "opposite sign of the deformation")
     if situation.at_rest:
         return
-    lock_in = np.array([np.nan if one is None else one.lock_in_error for one in known])
-    error, judged = np.where(compared, lock_in, level_error), described & same_sign
+    error, judged = np.where(compared, column_of(known, "lock_in_error"), level_error), described & same_sign
     yield Objection(judged & np.isnan(error), "the energy is not positive here, so there is nothing to compare")
     tolerance = situation.settings.tolerance
     yield Objection(judged & (error > tolerance), f"above the tolerance {tolerance:g}", error)

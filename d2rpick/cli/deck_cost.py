@@ -88,5 +88,7 @@ def with_cost(
     if merge is not None and history.parts:
         from d2rpick.flight.bodies import RigidBody
 
-        settings = replace(settings, bodies=(RigidBody(tuple(part.id for part in history.parts)),))
+        merged = tuple(sorted({part.id for part in history.parts} | {merge}))
+        told = any(body.whole for body in settings.bodies or ())  # a part alone may be of pieces
+        settings = replace(settings, bodies=(RigidBody(merged, whole=len(merged) > 1 or told),))
     return settings, cautions

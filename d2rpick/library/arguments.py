@@ -108,7 +108,10 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
     """
     if value is None:
         return ()
-    listed = [value] if isinstance(value, str | int) else list(_each(name, value, "a number, a title or several"))
+    from d2rpick.histories.history import Part
+
+    single = isinstance(value, str | int | Part)  # a Part holds its number and its title
+    listed = [value] if single else list(_each(name, value, "a number, a title or several"))
     for one in listed:
         if isinstance(one, bool) or not (isinstance(one, str) or hasattr(one, "__index__")):
             raise TypeError(f"{name} holds {one!r}; numbers and titles of parts were expected")

@@ -6,7 +6,7 @@ from itertools import groupby
 from math import isinf
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.errors import printable
+from d2rpick.errors import listing, printable
 from d2rpick.report import keys, tables
 from d2rpick.version import __version__
 
@@ -210,7 +210,7 @@ def rows(found: Parts) -> list[list[tables.Cell]]:
             row.flight.deforms if row.flight else None,
             _percent(row.cost_share),
             _short(row.smallest_step),
-            _listed(row.shares_nodes),
+            None if row.shares_nodes is None else listing(row.shares_nodes, most=_MOST_SHOWN, between=","),
             "; ".join(row.reasons),
         ]
         for row in found.rows
@@ -274,13 +274,6 @@ def _number(count: int, what: str) -> str:
 
 def _counted(row: PartRow) -> str | None:
     return None if row.elements is None else ", ".join(f"{count} {kind}" for kind, count in row.elements.items())
-
-
-def _listed(ids: Sequence[int] | None, most: int = _MOST_SHOWN) -> str | None:
-    if ids is None:
-        return None
-    more = f" and {len(ids) - most} more" if len(ids) > most else ""
-    return ",".join(map(str, ids[:most])) + more
 
 
 def ranges(ids: Sequence[int]) -> str:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.errors import printable
-from d2rpick.histories.names import listing
+from d2rpick.errors import listing, printable
 from d2rpick.report import keys
 from d2rpick.report.tables import measure
 from d2rpick.version import __version__

@@ -9,7 +9,7 @@ vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -67,18 +67,33 @@ def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst:
     return best
 
 
+def hopeless(poles: NDArray[np.complex128], s: Samples, e: Samples, worst: float) -> bool:
+    """Whether the richest model leaves more than ``worst`` of the variance of a few samples: the others leave more."""
+
+    def model(parameters: Samples, times: Samples) -> tuple[Samples, Samples]:
+        return energy_and_jacobian(parameters, times, WITH_PRELOAD)
+
+    few_s, few_e = _few(s, e)
+    return refine(_starts(poles, few_s, few_e, size=WITH_PRELOAD), model, few_s, few_e, worst) is None
+
+
 def best_of_starts(
     starts: Callable[[Samples, Samples], Sequence[Samples]], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
     """Return the best fit to all samples from what ``starts`` gives for a few of them; None as for `fit`."""
-    stride = -(-s.size // COARSE)
-    coarse_s, coarse_e = s[::stride], e[::stride]
+    coarse_s, coarse_e = _few(s, e)
     best = refine(starts(coarse_s, coarse_e), model, coarse_s, coarse_e, worst)
     if best is None:
         return None
     if np.isfinite(worst) and (_structured(best, model, coarse_s, coarse_e) or fails(best, model, s, e)):
         return None
-    return best if stride == 1 else minimise(best, model, s, e)[0]
+    return best if coarse_s.size == s.size else minimise(best, model, s, e)[0]
+
+
+def _few(s: Samples, e: Samples) -> tuple[Samples, Samples]:
+    """Give the few of the samples on which starts are compared."""
+    stride = -(-s.size // COARSE)
+    return s[::stride], e[::stride]
 
 
 def refine(starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float) -> Samples | None:
@@ -111,35 +126,53 @@ def _structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bo
     return surely_structured(e - model(parameters, s)[0], float(np.std(e)))
 
 
-def rates(s: Samples, e: Samples, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
-    """Read the complex rates p = -damping + i frequency of exp(p s) that E may consist of, frequency > 0.
+class Pencil(NamedTuple):
+    """What the exponentials that E may consist of span, over so many cells: ``vectors`` of shape (lags, lags).
 
-    ``orders`` are the numbers of exponentials that are tried.
     Matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 1990): the leading right singular vectors of the
     Hankel matrix of equidistant values span the exponentials, and shifting them by one cell multiplies
     each by exp(p h).  Means over cells of an exponential are the same exponential, so cells also serve
     dense records.
     """
-    fine = cell_means(s, e, min(s.size - 1, _MAX_CELLS))
-    power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
-    periods = int(np.argmax(power * np.arange(power.size)))  # per octave: decay alone must not win
-    count = min(max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS)
-    cells = cell_means(s, e, count)
-    hankel = np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
-    vectors = np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1]
-    found = []
-    for order in orders:
-        v = vectors[:, :order]
-        found.append(np.linalg.eigvals(np.linalg.lstsq(v[:-1], v[1:], rcond=None)[0]))
-    z = np.concatenate(found).astype(np.complex128)
-    z = z[(z.imag > 0) & (np.abs(z) > 0)]
-    poles: NDArray[np.complex128] = np.log(z) * count
-    return poles
+
+    vectors: Samples
+    cells: int
+
+    @classmethod
+    def of(cls, s: Samples, e: Samples) -> Pencil:
+        """Find the vectors, those that hold most of E first."""
+        running = integral(s, e)
+        fine = _means_of_cells(s, running, min(s.size - 1, _MAX_CELLS))
+        power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
+        periods = int(np.argmax(power * np.arange(power.size)))  # per octave: decay alone must not win
+        count = min(max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS)
+        cells = _means_of_cells(s, running, count)
+        hankel = np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
+        return cls(np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1], count)
+
+    def rates(self, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
+        """Read the complex rates p = -damping + i frequency of exp(p s) that E may consist of, frequency > 0.
+
+        ``orders`` are the numbers of exponentials that are tried.
+        """
+        found = []
+        for order in orders:
+            v = self.vectors[:, :order]
+            found.append(np.linalg.eigvals(np.linalg.lstsq(v[:-1], v[1:], rcond=None)[0]))
+        z = np.concatenate(found).astype(np.complex128)
+        z = z[(z.imag > 0) & (np.abs(z) > 0)]
+        poles: NDArray[np.complex128] = np.log(z) * self.cells
+        return poles
 
 
 def cell_means(s: Samples, e: Samples, count: int) -> Samples:
     """Means of E(s) over equal cells of [0, 1]."""
-    return np.asarray(np.diff(np.interp(np.linspace(0, 1, count + 1), s, integral(s, e))) * count)
+    return _means_of_cells(s, integral(s, e), count)
+
+
+def _means_of_cells(s: Samples, running: Samples, count: int) -> Samples:
+    """The same of the ``running`` integral of E(s)."""
+    return np.asarray(np.diff(np.interp(np.linspace(0, 1, count + 1), s, running)) * count)
 
 
 def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, *, size: int) -> list[Samples]:

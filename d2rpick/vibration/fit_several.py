@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.vibration.fit_one import STARTS, best_of_starts, rates
+from d2rpick.vibration.fit_one import STARTS, best_of_starts
 from d2rpick.vibration.modes import sum_and_jacobian
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.fit_one import Pencil
 
 # Least difference of two rates over the record to start from [rad]: below a quarter of a beat two modes act as one.
 _APART: Final = np.pi / 4
@@ -24,26 +25,26 @@ _APART: Final = np.pi / 4
 _HOPELESS: Final = 0.5
 
 
-def fit_several(s: Samples, e: Samples, count: int, worst: float = np.inf) -> Samples | None:
-    """Return the least-squares parameters of ``count`` modes; None where E does not show so many rates.
+def fit_several(pencil: Pencil, s: Samples, e: Samples, count: int, worst: float = np.inf) -> Samples | None:
+    """Return the least-squares parameters of ``count`` modes; None where E, of this ``pencil``, shows fewer rates.
 
     Each mode makes exp(-alpha s) times a constant and a vibration at twice its rate, so the constants add up and
     3 count exponentials leave room for what is none.  For known rates E is linear in the rest, which ranks the
     rates and gives the parameters.  None also where a few of the samples refuse the fit, as for one mode.
     """
-    return best_of_starts(partial(_starts, s, e, count), sum_and_jacobian, s, e, worst)
+    return best_of_starts(partial(_starts, pencil, count), sum_and_jacobian, s, e, worst)
 
 
-def _starts(s: Samples, e: Samples, count: int, coarse_s: Samples, coarse_e: Samples) -> list[Samples]:
-    """Return the best parameter vectors to start from."""
-    poles = rates(s, e, (3 * count,))
-    hopeless = _HOPELESS * float(np.sum((coarse_e - np.mean(coarse_e)) ** 2))
+def _starts(pencil: Pencil, count: int, s: Samples, e: Samples) -> list[Samples]:
+    """Return the best parameter vectors to start from, for a few of the samples."""
+    poles = pencil.rates((3 * count,))
+    hopeless = _HOPELESS * float(np.sum((e - np.mean(e)) ** 2))
     omega, alpha = poles.imag / 2, np.maximum(-poles.real, -1.0)  # growth is refused anyway
     found = []
     for chosen in combinations(range(poles.size), count):
         members = list(chosen)
         if np.diff(np.sort(omega[members])).min() >= _APART:
-            found.append(linear_fit(omega[members], float(np.median(alpha[members])), coarse_s, coarse_e))
+            found.append(linear_fit(omega[members], float(np.median(alpha[members])), s, e))
     return [start for misfit, start in sorted(found, key=lambda one: one[0])[:STARTS] if misfit < hopeless]
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.vibration.fit_one import COARSE, VIBRATION, WITH_PLASTIC, WITH_PRELOAD, fit, minimise, rates
+from d2rpick.vibration.fit_one import COARSE, VIBRATION, WITH_PLASTIC, WITH_PRELOAD, Pencil, fit, hopeless, minimise
 from d2rpick.vibration.one_mode import Mode, energy_and_jacobian
 from d2rpick.vibration.structure import MAX_STRUCTURE, structure_of
 
@@ -132,9 +132,11 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False) -> Identifi
     if lacking:
         return _nothing(time, lacking)
     record = _Record.scaled(time, energy)
-    poles = rates(record.s, record.e)
+    poles = Pencil.of(record.s, record.e).rates()
     if poles.size == 0:
         return _nothing(time, "the energy does not oscillate: nothing vibrates, or it is overdamped")
+    if quick and hopeless(poles, record.s, record.e, HOPELESS):
+        return _least_wrong([], time)
     refused = []
     for size, least_periods in _MODELS:
         parameters = fit(poles, record.s, record.e, size, HOPELESS if quick else np.inf)
@@ -170,9 +172,9 @@ def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> 
     if lacking:
         return _nothing(time, lacking)
     record = _Record.scaled(time, energy)
-    refused = []
+    refused, pencil = [], Pencil.of(record.s, record.e)
     for count in _SEVERAL:
-        parameters = fit_several(record.s, record.e, count, HOPELESS if quick else np.inf)
+        parameters = fit_several(pencil, record.s, record.e, count, HOPELESS if quick else np.inf)
         if parameters is not None:
             attempt, follows = _judged(_sum(parameters, record), _PERIODS_OF_SEVERAL, record)
             if follows:

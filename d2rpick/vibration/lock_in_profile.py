@@ -10,11 +10,9 @@ import numpy as np
 from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.measures import Deformation
-    from d2rpick.vibration.moments import Moment
+    from d2rpick.vibration.moments import Moments
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +45,9 @@ class Profile:
         after = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
         return np.asarray(self.time[after] - self.time[after - 1])
 
-    def bounding(self, moments: Sequence[Moment], reach: Samples) -> Samples:
+    def bounding(self, moments: Moments, reach: Samples) -> Samples:
         """Give ``reach`` of each moment, of a match half of its cell: it lies where the error is least [time]."""
-        times = np.array([moment.tr for moment in moments])
-        return np.where([moment.kind == "match" for moment in moments], self.cell(times) / 2, reach)
+        return np.where(moments.are("match"), self.cell(moments.tr) / 2, reach)
 
     def tolerances(self, tr: Samples, errors: Samples) -> Samples:
         """Give the tolerance of each tr of shape (n,) with its error [time]."""

@@ -67,6 +67,13 @@ def measured(
     return [Measured(*row) for row in zip(*lists, mismatch, strict=True)]
 
 
+def column_of(known: NDArray[np.object_], name: str) -> Samples:
+    """Give one of the measures of each, shape (n,); NaN where there are none."""
+    column, measured = np.full(known.shape, np.nan), known.astype(bool)
+    column[measured] = [getattr(one, name) for one in known[measured]]
+    return column
+
+
 # The growth of the lock-in error that ``timing_tolerance`` allows.
 TOLERATED_GROWTH = 0.05
 

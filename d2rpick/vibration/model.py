@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.modes import Modes
-    from d2rpick.vibration.moments import Moment
+    from d2rpick.vibration.moments import Moment, Moments
     from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.part_signs import PartVibration, SignedParts, Unsigned
@@ -95,7 +95,7 @@ class Vibration(Protocol):
     def knots(self) -> Samples:
         """Times before td between which the errors run monotone [time]."""
 
-    def reach(self, moments: Sequence[Moment]) -> Samples:
+    def reach(self, moments: Moments) -> Samples:
         """How far the true time of each moment may lie away [time]."""
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from itertools import repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.errors import listing
 from d2rpick.histories.crossings import find_turns, passages
-from d2rpick.histories.names import listing
 from d2rpick.vibration import measures
-from d2rpick.vibration.moments import SUNK, Moment
+from d2rpick.vibration.moments import SUNK, Moments
 from d2rpick.vibration.uncertainty import sampled_reach
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.part_shares import PartMatch
@@ -61,16 +60,13 @@ class OfEnergy:
         peaks = self.history.peaks
         return tuple(peaks[(start < peaks) & (peaks <= end)].tolist())
 
-    def moments(self, tolerance: float, since: float = -np.inf) -> list[Moment]:
+    def moments(self, tolerance: float, since: float = -np.inf) -> Moments:
         """Crossings of the level at td, and samples where the energy turns near it, none before ``since``."""
         time, energy = sampled_before(self.history, self.td, level := self.energy(self.td))
         times, rising = passages(time, energy, level)
         asked, turns = (since <= times) & (times < self.td), find_turns(energy)[0]
         near = time[turns[measures.level_errors(energy[turns], level) <= tolerance]]
-        return [
-            *map(Moment, times[asked].tolist(), repeat("crossing"), rising[asked].tolist()),
-            *(Moment(t, "extremum", None) for t in near[near >= since].tolist()),
-        ]
+        return Moments.of_level(times[asked], rising[asked], near[near >= since])
 
     def measured(self, times: Samples) -> list[None]:
         """Nothing: no deformation is known."""
@@ -89,9 +85,9 @@ class OfEnergy:
         """None but the samples."""
         return np.zeros(0)
 
-    def reach(self, moments: Sequence[Moment]) -> Samples:
+    def reach(self, moments: Moments) -> Samples:
         """How far sampling and printed digits leave the true time open [time]."""
-        return self.level_reach(np.array([moment.tr for moment in moments]))
+        return self.level_reach(moments.tr)
 
     def level_reach(self, times: Samples) -> Samples:
         """How far from each time the energy may have the level at td [time]."""

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.lock_in_profile import Profile
     from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.moments import Moments
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.span import Span
 
@@ -170,9 +171,9 @@ class OfModes:
         """Standstills and ends of the span, between which the energy runs monotone [time]."""
         return np.concatenate([self.mode.extrema(float(self.history.time[0]), self.td), self.span])
 
-    def reach(self, moments: Sequence[Moment]) -> Samples:
+    def reach(self, moments: Moments) -> Samples:
         """How far fit, sampling and printed digits leave the true time open; half a cell of the profile for a match."""
-        reach = self.level_reach(np.array([moment.tr for moment in moments]))
+        reach = self.level_reach(moments.tr)
         return self.profile.bounding(moments, reach) if self.profile else reach
 
     def level_reach(self, times: Samples) -> Samples:

@@ -14,11 +14,10 @@ from d2rpick.vibration.of_modes import OfModes
 from d2rpick.vibration.part_shares import PartMatch, contributions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.moments import Moments
     from d2rpick.vibration.of_energy import OfEnergy
     from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.part_signs import PartVibration, Unsigned
@@ -134,9 +133,9 @@ class OfParts:
         """Those of the whole and the times of the profile [time]."""
         return np.append(self.whole.edges(), self.profile.time)
 
-    def reach(self, moments: Sequence[Moment]) -> Samples:
+    def reach(self, moments: Moments) -> Samples:
         """How far the whole leaves the true time open; half a cell of the profile for a match [time]."""
-        return self.profile.bounding(moments, self.whole.level_reach(np.array([moment.tr for moment in moments])))
+        return self.profile.bounding(moments, self.whole.level_reach(moments.tr))
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:
         """What each part has of the mismatch."""

@@ -219,6 +219,7 @@ def test_a_run_is_shown_by_its_files() -> None:
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, v0=6.0), ValueError, "oscillator and v0 go together"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[]), ValueError, "parts is empty"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[1.5]), TypeError, "parts holds 1.5"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, parts=d2.read(BOX).parts[0]), TypeError, r"parts holds Part\(id=1,"),
         (lambda: loose.suggest(ENERGY, 0.06), TypeError, "run is .*, what read"),
         (lambda: loose.suggest(d2.read(ROLLOVER, energy="boxIE_J"), 0.3, parts=1), ValueError, "exclude each other"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, weights="a.toml"), ValueError, "weights needs a deck"),

@@ -10,6 +10,7 @@ from d2rpick.vibration import measures
 from d2rpick.vibration.identify import identify_several
 from d2rpick.vibration.lock_in_profile import Profile
 from d2rpick.vibration.modes import Modes
+from d2rpick.vibration.moments import Moments
 from d2rpick.vibration.of_modes import OfModes
 from d2rpick.vibration.one_mode import Mode
 from d2rpick.vibration.span import Span
@@ -60,5 +61,5 @@ def test_a_td_at_which_two_modes_set_in_has_nothing_before_it_to_compare() -> No
     vibration = OfModes(history, 2.0, fit, Span(2.0, 6.0))
     crossings = vibration.moments(0.2)
     assert all(one.tr < 2.0 and one.kind == "crossing" for one in crossings)
-    assert np.isfinite(vibration.reach(crossings)).all()
+    assert np.isfinite(vibration.reach(Moments.of(crossings))).all()
     assert vibration.measured(np.array([one.tr for one in crossings])) == [None] * len(crossings)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.vibration.fit_one import VIBRATION, fails, fit, rates
+from d2rpick.vibration.fit_one import VIBRATION, Pencil, fails, fit
 from d2rpick.vibration.identify import HOPELESS, identify, identify_several
 from d2rpick.vibration.one_mode import energy_and_jacobian
 from d2rpick.vibration.structure import MAX_STRUCTURE, structure_of, surely_structured
@@ -42,7 +42,7 @@ def test_a_part_of_the_samples_refuses_only_what_all_of_them_refuse(scatter: flo
 
 def test_a_fit_that_leaves_another_mode_fails_early() -> None:
     one = np.exp(-S) * np.sin(20 * S) ** 2
-    right = fit(rates(S, one), S, one, VIBRATION, HOPELESS)
+    right = fit(Pencil.of(S, one).rates(), S, one, VIBRATION, HOPELESS)
     assert right is not None
 
     def model(parameters: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
