@@ -132,8 +132,11 @@ def _refuse_few(reference: History, switched: History, states: int, td: float, e
     """RangeError where a run holds too few states after td."""
     if states < 3:
         short = min(reference, switched, key=lambda history: history.time[-1])
+        name, last = ", ".join(short.source), float(short.time[-1])
+        if last <= td:
+            raise RangeError(f"{name}: ends at {last:g}, not after td {td:g}; give the later legs of the run too")
         found = f"fewer than 3 states from td {td:g} to {end:g}"
-        raise RangeError(f"{', '.join(short.source)}: {found}; too few to compare the runs")
+        raise RangeError(f"{name}: {found}; too few to compare the runs")
 
 
 def _rigid_window(switched: History, tr: float, td: float) -> tuple[float, float] | None:

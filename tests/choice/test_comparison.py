@@ -319,6 +319,9 @@ def test_a_run_that_ends_at_td_is_named(short: str) -> None:
     runs[short] = history(1 + TIME[:52], TIME[:52], short)
     with pytest.raises(RangeError, match=rf"^{short}: fewer than 3 states from td 0.5 to 0.51; "):
         compare_runs(runs["reference"], runs["switched"], (0.1, 0.5), np.inf, 0.2, NONE, NONE)
+    runs[short] = history(1 + TIME[:40], TIME[:40], short)
+    with pytest.raises(RangeError, match=rf"^{short}: ends at 0.39, not after td 0.5; give the later legs of the run"):
+        compare_runs(runs["reference"], runs["switched"], (0.1, 0.5), np.inf, 0.2, NONE, NONE)
 
 
 def test_no_output_replaces_a_file_of_the_switched_run(tmp_path: Path) -> None:
