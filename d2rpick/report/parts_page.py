@@ -25,7 +25,7 @@ _TABLES: Final = {
 
 def as_page(found: Parts, command: Sequence[str]) -> str:
     """Write the page; ``command`` are the arguments that repeat the answer."""
-    return document(f"Parts to switch: {found.run.name}", *_sections(found, command), signed=("chosen by", "date"))
+    return document(f"Parts to switch: {page.title_of(found.run)}", *_sections(found, command), signed=page.SIGNED)
 
 
 def _sections(found: Parts, command: Sequence[str]) -> Iterator[Markup]:

@@ -187,7 +187,10 @@ class Table:
         return self._read[column]
 
     def _no_parts(self) -> FormatError:
-        return FormatError(f"{self.source}: a table has no parts; choose its columns with `energy`")
+        return FormatError(
+            f"{self.source}: a table has no parts; choose its columns with `energy`, "
+            "or give the matsum, binout or T01 of the run"
+        )
 
 
 def _kept(values: Samples) -> Samples:

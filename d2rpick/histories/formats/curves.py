@@ -204,7 +204,10 @@ class Curves:
         return listing([f"{number} {name!r}" for number, name in enumerate(self.channels, 1)])
 
     def _no_parts(self) -> FormatError:
-        return FormatError(f"{self.source}: curves are not parts; choose them with `energy`")
+        return FormatError(
+            f"{self.source}: curves are not parts; choose them with `energy`, "
+            "or give the matsum, binout or T01 of the run"
+        )
 
 
 def _curveplot(found: _Found) -> bool:
