@@ -21,15 +21,24 @@ _LEAST: Final = 40
 
 def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
     """Find what other td cost than those of a plan, for each of its flights; its grids are the coarser the more."""
-    answers = [row.answer for row in plan.rows if row.answer and row.window]
+    answers = {row.number: row.answer for row in plan.rows if row.answer and row.window}
+    landings = {row.number: row.flight.end for row in plan.rows}
     reference = reference._replace(history=plan.history)
     steps = max(_STEPS // max(len(answers), 1), _LEAST)
-    found = (explored_around(reference, one.situation, one.td_window, steps=steps) for one in answers)
+    found = (
+        explored_around(reference, one.situation, one.td_window, steps=steps, since=landings.get(number - 1))
+        for number, one in answers.items()
+    )
     return tuple(one for one in found if one)
 
 
 def explored_around(
-    reference: Reference, situation: Situation, window: tuple[float, float] | None = None, *, steps: int = _STEPS
+    reference: Reference,
+    situation: Situation,
+    window: tuple[float, float] | None = None,
+    *,
+    steps: int = _STEPS,
+    since: float | None = None,
 ) -> TradeOff | None:
     """Find what other td cost than that of a situation.
 
@@ -42,6 +51,8 @@ def explored_around(
         Where td was looked for [time].  Default: the flight that td lies in.
     steps : int, optional
         So many td on an even grid.
+    since : float, optional
+        No flight is taken to begin before [time].
 
     Returns
     -------
@@ -53,6 +64,6 @@ def explored_around(
         return None
     try:
         span = window or bounds(situation.history, flight)
-        return explore_of(reference, situation.settings, span, td=situation.td, steps=steps)
+        return explore_of(reference, situation.settings, span, td=situation.td, steps=steps, since=since)
     except RangeError:  # the window holds no state
         return None

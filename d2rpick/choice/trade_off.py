@@ -60,6 +60,7 @@ def explore_of(
     *,
     td: float | None = None,
     steps: int = STEPS,
+    since: float | None = None,
 ) -> TradeOff:
     """Find what each td offers.
 
@@ -74,6 +75,8 @@ def explore_of(
     steps : int
         So many td on an even grid, and every peak of the energy.  Where there are more peaks than that, the highest in
         each interval of the grid takes its place.
+    since : float, optional
+        No flight is taken to begin before [time].
 
     Raises
     ------
@@ -83,9 +86,9 @@ def explore_of(
     history, fits = reference.history, Fits()
     record = float(history.time[0]), float(history.time[-1])
     window = td_window or longest_flight(history, settings, fits, otherwise=None if td is None else record)
-    look = looking(history, settings, fits)
+    look = looking(history, settings, fits, since)
     situation, inside = within_flight(look, history, window)
-    suggestion = suggest_of(reference, window, settings, fits=fits)
+    suggestion = suggest_of(reference, window, settings, fits=fits, since=since)
     chosen = suggestion.recommended.td if suggestion.recommended else None
     times, peaks = _times(situation, inside, steps)
     named = [time for time in (td, chosen) if time is not None]
