@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 # Control and format characters (escape codes, text direction), line and paragraph separators.
 _UNSEEN = frozenset({"Cc", "Cf", "Zl", "Zp"})
 
@@ -48,3 +53,15 @@ def printable(text: str) -> str:
         letter.encode("unicode_escape").decode() if unicodedata.category(letter) in _UNSEEN else letter
         for letter in text
     )
+
+
+def listing(names: Sequence[object], most: int = 20, between: str = ", ") -> str:
+    """Name things in one line, printable, cut where they would fill the screen.
+
+    Examples
+    --------
+    >>> listing([3, 7, 8]), listing([3, 7, 8], most=2), listing([3, 7], between=",")
+    ('3, 7, 8', '3, 7 and 1 more', '3,7')
+    """
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return printable(between.join(map(str, names[:most]))) + more

@@ -7,7 +7,7 @@ import unicodedata
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.errors import printable
+from d2rpick.errors import listing, printable
 
 
 @given(st.text())
@@ -24,3 +24,9 @@ def test_every_other_name_is_shown_as_it_is(text: str) -> None:
 
 def test_an_escape_code_is_spelled_out() -> None:
     assert printable("\x1b[2Jbox\u202e\u2028é\udce9") == "\\x1b[2Jbox\\u202e\\u2028é\udce9"
+
+
+def test_a_listing_is_one_line_and_counts_what_it_leaves_out() -> None:
+    assert listing([f"box\n{i}" for i in range(4)], most=2) == "box\\n0, box\\n1 and 2 more"
+    assert listing([3, 7], most=2, between=",") == "3,7"
+    assert listing([]) == ""

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 def examine(history: History, td: float, settings: Settings, fits: Fits | None = None) -> Situation:
     """Find the flight around ``td`` and the oscillator in it.
 
-    ``fits`` are those of an earlier look at the same record with the same settings.
+    ``fits`` are those of an earlier look at the same record with the same settings, but for ``after``.
 
     RangeError when td, ``after`` or the fit window lie outside the record, or it has fewer than 3 states.
     """

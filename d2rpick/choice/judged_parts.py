@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.choice.rigid_parts import rigid_parts, with_energy
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, listing
 from d2rpick.flight.energy_alone import round_off
-from d2rpick.histories.names import listing
 from d2rpick.histories.selection import Selection
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck.inventory.model import DISCRETE, some_of
+from d2rpick.deck.inventory.model import DISCRETE
+from d2rpick.errors import listing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -131,7 +132,7 @@ def _joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
     others = inventory.joined.get(row.id, {}) if inventory else {}
     if others:
         kinds = ", ".join(sorted(frozenset[str]().union(*others.values())))
-        yield f"joined to part {some_of(sorted(others))} ({kinds})"
+        yield f"joined to part {listing(sorted(others))} ({kinds})"
 
 
 def _to_keep(row: PartRow, fact: PartFacts | None, data: PartData | None, alone: int | None) -> Iterator[str]:

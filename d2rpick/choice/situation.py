@@ -84,7 +84,7 @@ class Situation:
 
         told, placement = self.settings.bodies, self.settings.placement
         return self.fits.once(
-            ("drift", *self.flight[:2]), lambda: bodies_in_flight(self.history, self.flight, told, placement)
+            ("drift", self.flight, told), lambda: bodies_in_flight(self.history, self.flight, told, placement)
         )
 
     def position_errors(self, times: Samples) -> Samples:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.errors import listing
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
 POOR_KINETIC_SHARE = 0.5
 # An E_plastic above this share of the vibration is worth a word: energy alone cannot tell it from a preload.
 _NOTABLE_PLASTIC = 0.05
+# Parts that a warning names of a rigid body; the JSON document has all.
+_NAMED = 10
 
 
 class Caution(NamedTuple):
@@ -107,9 +111,7 @@ def _not_predicted(told: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> s
 
 
 def _named(body: RigidBody) -> str:
-    from d2rpick.deck.inventory.model import some_of  # not above: without a deck no body has a name
-
-    return f"part {some_of(body.parts)}"
+    return f"part {listing(body.parts, most=_NAMED)}"
 
 
 def end_of_load(situation: Situation) -> str:

@@ -10,18 +10,19 @@ import click
 from d2rpick.cli import options as shared
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from d2rpick.choice.cost import CostModel
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.warnings import Caution
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
 
-DECK = click.option(
-    "--deck", metavar="DECK", type=shared.FILE,
-    help="Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): gives the cost of the parts, "
-    "and which of them become one rigid body.",
-)  # fmt: skip
-WEIGHTS = click.option(
+_DECK = (
+    "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): gives the cost of the parts, "
+    "and which of them become one rigid body"
+)
+_WEIGHTS = click.option(
     "--weights", metavar="FILE", type=shared.FILE,
     help="Cost of an element by formulation, as d2rpick calibrate writes it.  [default: measured with OpenRadioss]",
 )  # fmt: skip
@@ -29,7 +30,16 @@ WEIGHTS = click.option(
 
 def cost_options(function: shared.Decorated) -> shared.Decorated:
     """``--deck`` and ``--weights``; collected by ``with_deck``."""
-    return DECK(WEIGHTS(function))
+    return _deck(f"{_DECK}; `--part recommended` stands for the set that d2rpick parts recommends.")(_WEIGHTS(function))
+
+
+def model_options(function: shared.Decorated) -> shared.Decorated:
+    """``--deck`` and ``--weights`` of the command that recommends a set; collected by ``model_of``."""
+    return _deck(f"{_DECK}.")(_WEIGHTS(function))
+
+
+def _deck(text: str) -> Callable[[shared.Decorated], shared.Decorated]:
+    return click.option("--deck", metavar="DECK", type=shared.FILE, help=text)
 
 
 def model_of(options: dict[str, Any]) -> CostModel | None:
@@ -78,5 +88,7 @@ def with_cost(
     if merge is not None and history.parts:
         from d2rpick.flight.bodies import RigidBody
 
-        settings = replace(settings, bodies=(RigidBody(tuple(part.id for part in history.parts)),))
+        merged = tuple(sorted({part.id for part in history.parts} | {merge}))
+        told = any(body.whole for body in settings.bodies or ())  # a part alone may be of pieces
+        settings = replace(settings, bodies=(RigidBody(merged, whole=len(merged) > 1 or told),))
     return settings, cautions

@@ -8,7 +8,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli import typed
-from d2rpick.cli.deck_cost import cost_options, model_of
+from d2rpick.cli.deck_cost import model_of, model_options
 from d2rpick.cli.output import Output, finish, text_bytes
 from d2rpick.cli.progress import reading
 from d2rpick.cli.wording import in_words, with_options
@@ -27,7 +27,7 @@ Examples:
 
 
 @click.command("parts", epilog=EXAMPLES)
-@cost_options
+@model_options
 @click.option("--tr", type=shared.TIME, metavar="T", help="With --td: compare the sets in this window.")
 @click.option(
     "--td", type=shared.TIME, metavar="T",
@@ -79,7 +79,9 @@ def command(
         output.write(options["report"], text_bytes(with_options(as_page(found, typed.repeat()))))
     text = write("parts", output_format, found, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))
-    return finish(ctx, objection=model is not None and found.recommended is None, exit_zero=exit_zero)
+    # without a deck a table of parts promises no set
+    wanted = model is not None or output_format == "value" or not found.rows
+    return finish(ctx, objection=wanted and found.recommended is None, exit_zero=exit_zero)
 
 
 def _times(tr: float | None, td: float | None) -> Times | float | None:

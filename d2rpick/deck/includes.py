@@ -71,7 +71,8 @@ def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, .
     time = (factor.value if factor else 0.0) or 1.0
     problems = tuple((value.field, value.problem) for value in (*offsets, factor) if value and value.problem)
     scaled = any(one.value not in (0.0, 1.0) for one in factors)
-    moved = len(rows) > 3 and card.integer(rows[3], 0).value not in (0, None)
+    turn = card.integer(rows[3], 0) if len(rows) > 3 else None
+    moved = turn is not None and (bool(turn.problem) or turn.value != 0)  # what cannot be read may move them
     return Transform(node, part, material, set_, rest, time, scaled, moved), problems
 
 

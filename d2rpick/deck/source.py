@@ -110,9 +110,11 @@ class SourceFile:
             return io.BytesIO(self._content)
         try:
             stream = Path(self.name).open("rb")  # noqa: SIM115  it is given back
+        except FileNotFoundError:
+            raise DeckError(f"{self.name}: no such file; check the name and the folder") from None
         except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
             reason = getattr(error, "strerror", None) or error
-            raise DeckError(f"{self.name}: {reason}, a readable deck was expected") from None
+            raise DeckError(f"{self.name}: cannot be read ({reason}); check the name and the permissions") from None
         if stat.S_ISCHR(os.fstat(stream.fileno()).st_mode) and not stream.isatty():  # /dev/zero never ends
             stream.close()
             raise DeckError(f"{self.name}: this is a device, a readable deck was expected")

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, listing
 from d2rpick.histories.history import Precision, newest_states
-from d2rpick.histories.names import listing, quantity_of, resolve
+from d2rpick.histories.names import quantity_of, resolve
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.errors import FormatError, printable
+from d2rpick.errors import FormatError, listing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -230,9 +230,3 @@ def plain_text(raw: bytes) -> str:
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
     return "".join(letter if letter.isprintable() else " " for letter in text).strip()
-
-
-def listing(names: Sequence[object], most: int = 20) -> str:
-    """Names for a message, cut where it would fill the screen."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return printable(", ".join(map(str, names[:most]))) + more

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, listing
 from d2rpick.histories.companions import doubts
 from d2rpick.histories.history import History, Momenta, Track
-from d2rpick.histories.names import QUANTITIES, listing, quantity_note
+from d2rpick.histories.names import QUANTITIES, quantity_note
 from d2rpick.histories.selection import menu, select_parts
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.errors import FormatError
-from d2rpick.histories.names import listing, near_miss
+from d2rpick.errors import FormatError, listing
+from d2rpick.histories.names import near_miss
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

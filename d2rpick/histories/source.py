@@ -7,9 +7,9 @@ import re
 import sys
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, listing
 from d2rpick.histories.content import stored
-from d2rpick.histories.names import in_seconds, listing, near_miss
+from d2rpick.histories.names import in_seconds, near_miss
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -240,8 +240,9 @@ def suggest(
     weights : Weights or path, optional
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     **choosing
-        How to choose, see `Choosing`: ``after``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``,
-        ``oscillator`` with ``v0``, ``fit_window``, ``replay``, ``strict``, ``cost_share``, ``step_ratio``.
+        How to choose: ``after``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``, ``oscillator``
+        with ``v0``, ``fit_window``, ``replay``, ``strict``, ``cost_share``, ``step_ratio``; what they mean stands in
+        ``d2rpick.library.arguments.Choosing``.
 
     Returns
     -------

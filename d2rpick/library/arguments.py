@@ -108,13 +108,45 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
     """
     if value is None:
         return ()
-    listed = [value] if isinstance(value, str | int) else list(value)
+    from d2rpick.histories.history import Part
+
+    single = isinstance(value, str | int | Part)  # a Part holds its number and its title
+    listed = [value] if single else list(_each(name, value, "a number, a title or several"))
     for one in listed:
         if isinstance(one, bool) or not (isinstance(one, str) or hasattr(one, "__index__")):
             raise TypeError(f"{name} holds {one!r}; numbers and titles of parts were expected")
     if not listed:
         raise ValueError(f"{name} is empty; give a part, or leave {name} out")
     return tuple(str(one) for one in listed)
+
+
+def rule_ids(name: str, value: str | Iterable[str]) -> tuple[str, ...]:
+    """Give ids of rules or their beginnings; a string is one of them.
+
+    Examples
+    --------
+    >>> rule_ids("select", "D2R1"), rule_ids("ignore", ["D2R104", "D2R2"])
+    (('D2R1',), ('D2R104', 'D2R2'))
+    """
+    listed = [value] if isinstance(value, str) else list(_each(name, value, "ids of rules"))
+    for one in listed:
+        if not isinstance(one, str):
+            raise TypeError(f"{name} holds {one!r}; ids of rules were expected")
+    return tuple(listed)
+
+
+def whole(name: str, value: object, low: int) -> int:
+    """Give a whole number of at least ``low``.
+
+    Examples
+    --------
+    >>> whole("steps", 2.5, 1)
+    Traceback (most recent call last):
+    TypeError: steps is 2.5, a whole number was expected
+    """
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        raise TypeError(f"{name} is {value!r}, a whole number was expected")
+    return int(number(name, value, low))
 
 
 def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
@@ -125,7 +157,7 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
     >>> paths("source", "run/"), paths("source", ["glstat", "matsum"])
     (('run/',), ('glstat', 'matsum'))
     """
-    listed = [value] if isinstance(value, str | os.PathLike) else list(_each(name, value))
+    listed = [value] if isinstance(value, str | os.PathLike) else list(_each(name, value, "a path or several"))
     for one in listed:
         if not isinstance(one, str | os.PathLike):
             raise TypeError(f"{name} holds {one!r}; paths were expected")
@@ -167,7 +199,8 @@ def settings(choosing: Choosing, *, with_deck: bool = False) -> Settings:
     return Settings(**given, oscillator=to_mode(oscillator, v0) if oscillator else None)
 
 
-def _each(name: str, value: Iterable[Path]) -> Iterable[Path]:
+def _each(name: str, value: Any, expected: str) -> Iterable[Any]:
     if not hasattr(value, "__iter__"):
-        raise TypeError(f"{name} is {value!r}; a path or several were expected")
-    return value
+        raise TypeError(f"{name} is {value!r}; {expected} were expected")
+    found: Iterable[Any] = value
+    return found

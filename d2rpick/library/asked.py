@@ -83,10 +83,10 @@ def selection_for(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
     return run.chosen._replace(parts=names, flying=arguments.part_names("flying", flying))
 
 
-def check_run(run: Run) -> None:
+def check_run(run: Run, name: str = "run") -> None:
     """Raise TypeError for what is not a run that was read."""
     if not hasattr(run, "files"):
-        raise TypeError(f"run is {run!r}, what read() or from_frame() gives was expected")
+        raise TypeError(f"{name} is {run!r}, what read() or from_frame() gives was expected")
 
 
 def model_of(

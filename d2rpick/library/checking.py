@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.library import arguments
+from d2rpick.library.asked import check_run
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
 
@@ -33,6 +34,7 @@ class Findings(Document):
     findings: tuple[Finding, ...]
     windows: tuple[Window, ...] = field(repr=False)
     warnings: tuple[Caution, ...]
+    command: tuple[str, ...] = field(repr=False)
     _checked: tuple[Checked, ...] = field(repr=False)
     _history: tuple[str, ...] | None = field(repr=False)
 
@@ -41,9 +43,8 @@ class Findings(Document):
         from d2rpick.report.findings import Checks, as_json
         from d2rpick.report.keys import of_warnings
 
-        history = [text for name in self._history or () for text in ("--history", name)]
         checks = Checks(self._checked, warnings=of_warnings(self.warnings), history=self._history)
-        return as_json(checks, ("check", *history, *self.decks))
+        return as_json(checks, self.command)
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per finding, a column per key of ``findings`` in the JSON.
@@ -63,8 +64,8 @@ def check(
     decks: arguments.Path | Iterable[arguments.Path],
     *,
     history: Run | None = None,
-    select: Iterable[str] = (),
-    ignore: Iterable[str] = (),
+    select: str | Iterable[str] = (),
+    ignore: str | Iterable[str] = (),
     **choosing: Unpack[Choosing],
 ) -> Findings:
     """Find the switching cards of decks and check them, as ``d2rpick check`` does.
@@ -75,7 +76,7 @@ def check(
         Main decks; their includes are read with them.
     history : Run, optional
         By which the windows are judged: a run without switching.
-    select, ignore : strings
+    select, ignore : string or several
         Rules by id or its beginning; default: by the configuration nearest to the deck.
     **choosing
         How to judge, as for `suggest`.
@@ -93,6 +94,7 @@ def check(
     TypeError, ValueError
         If an argument is not of its kind.
     """
+    from d2rpick.library.repeat import options_of
     from d2rpick.rules import check_deck, configuration_for
     from d2rpick.rules.configuration import Configuration
 
@@ -102,14 +104,19 @@ def check(
     if history is not None:
         from d2rpick.rules.judgement import HistoryJudge
 
+        check_run(history, "history")
         judge = HistoryJudge(history.files, history.chosen, settings)
-    asked = Configuration(tuple(select), tuple(ignore))
+    asked = Configuration(arguments.rule_ids("select", select), arguments.rule_ids("ignore", ignore))
     checked = tuple(check_deck(name, configuration_for(name, asked), judge) for name in names)
+    files = [text for name in (history.sources if history else ()) for text in ("--history", name)]
+    rules = [text for name in ("select", "ignore") for one in getattr(asked, name) for text in (f"--{name}", one)]
+    judging = options_of(history.chosen, choosing) if history else ()
     return Findings(
         decks=names,
         findings=tuple(finding for one in checked for finding in one.findings),
         windows=tuple(window for one in checked for window in one.windows),
         warnings=tuple(judge.cautions) if judge else (),
+        command=("check", *files, *judging, *rules, *names),
         _checked=checked,
         _history=history.sources if history else None,
     )

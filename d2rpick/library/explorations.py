@@ -138,7 +138,7 @@ def explore(
 
     wanted = None if td is None else arguments.number("td", td)
     window = None if td_window is None else arguments.window("td_window", td_window)
-    count = int(arguments.number("steps", steps, 1))
+    count = arguments.whole("steps", steps, 1)
     asked = asked_of(run, parts, flying, deck, weights, choosing)
     core = explore_of(asked.reference, asked.settings, window, td=wanted, steps=count)
     core = core._replace(cautions=(*core.cautions, *asked.cautions))

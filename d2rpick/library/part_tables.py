@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.library import arguments
 from d2rpick.library.answers import written
 from d2rpick.library.asked import check_run, model_of
+from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
 from d2rpick.library.repeat import options_of
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class PartTable:
+class PartTable(Document):
     """Answer of `parts`; nothing of it changes.
 
     ``rows`` has every part with its ``verdict`` and ``reasons``, ``sets`` what is worth comparing, ``recommended`` the
@@ -42,12 +42,11 @@ class PartTable:
     command: tuple[str, ...] = field(repr=False)
     _core: Core = field(repr=False)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Give what ``-f json`` prints, by schema d2rpick/parts/1."""
+    def to_json(self) -> str:
+        """Give the JSON document of ``d2rpick parts``, schema d2rpick/parts/1."""
         from d2rpick.report.parts import as_json
 
-        found: dict[str, Any] = json.loads(as_json(self._core, self.command))
-        return found
+        return as_json(self._core, self.command)
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per part.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.library.arguments import Parts, Path
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """One run: its files, opened, and which columns of a table were named; nothing of it changes.
 
@@ -29,6 +29,9 @@ class Run:
 
     files: histories.Run
     chosen: Selection
+
+    def __repr__(self) -> str:
+        return f"Run({', '.join(map(repr, self.sources))})"
 
     @property
     def sources(self) -> tuple[str, ...]:
@@ -191,7 +194,7 @@ def from_frame(
     from d2rpick.histories.source import Source
 
     if not isinstance(frame, pd.DataFrame):
-        raise TypeError(f"frame is a {type(frame).__name__}, a pandas.DataFrame was expected")
+        raise TypeError(f"frame is of type {type(frame).__name__}, a pandas.DataFrame was expected")
     has_time = time is not None or any(is_time(str(column)) for column in frame.columns)
     text = frame.to_csv(index=not has_time, index_label="time")
     return _opened([Source(name, text.encode())], selection_of(time, energy, channels), "csv")

@@ -132,16 +132,15 @@ def study(
 
     if (td is None) == (td_window is None):
         raise TypeError("td or td_window was expected, and not both")
+    processes = arguments.whole("jobs", jobs, 1)
     asked = arguments.number("td", td) if td_window is None else arguments.window("td_window", td_window)
     names = find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
     selection = selection_of(time, energy, channels)._replace(
         parts=arguments.part_names("parts", parts), flying=arguments.part_names("flying", flying)
     )
     question = Question(asked, arguments.settings(choosing), selection, known_format(input_format), True)
-    if not (isinstance(jobs, int) and jobs > 0):
-        raise ValueError(f"jobs is {jobs!r}, a whole number of at least 1 was expected")
     rows: dict[int, StudyRow] = {}
-    with on_cores(min(jobs, len(names)), "d2rpick.studies.study") as farm:
+    with on_cores(min(processes, len(names)), "d2rpick.studies.study") as farm:
         for answer in answers(farm, partial(ask, question), names):
             row = failed(names[answer.number], answer.error) if answer.error else answer.result
             rows[answer.number] = replace(row, source=names[answer.number])

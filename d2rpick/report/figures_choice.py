@@ -23,6 +23,7 @@ from d2rpick.report.figures import (
     show_span,
 )  # fmt: skip
 from d2rpick.report.figures_page import arrange
+from d2rpick.report.situation import energy_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -112,7 +113,7 @@ def _draw_energy(
         known = span.end if span else situation.td  # without a contact, as far as it was seen
         end = known if flight.end is None else flight.end
         axes.axvspan(flight.start, end, color=FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
-    axes.plot(*drawn, color=REFERENCE, linewidth=1, label=plain(history.channel))
+    axes.plot(*drawn, color=REFERENCE, linewidth=1, label=plain(energy_name(history)))
     axes.axhline(level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
     for number, band in enumerate(merged(bands, (seen.end - seen.start) / STRETCHES)):
         label = "_" if number else "acceptable tr"

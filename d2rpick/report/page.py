@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.explorer import scripts, styles
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import Run
     from d2rpick.histories.source import Source
     from d2rpick.report.explorer import Explorer
+
+
+SIGNED: Final = ("chosen by", "date", "signature")  # lines of a page to be filled in by hand
 
 
 @dataclass(frozen=True)
@@ -46,9 +49,13 @@ class PageContext:
 
 def run_page(run: Run, sections: Iterable[Markup], explored: Explorer | None = None) -> str:
     """Write a page about one run; with what can be ``explored`` it runs a script."""
-    name = next((database.title for database in run.databases if database.title), "") or run.name
     needed = {"styles": styles(), "scripts": scripts()} if explored else {}
-    return document(f"Switch times: {name}", *sections, signed=("chosen by", "date", "signature"), **needed)
+    return document(f"Switch times: {title_of(run)}", *sections, signed=SIGNED, **needed)
+
+
+def title_of(run: Run) -> str:
+    """Title that the solver wrote, else the name of the file."""
+    return next((database.title for database in run.databases if database.title), "") or run.name
 
 
 def pair(title: str, times: tuple[float, float], told: Markup, history: History, class_: str) -> Markup:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from math import isinf
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.errors import printable
+from d2rpick.errors import listing, printable
 from d2rpick.report import keys, tables
 from d2rpick.version import __version__
 
@@ -209,7 +210,7 @@ def rows(found: Parts) -> list[list[tables.Cell]]:
             row.flight.deforms if row.flight else None,
             _percent(row.cost_share),
             _short(row.smallest_step),
-            _listed(row.shares_nodes),
+            None if row.shares_nodes is None else listing(row.shares_nodes, most=_MOST_SHOWN, between=","),
             "; ".join(row.reasons),
         ]
         for row in found.rows
@@ -222,7 +223,7 @@ def set_rows(found: Parts) -> list[list[tables.Cell]]:
         [
             "*" if one.recommended else " ",
             one.name,
-            _listed(one.parts, 20),
+            ranges(one.parts),
             one.elements,
             _percent(one.mass_fraction),
             _percent(one.cost_share),
@@ -256,8 +257,7 @@ def outlook(found: Parts) -> list[tuple[str, str]]:
         lines.append(("recommended", "no set"))
     else:
         bodies = "one rigid body" if len(best.bodies) == 1 else f"{len(best.bodies)} rigid bodies"
-        ids = ",".join(map(str, best.parts))
-        lines.append(("recommended", f"{best.name}: --part {ids} ({bodies})"))
+        lines.append(("recommended", f"{best.name}: --part {ranges(best.parts)} ({bodies})"))
         flights = len(found.facts.flights)
         where = f", rigid in the longest of {flights} flights alone" if flights > 1 else ""
         lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's{where}"))
@@ -276,11 +276,17 @@ def _counted(row: PartRow) -> str | None:
     return None if row.elements is None else ", ".join(f"{count} {kind}" for kind, count in row.elements.items())
 
 
-def _listed(ids: Sequence[int] | None, most: int = _MOST_SHOWN) -> str | None:
-    if ids is None:
-        return None
-    more = f" and {len(ids) - most} more" if len(ids) > most else ""
-    return ",".join(map(str, ids[:most])) + more
+def ranges(ids: Sequence[int]) -> str:
+    """Numbers of parts as ``--part`` takes them, three and more in a row as a range.
+
+    Examples
+    --------
+    >>> ranges([1, 2, 3, 5, 6, 12])
+    '1-3,5,6,12'
+    """
+    # in a row, number and place grow alike
+    groups = [[id_ for _, id_ in group] for _, group in groupby(enumerate(ids), lambda one: one[1] - one[0])]
+    return ",".join(f"{row[0]}-{row[-1]}" if len(row) > 2 else ",".join(map(str, row)) for row in groups)
 
 
 def _short(value: float | None) -> str | None:

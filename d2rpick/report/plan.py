@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.errors import printable
 from d2rpick.report import tables
-from d2rpick.report.situation import frame_of
+from d2rpick.report.situation import frame_of, what_was_read
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -107,11 +106,7 @@ def window(plan: Plan, row: Planned) -> dict[str, Any]:
 
 def heading(plan: Plan) -> str:
     """What was read."""
-    history = plan.history
-    unit = f" {history.time_unit}" if history.time_unit else ""
-    what = f"{', '.join(history.source)}: {history.format}, {history.channel}"
-    span = f"{history.time[0]:.6g} to {history.time[-1]:.6g}{unit}"
-    return printable(f"history   {what}, {history.time.size} states, {span}")
+    return f"history   {what_was_read(plan.history)}"
 
 
 def outlook(plan: Plan) -> list[tuple[str, str]]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.errors import printable
-from d2rpick.histories.names import listing
+from d2rpick.errors import listing, printable
 from d2rpick.report import keys
 from d2rpick.report.tables import measure
 from d2rpick.version import __version__
@@ -18,16 +17,27 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
 
-# Parts that a line names of those that fly together; the JSON document has all.
+# Parts that a line names of those that are switched or fly together; the JSON document has all.
 _NAMED = 5
 
 
 def read_line(history: History) -> str:
     """Say what was read."""
+    return f"history  {what_was_read(history)}"
+
+
+def what_was_read(history: History) -> str:
+    """Name files, format, energy and span of a history."""
     unit = f" {history.time_unit}" if history.time_unit else ""
-    what = f"{', '.join(history.source)}: {history.format}, {history.channel}"
+    what = f"{', '.join(history.source)}: {history.format}, {energy_name(history)}"
     span = f"{history.time[0]:.6g} to {history.time[-1]:.6g}{unit}"
-    return printable(f"history  {what}, {history.time.size} states, {span}")
+    return printable(f"{what}, {history.time.size} states, {span}")
+
+
+def energy_name(history: History) -> str:
+    """Name the energy; of many parts the first ones."""
+    parts = [part.title or f"part {part.id}" for part in history.parts or () if part not in history.springs]
+    return history.channel if len(parts) <= _NAMED else f"internal energy of {listing(parts, most=_NAMED)}"
 
 
 def heading(situation: Situation) -> list[str]:

@@ -101,6 +101,9 @@ COLUMNS: Final = (
 )
 
 
+_NOT_HALVED: Final = "has half of it and keeps half of the rigid time"
+
+
 def answer(found: TradeOff) -> str:
     """The shortest sensible answer in a sentence: how good the td asked for is, and what a step to another one changes.
 
@@ -116,7 +119,7 @@ def answer(found: TradeOff) -> str:
     what = f"{named}, {_error(start)}" if not found.asked else f"{named}: {_error(start)}"
     if step is None:
         small = start.error is not None and start.error <= EQUALLY_GOOD
-        return f"{what}; no other td in the window {'is better' if small else 'has half of it'}"
+        return f"{what}; no other td in the window {'is better' if small else _NOT_HALVED}"
     return f"{what}; {_away(start, step, unit)} {_less(start, step)} and {_cost(start, step)}"
 
 

@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.contacts import read_contacts, read_rigid_walls
+from d2rpick.errors import listing
 from d2rpick.rules.base import Example, Rule, Severity
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.contacts import Entities, Entity
     from d2rpick.deck.switching import Header
-    from d2rpick.rules.base import Case, Objection
+from d2rpick.rules.base import Case, Objection
 
 _OF_WALL: Final = {1, 3}
 _OF_CONTACT: Final = {2, 4}
@@ -63,8 +64,7 @@ def _listed(entities: Entities) -> str:
     texts = [
         f"{one.id or one.number} (*{one.keyword}{f' {one.title!r}' if one.title else ''})" for one in entities.found
     ]
-    more = f" and {len(texts) - _MOST_LISTED} more" if len(texts) > _MOST_LISTED else ""
-    return ", ".join(texts[:_MOST_LISTED]) + more
+    return listing(texts, most=_MOST_LISTED)
 
 
 def _delay(case: Case) -> Iterator[Objection]:

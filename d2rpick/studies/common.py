@@ -9,7 +9,7 @@ import numpy as np
 from d2rpick.choice.acceptable_windows import common_windows, coverage
 from d2rpick.choice.error_profile import error_at
 from d2rpick.choice.ranking import EQUALLY_GOOD
-from d2rpick.histories.names import listing
+from d2rpick.errors import listing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -13,8 +13,7 @@ from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows,
 from d2rpick.choice.error_profile import error_profile
 from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.warnings import Caution
-from d2rpick.errors import D2RPickError, RangeError
-from d2rpick.histories.names import listing
+from d2rpick.errors import D2RPickError, RangeError, listing
 from d2rpick.histories.outline import outline
 from d2rpick.histories.selection import Selection
 from d2rpick.histories.source import expand

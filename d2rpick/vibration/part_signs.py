@@ -145,10 +145,10 @@ def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Signed
 def _no_sign(lasting: Samples, deformation: Samples, zeros: Samples) -> str | None:
     """Say why a deformation, whose states last so long, is none that swings about zero."""
     if zeros.size < 2:
-        return "its energy does not return to zero: it is preloaded, has yielded or vibrates in many modes"
+        return "the energy does not return to zero: preloaded, yielded or vibrating in many modes"
     off, size = abs(float(lasting @ deformation)), float(lasting @ np.abs(deformation))
     if off > _MOST_OFF_CENTRE * size:
-        return f"its deformation would vibrate about {off / size:.2g} of its mean size: it is preloaded or has yielded"
+        return f"the deformation would vibrate about {off / size:.2g} of its mean size: preloaded or yielded"
     return None
 
 

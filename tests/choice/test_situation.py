@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.examine import examine
+from d2rpick.choice.of_run import read
 from d2rpick.choice.settings import Settings
+from d2rpick.flight.bodies import RigidBody
+from d2rpick.histories.opening import Selection
+from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.moments import Moments
 from tests import chain, paper
 from tests.energies import rollover
@@ -46,3 +50,14 @@ def test_from_another_td_the_same_evidence_is_seen() -> None:
     assert there.evidence is situation.evidence
     assert there.kinetic_share == pytest.approx(0.0, abs=1e-9)
     assert situation.at(paper.TD) is situation
+
+
+@pytest.mark.parametrize("order", [(0.42, 0.3), (0.3, 0.42)])
+def test_how_bodies_drift_is_known_in_the_flight_whatever_td_was_seen_before(order: tuple[float, float]) -> None:
+    """Behind the flight, at 0.42, it is the same flight that is nearest, but nothing flies."""
+    history = read(["sample_data/rollover_box.matsum"], Selection(parts=("all",))).history
+    fits, settings = Fits(), Settings(bodies=(RigidBody((1,)), RigidBody((2,))))
+    seen = {td: examine(history, td, settings, fits) for td in order}
+    assert len({situation.flight[:2] for situation in seen.values()}) == 1
+    open_ = {td: situation.bodies.unknown for td, situation in seen.items() if situation.bodies}
+    assert open_ == {0.42: settings.bodies, 0.3: ()}

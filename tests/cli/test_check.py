@@ -130,7 +130,7 @@ def test_a_deck_that_cannot_be_read_does_not_hide_the_others(form: str) -> None:
     place("a.k", COARSE)
     result = run("check", "absent.k", "a.k", "-f", form)
     assert result.exit_code == 1
-    assert result.stderr == "d2rpick: absent.k: No such file or directory, a readable deck was expected\n"
+    assert result.stderr == "d2rpick: absent.k: no such file; check the name and the folder\n"
     assert "D2R111" in result.stdout
     assert "absent.k" in result.stdout or form == "table"
     valid(form, result.stdout)

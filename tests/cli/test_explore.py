@@ -72,6 +72,16 @@ def test_the_sentence_says_what_a_step_changes() -> None:
     assert good == "td = 0.0687534: residual 0.000; no other td in the window is better"
 
 
+def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so() -> None:
+    found = answer("explore", "--td", "0.37", "--part", "box", MATSUM)
+    (start,) = (one for one in found["offers"] if one["td"] == 0.37)
+    halved = [one for one in found["offers"] if one["error"] is not None and one["error"] <= start["error"] / 2]
+    assert halved
+    assert max(one["rigid_time"] for one in halved) < start["rigid_time"] / 2
+    assert found["step"] is None
+    assert found["answer"].endswith("; no other td in the window has half of it and keeps half of the rigid time")
+
+
 def test_every_form_has_the_same_offers(tmp_path: Path) -> None:
     found = answer("explore", *WINDOW, ENERGY)["offers"]
     rows = list(csv.DictReader(io.StringIO(run("explore", *WINDOW, "-f", "csv", ENERGY).stdout)))

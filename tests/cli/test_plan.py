@@ -122,7 +122,7 @@ def test_nothing_to_recommend_is_an_objection(history: list[str]) -> None:
         (("--before", BOX, BOX), "name its windows with --done"),
         (("-f", "card", ENERGY), "needs --part"),
         (("--node", "3", ENERGY), "is about the card"),
-        (("--done", "nowhere.txt", BOX), "nowhere.txt"),
+        (("--done", "nowhere.txt", BOX), "nowhere.txt: no such file; check the name and the folder"),
         (("--min-rigid", "-1", BOX), "at least 0"),
     ],
 )

@@ -150,6 +150,14 @@ def test_a_lead_part_makes_one_body_with_a_deck_and_without(deck: str, tmp_path:
         assert best["position_error_assumes"] is None
 
 
+@pytest.mark.parametrize(("lead", "known"), [("1", False), ("99", False), ("1", True)])
+def test_a_lead_part_does_not_tell_whether_the_part_hangs_together(tmp_path: Path, lead: str, known: bool) -> None:
+    """Nor how a lead that is not among the parts moves against them."""
+    merged = ("--merge", lead, "--report", str(tmp_path / "page.html"), *(("--deck", str(DECK)) if known else ()))
+    found = answer("suggest", "--td", "0.37", "--part", "1", *merged, "sample_data/rollover_box.matsum")
+    assert {one["position_error"] for one in found["candidates"] if one["tr"] > 0.1} == {0.0 if known else None}
+
+
 def test_cards_merge_the_bodies_of_the_deck(deck: str) -> None:
     asked = ("suggest", "-q", "--td", "0.1464", "-f", "card", "--solver", "ls-dyna", "--deck", deck, car())
     apart = run(*asked, "--part", "12-14").stdout

@@ -189,6 +189,18 @@ def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(tmp_pa
     assert found.to_frame()["tr"].tolist() == d2.suggest(d2.from_frame(table), td=0.37).to_frame()["tr"].tolist()
 
 
+@pytest.mark.parametrize("asked", [{"select": "D2R2", "tolerance": 0.1}, {"ignore": ["D2R203", "D2R1"]}, {}])
+def test_a_check_names_the_command_that_repeats_it(asked: dict[str, Any]) -> None:
+    found = d2.check(DECK, history=d2.read(ENERGY, energy="internal_energy"), **asked)
+    assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
+    kept = [rule for rule in ("D2R202", "D2R203") if rule not in asked.get("ignore", ())]
+    assert found.to_frame()["rule"].tolist() == kept
+
+
+def test_a_run_is_shown_by_its_files() -> None:
+    assert repr(d2.read(ENERGY)) == f"Run({ENERGY!r})"
+
+
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
@@ -207,6 +219,7 @@ def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(tmp_pa
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, v0=6.0), ValueError, "oscillator and v0 go together"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[]), ValueError, "parts is empty"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[1.5]), TypeError, "parts holds 1.5"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, parts=d2.read(BOX).parts[0]), TypeError, r"parts holds Part\(id=1,"),
         (lambda: loose.suggest(ENERGY, 0.06), TypeError, "run is .*, what read"),
         (lambda: loose.suggest(d2.read(ROLLOVER, energy="boxIE_J"), 0.3, parts=1), ValueError, "exclude each other"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, weights="a.toml"), ValueError, "weights needs a deck"),
@@ -223,8 +236,13 @@ def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(tmp_pa
         (lambda: loose.plan(d2.read(BOX), deck="a\0b"), ValueError, "deck holds .* with a NUL byte"),
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, step_ratio=0.5, cost_share=1), ValueError, "at least 1 was"),
         (lambda: loose.read(ENERGY, input_format="exel"), ValueError, "input_format is 'exel', one of auto, binout"),
-        (lambda: loose.from_frame([1, 2]), TypeError, "frame is a list"),
+        (lambda: loose.from_frame([1, 2]), TypeError, "frame is of type list"),
         (lambda: loose.study([ENERGY], 0.06, jobs=0), ValueError, "jobs is 0"),
+        (lambda: loose.study([ENERGY], 0.06, jobs=1.5), TypeError, "jobs is 1.5, a whole number was expected"),
+        (lambda: loose.explore(d2.read(ENERGY), steps=2.5), TypeError, "steps is 2.5, a whole number was expected"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, parts=1.5), TypeError, "parts is 1.5; a number, a title or several"),
+        (lambda: loose.check(DECK, history=ENERGY), TypeError, "history is .*, what read"),
+        (lambda: loose.check(DECK, select=5), TypeError, "select is 5; ids of rules were expected"),
         (lambda: loose.suggest(d2.read(ENERGY), 9), d2.RangeError, "lies outside the record"),
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, parts=1), d2.D2RPickError, "a table has no parts"),
         (lambda: loose.check("absent.k"), d2.DeckError, "absent.k"),

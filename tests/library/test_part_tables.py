@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -20,6 +21,7 @@ BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 def test_the_same_as_the_command() -> None:
     found = d2.parts(d2.read(BOX), deck=DECK, td=0.37)
     assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
+    assert json.loads(found.to_json()) == found.to_dict()
     assert found.recommended is not None
     assert found.to_frame()["verdict"].tolist() == ["switch", "merge", "keep"]
     sets = found.sets_frame()
@@ -32,7 +34,10 @@ def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
     found = d2.parts(d2.read(BOX), deck=DECK, weights=Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0), step_ratio=2.0)
     assert found.rows[0].cost_share == pytest.approx(94 / 109)
     assert d2.parts(d2.read(BOX), deck=DECK, given=2).sets[-1].parts == (2,)
-    assert "all that may" in found.report(tmp_path / "parts.html").read_text("utf-8")
+    page = found.report(tmp_path / "parts.html").read_text("utf-8")
+    assert "all that may" in page
+    assert "<h1>Parts to switch: rollover box</h1>" in page
+    assert "<span>signature</span>" in page
 
 
 def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:

@@ -232,7 +232,7 @@ def test_the_rollover_has_no_signs_and_says_why() -> None:
     assert answer.situation.basis == "energy"
     best = answer.candidates[0]
     assert (best.sign_match, best.residual, best.part_mismatch, best.parts) == (None, None, None, ())
-    assert any("box, step: its energy does not return to zero" in note for note in best.notes)  # one reason, said once
+    assert any("box, step: the energy does not return to zero" in note for note in best.notes)  # one reason, said once
 
 
 def test_several_energies_are_carried_but_for_those_that_are_always_zero() -> None:

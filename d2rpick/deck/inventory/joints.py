@@ -28,9 +28,13 @@ if TYPE_CHECKING:
 _PART_ID, _NODE_SET = 3, 4  # SSTYP, MSTYP
 # Keywords that hold parts together too, by the first words of their names.
 _OTHER_TIES: Final = (
-    *("CONSTRAINED_TIED_NODES_FAILURE", "CONSTRAINED_SPR2", "CONSTRAINED_SPR3", "CONSTRAINED_INTERPOLATION_SPOTWELD"),
-    *("CONSTRAINED_SHELL_TO_SOLID", "CONSTRAINED_NODE_SET"),
+    *("CONSTRAINED_TIED_NODES_FAILURE", "CONSTRAINED_TIE-BREAK", "CONSTRAINED_SPR2", "CONSTRAINED_SPR3"),
+    *("CONSTRAINED_INTERPOLATION", "CONSTRAINED_NODE_INTERPOLATION", "CONSTRAINED_LINEAR", "CONSTRAINED_POINTS"),
+    *("CONSTRAINED_MULTIPLE_GLOBAL", "CONSTRAINED_SHELL_TO_SOLID", "CONSTRAINED_NODE_SET"),
+    *(f"CONSTRAINED_{one}_IN_SOLID" for one in ("BEAM", "SHELL", "SOLID", "LAGRANGE")),
 )
+# The same of Radioss, by the first word.
+_OTHER_OF_RADIOSS: Final = ("RBE2", "RBE3", "RLINK", "MPC")
 _CONSTRAINTS: Final = ("CONSTRAINED_NODAL_RIGID_BODY", "CONSTRAINED_EXTRA_NODES")
 
 
@@ -110,23 +114,26 @@ def of_radioss(starter: Starter, cards: Sequence[tuple[Card, tuple[str, ...]]]) 
     surfaces = {whole(words[-1]): card for card, words in cards if words[:2] == ("SURF", "PART") and words[2:]}
     found, unknown = [], []
     for card, words in cards:
-        if words[:2] == ("INTER", "TYPE2"):
-            tie = _of_interface(card, starter, surfaces)
-            found += [tie] if tie else []
-            unknown += [] if tie else [f"/{'/'.join(words)} ({card.file}:{card.line})"]
+        interface = words[:2] == ("INTER", "TYPE2")
+        tie = _of_interface(card, starter, surfaces) if interface else None
+        if tie:
+            found.append(tie)
+        elif interface or (words and words[0] in _OTHER_OF_RADIOSS):
+            unknown.append(f"/{'/'.join(words)} ({card.file}:{card.line})")
     return Joints(tuple(found), tuple(unknown))
 
 
 def _of_interface(card: Card, starter: Starter, surfaces: dict[int, Card]) -> Held | None:
     rows = [row for row in card.rows if not row.blank]
     group, surface = (card.integer(rows[1], at).value for at in range(2)) if len(rows) > 1 else (0, 0)
-    members, main = starter.group_members(group), frozenset(_listed(surfaces.get(surface)))
+    members = starter.group_members(group)
+    main = frozenset(_listed(surfaces[surface]) if surface in surfaces else ())
     if members is None or len(main) != 1:
         return None
     return Held("tied interface", frozenset(members[0]), frozenset(members[1]) | main)
 
 
-def _listed(card: Card | None) -> Iterator[int]:
+def _listed(card: Card) -> Iterator[int]:
     """Ids below the title of a surface."""
-    for row in [row for row in card.rows if not row.blank][1:] if card else ():
-        yield from (value for at in range(10) if (value := card.integer(row, at).value) > 0) if card else ()
+    for row in [row for row in card.rows if not row.blank][1:]:
+        yield from (value for at in range(10) if (value := card.integer(row, at).value) > 0)

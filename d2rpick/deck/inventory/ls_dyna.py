@@ -12,10 +12,11 @@ import numpy as np
 
 from d2rpick.deck.inventory import formulations, joints
 from d2rpick.deck.inventory.columns import is_cut, layout, lines_of
-from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of, some_of
+from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.rows import LONG
 from d2rpick.deck.sections import NOT_TURNED
+from d2rpick.errors import listing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -132,7 +133,7 @@ def _notes(deck: Deck, cards: Sequence[Card], elements: Sequence[Elements], part
         yield f"{deck.path}: the main deck ends within its mesh, without *END; is it cut?"
     unknown = sorted({int(part) for one in elements for part in np.unique(one.part)} - parts.materials.keys())
     if unknown:
-        yield f"elements of part {some_of(unknown)}, which no *PART of the deck defines"
+        yield f"elements of part {listing(unknown)}, which no *PART of the deck defines"
     if lost:
         yield f"{lost} nodes of elements are not in any *NODE of the deck"
 

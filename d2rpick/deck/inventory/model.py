@@ -271,12 +271,6 @@ class Inventory:
         return mask
 
 
-def some_of(ids: Sequence[int], most: int = 10) -> str:
-    """Ids for a message, cut where there are many."""
-    more = f" and {len(ids) - most} more" if len(ids) > most else ""
-    return ", ".join(map(str, ids[:most])) + more
-
-
 def _distinct(values: Places) -> Places:
     """Give the distinct values, ascending; by sorting, which is quicker here than by a table of hashes."""
     ordered = np.sort(values, axis=None)

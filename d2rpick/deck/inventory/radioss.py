@@ -12,10 +12,11 @@ import numpy as np
 from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.inventory import formulations, joints
 from d2rpick.deck.inventory.columns import is_cut, layout, lines_of
-from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of, some_of
+from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of
 from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
 from d2rpick.deck.radioss.legs import find_run_windows
 from d2rpick.deck.radioss.starter import WITHOUT_FRAME
+from d2rpick.errors import listing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -129,7 +130,7 @@ def _notes(
         yield "ids of a //SUBMODEL may be moved, which is not followed"
     unknown = sorted({int(part) for one in elements for part in np.unique(one.part)} - starter.parts.keys())
     if unknown:
-        yield f"elements of part {some_of(unknown)}, which no /PART of the deck defines"
+        yield f"elements of part {listing(unknown)}, which no /PART of the deck defines"
     if lost:
         yield f"{lost} nodes of elements are not in any /NODE of the deck"
 

@@ -11,12 +11,11 @@ from functools import cached_property
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, listing
 from d2rpick.histories.database import DIGITS, SolverFile
 from d2rpick.histories.formats.binout_branch import Branch
 from d2rpick.histories.formats.lsda import Lsda, recognises
 from d2rpick.histories.history import Part
-from d2rpick.histories.names import listing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, listing
 from d2rpick.histories.formats.binout_states import Group, States
-from d2rpick.histories.names import listing, plain_text
+from d2rpick.histories.names import plain_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

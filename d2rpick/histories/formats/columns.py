@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from d2rpick.errors import FormatError
-from d2rpick.histories.names import internal_energies, is_time, listing, near_miss, normalised, refuse_other_quantity
+from d2rpick.errors import FormatError, listing
+from d2rpick.histories.names import internal_energies, is_time, near_miss, normalised, refuse_other_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, listing
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.columns import internal_energy, labelled, named_column, own_times, time_column
 from d2rpick.histories.formats.curves import Curves, find_curves
@@ -24,7 +24,7 @@ from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, sp
 from d2rpick.histories.formats.order import not_a_restart
 from d2rpick.histories.formats.table_values import checked_values, line_of, plain_values
 from d2rpick.histories.formats.text import UTF16, Text
-from d2rpick.histories.names import listing, quantity_of
+from d2rpick.histories.names import quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -187,7 +187,10 @@ class Table:
         return self._read[column]
 
     def _no_parts(self) -> FormatError:
-        return FormatError(f"{self.source}: a table has no parts; choose its columns with `energy`")
+        return FormatError(
+            f"{self.source}: a table has no parts; choose its columns with `energy`, "
+            "or give the matsum, binout or T01 of the run"
+        )
 
 
 def _kept(values: Samples) -> Samples:

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, listing
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.layout import as_number
 from d2rpick.histories.formats.order import not_a_restart
-from d2rpick.histories.names import internal_energies, is_time, listing, refuse_other_quantity, resolve, unit_of
+from d2rpick.histories.names import internal_energies, is_time, refuse_other_quantity, resolve, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -204,7 +204,10 @@ class Curves:
         return listing([f"{number} {name!r}" for number, name in enumerate(self.channels, 1)])
 
     def _no_parts(self) -> FormatError:
-        return FormatError(f"{self.source}: curves are not parts; choose them with `energy`")
+        return FormatError(
+            f"{self.source}: curves are not parts; choose them with `energy`, "
+            "or give the matsum, binout or T01 of the run"
+        )
 
 
 def _curveplot(found: _Found) -> bool:

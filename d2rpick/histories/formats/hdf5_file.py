@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError, printable
+from d2rpick.errors import FormatError, listing, printable
 from d2rpick.histories.database import DIGITS, SolverFile
 from d2rpick.histories.formats.hdf5_columns import Column, columns_of, finite
 from d2rpick.histories.formats.hdf5_damage import check_file, check_size
@@ -300,8 +300,7 @@ def _only(fitting: Sequence[Column], columns: Sequence[Column], what: str, sourc
 
 
 def _listed(columns: Sequence[Column]) -> str:
-    shown = printable(", ".join(f"{column.path} ({column.size})" for column in columns[:_MANY]))
-    return (shown or "there is none") + (f" and {len(columns) - _MANY} more" if len(columns) > _MANY else "")
+    return listing([f"{column.path} ({column.size})" for column in columns], most=_MANY) or "there is none"
 
 
 @contextmanager

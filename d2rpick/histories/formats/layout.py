@@ -8,9 +8,9 @@ from itertools import islice
 from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, listing
 from d2rpick.histories.formats.text import HEAD
-from d2rpick.histories.names import is_time, is_unit, listing, unit_of
+from d2rpick.histories.names import is_time, is_unit, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

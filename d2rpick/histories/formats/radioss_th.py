@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import FormatError, listing
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.database import DIGITS, SolverFile
 from d2rpick.histories.history import Part
-from d2rpick.histories.names import listing, plain_text
+from d2rpick.histories.names import plain_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -80,6 +80,10 @@ def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) ->
         ("*CONTACT_TIED_NODES_TO_SURFACE_MPP\n" + wide(0) + wide(7, 9, 3, 3), "MPP"),
         ("*CONSTRAINED_NODAL_RIGID_BODY\n" + wide(1, 0, 77), "nodal rigid body"),  # of a set that is not there
         ("*CONSTRAINED_SPR2\n" + wide(7, 9), "*CONSTRAINED_SPR2"),
+        ("*CONSTRAINED_INTERPOLATION\n" + wide(1, 2, 123456), "*CONSTRAINED_INTERPOLATION"),
+        ("*CONSTRAINED_BEAM_IN_SOLID_ID\n" + wide(1), "*CONSTRAINED_BEAM_IN_SOLID_ID"),
+        ("*CONSTRAINED_LINEAR_GLOBAL\n" + wide(1), "*CONSTRAINED_LINEAR_GLOBAL"),
+        ("*CONSTRAINED_TIE-BREAK\n" + wide(1, 2), "*CONSTRAINED_TIE-BREAK"),
     ],
 )
 def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(tmp_path: Path, text: str, told: str) -> None:
@@ -114,3 +118,12 @@ def test_tied_interfaces_of_radioss(
     assert len(read.ties) == (0 if joined else 1)
     assert {part: {*others} for part, others in read.joined.items()} == (joined or {})
     assert bool(bodies_of(read, [1, 2])) == bool(joined)
+
+
+@pytest.mark.parametrize("keyword", ["RBE2", "RBE3", "RLINK", "MPC"])
+def test_other_ties_of_radioss_leave_the_bodies_open(tmp_path: Path, keyword: str) -> None:
+    tie = f"/{keyword}/1\ntie\n{rad.wide(4, 0, 0, 5)}"
+    read = rad.inventory(tmp_path, rad.nodes(12) + RADIOSS + rad.PROPS + tie)
+    assert [one.split()[0] for one in read.ties] == [f"/{keyword}/1"]
+    assert bodies_of(read, [1, 2]) == ()
+    assert read.complete

@@ -103,6 +103,7 @@ MESH = f"{ls_dyna.HEAD}*NODE\n{ls_dyna.nodes()}{SHELL}"
         (f"{MESH}*PART_MOVE\n         7       1.0\n*END\n", False),
         (f"{ls_dyna.HEAD}*INCLUDE_TRANSFORM\nmesh.k\n\n\n\n         0\n*END\n", True),
         (f"{ls_dyna.HEAD}*INCLUDE_TRANSFORM\nmesh.k\n\n\n\n         3\n*END\n", False),
+        (f"{ls_dyna.HEAD}*INCLUDE_TRANSFORM\nmesh.k\n\n\n\n     &turn\n*END\n", False),  # not known, so not at rest
     ],
 )
 def test_where_a_deck_moves_its_nodes_no_part_is_placed(tmp_path: Path, text: str, placed: bool) -> None:
