@@ -195,6 +195,7 @@ ROWS = (
     Row("narrow window / --td, end of the load unknown", choosing("open_window_to_td"), most=3.0),
     Row("wide window / --td, clean oscillator", choosing("window_to_td", "clean", "wide"), most=3.0),
     Row("explore / --td, noise, 1e5 states", choosing("explore_to_td", "noisy", "0.9", "--after", "0.1"), most=10.0),
+    Row("explore / --td, noise, end of the load unknown", choosing("explore_to_td", "noisy", "0.9"), most=10.0),
     Row(
         "explore / --td, most noise before the flight",
         choosing("explore_to_td", "noisy", "0.9", "--after", "0.8"),

@@ -7,6 +7,7 @@ import pytest
 
 from d2rpick.choice import candidates
 from d2rpick.choice.candidates import candidates_of, find_candidates
+from d2rpick.choice.ranking import rank
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.suggest_td import looking
@@ -111,3 +112,13 @@ def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together(mon
     monkeypatch.setattr(candidates, "_MOST", 15)
     assert [one[:] for one in candidates_of(situations)] == alone
     assert list(candidates_of([])) == []
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.8])
+def test_a_candidate_alone_is_the_one_among_all(noise: float) -> None:
+    clean = vibration()
+    energy = clean.energy + noise * np.random.default_rng(1).random(clean.energy.size)
+    found = rank(find_candidates(looking(of(energy, clean.time), PLAIN)(3.2)))
+    assert len(found) > 3
+    assert [found[i] for i in range(len(found))] == list(found) == list(found[:])
+    assert (found[-1], found[1:3]) == (found[:][-1], found[:][1:3])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.vibration.fit_one import VIBRATION, Pencil, fails, fit
+from d2rpick.vibration.fit_one import VIBRATION, Pencil, fails, fit, hopeless
 from d2rpick.vibration.identify import HOPELESS, identify, identify_several
 from d2rpick.vibration.one_mode import energy_and_jacobian
 from d2rpick.vibration.structure import MAX_STRUCTURE, structure_of, surely_structured
@@ -38,6 +38,22 @@ def test_a_part_of_the_samples_refuses_only_what_all_of_them_refuse(scatter: flo
             assert quick.describes_record == full.describes_record
             if full.describes_record:
                 assert (quick.mode, quick.rms) == (full.mode, full.rms)
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize(("preload", "plastic"), [(0.0, 0.0), (0.0, 2.0), (0.7, 0.3), (4.0, 0.0)])
+def test_no_single_oscillator_is_hopeless_and_five_modes_are(preload: float, plastic: float, scatter: float) -> None:
+    def gives_up(energy: np.ndarray) -> bool:
+        noisy = energy / np.ptp(energy) + scatter * float(np.std(energy / np.ptp(energy))) * noise(S.size)
+        return hopeless(Pencil.of(S, noisy).rates(), S, noisy, HOPELESS)
+
+    assert not any(
+        gives_up(plastic + (preload + np.exp(-S / 2) * np.sin(rate * S + phase)) ** 2)
+        for rate in (9.0, 40.0, 300.0)
+        for phase in (0.0, 1.0, 2.0)
+    )
+    rates = 2 * np.pi * np.array([15.5, 28.5, 46.5, 69.5, 106.0])
+    assert gives_up(np.sum(np.sin(rates[:, np.newaxis] * S + np.arange(5)[:, np.newaxis]) ** 2, axis=0))
 
 
 def test_a_fit_that_leaves_another_mode_fails_early() -> None:
