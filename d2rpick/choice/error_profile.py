@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 
 # What a straight line between two points may be off by [-]: half of the last digit that is shown.
 _EXACT: Final = 5e-4
-# Halvings of an interval in which the error is no straight line: a parabola is one to a four-thousandth of itself then.
-_HALVINGS: Final = 6
+# Halvings of an interval in which the error is no straight line: the root of an energy that falls to zero is one to a
+# four-thousandth then, a parabola much sooner.
+_HALVINGS: Final = 20
 
 
 def error_profile(situation: Situation, candidates: Candidates, windows: Samples) -> Samples:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows, clear_of_td, common_windows, coverage
@@ -88,6 +88,7 @@ def test_windows_of_an_oscillator_hold_what_verifies(
     check(answer, seed)
 
 
+@example(energy=[0, 1, 0, -1, 1], share=1.0, tolerance=1.0, after=0.0, seed=60, uneven=False, margin=0.0)
 @settings(max_examples=60)
 @given(
     energy=st.lists(st.floats(-1, 100), min_size=5, max_size=60), share=st.floats(0.3, 1.0),
