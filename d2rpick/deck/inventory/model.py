@@ -219,7 +219,8 @@ class Inventory:
             first = np.repeat(one[:, :1], one.shape[1], axis=1)
             rows.append(np.searchsorted(nodes, first[at, other]))
             columns.append(np.searchsorted(nodes, one[at, other]))
-        joined = np.concatenate(rows), np.concatenate(columns)
+        # older versions of scipy take no wider numbers; a part has fewer nodes
+        joined = np.concatenate(rows).astype(np.int32), np.concatenate(columns).astype(np.int32)
         links = coo_array((np.ones(joined[0].size, bool), joined), shape=(nodes.size, nodes.size))
         return int(connected_components(links, directed=False, return_labels=False))
 
