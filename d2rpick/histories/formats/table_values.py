@@ -42,19 +42,21 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
     if piece.isspace() or b'"' in piece:
         return None  # numpy warns of the one, and a separator in quotes is none
     whole = piece.decode("latin-1")  # no other character than those of latin-1 belongs to a number
-    lines, taken, chosen = whole.split("\n")[:-1], [*range(layout.columns)], None
-    if layout.separator and not (sorted(used) == taken and not lines[0].endswith(layout.separator)):
+    taken, chosen = [*range(layout.columns)], None
+    first = whole[: whole.index("\n")]
+    if layout.separator and not (sorted(used) == taken and not first.endswith(layout.separator)):
         # otherwise numpy sees to it that each row has its cells
-        marks = _separators(piece, layout)
-        if marks is None:
+        rows = _separators(piece, layout)
+        if rows is None:
             return None
+        starts, marks = rows
         closed = marks.shape[1] == layout.columns
         taken = sorted({0, *used})  # a comment would show in the first column
-        if taken[-1] < layout.columns - 1:  # what follows is not taken apart
-            starts = np.cumsum([0, *(len(line) + 1 for line in lines[:-1])]).tolist()
-            cuts = marks[:, taken[-1]].tolist()
-            lines = [whole[start:cut] for start, cut in zip(starts, cuts, strict=True)]
         chosen = taken if closed or len(taken) < layout.columns else None
+    if taken[-1] < layout.columns - 1:  # what follows is not taken apart
+        lines = [whole[start:cut] for start, cut in zip(starts.tolist(), marks[:, taken[-1]].tolist(), strict=True)]
+    else:
+        lines = whole.split("\n")[:-1]
     try:
         table = np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=chosen)
     except ValueError:
@@ -64,8 +66,8 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
     return table if taken == [*used] else table[:, np.searchsorted(taken, used)]
 
 
-def _separators(piece: bytes, layout: Layout) -> NDArray[np.intp] | None:
-    """Places of the separators of each row, of shape (rows, k); None unless all rows have their number of cells."""
+def _separators(piece: bytes, layout: Layout) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
+    """Places of the rows (n,) and of their separators (n, k); None unless all rows have their number of cells."""
     assert layout.separator
     signs = np.frombuffer(piece, np.uint8)
     marks, ends = np.flatnonzero(signs == ord(layout.separator)), np.flatnonzero(signs == ord("\n"))
@@ -75,7 +77,8 @@ def _separators(piece: bytes, layout: Layout) -> NDArray[np.intp] | None:
         return None
     table = marks.reshape(-1, each)
     alike = np.all(table[:, -1] < ends) and np.all(table[1:, 0] > ends[:-1])
-    return table if alike and (not closed or np.all(table[:, -1] == ends - 1)) else None
+    whole = alike and (not closed or np.all(table[:, -1] == ends - 1))
+    return (np.append(0, ends[:-1] + 1), table) if whole else None
 
 
 def checked_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Samples:
