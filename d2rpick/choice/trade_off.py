@@ -95,6 +95,8 @@ def explore_of(
     situations = [look(time) for time in np.unique([*times, *named]).tolist()]
     offers = [replace(one, recommended=one.td == chosen) for one in _marked([*offers_of(situations, peaks)])]
     asked = next((one for one in offers if one.td == td), None)
+    if td is not None and look(td).in_flight:
+        situation = look(td)  # the energy alone shows another flight to each td: the one that suggest names is shown
     start = asked or max(filter(_found, offers), key=lambda one: one.rigid_time or 0.0, default=None)
     return TradeOff(
         situation=situation,

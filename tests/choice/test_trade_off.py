@@ -121,3 +121,16 @@ def test_candidates_before_the_flight_never_change_what_is_best(
     assert best_of(situation, flying) == best_of(situation, every)
     if situation.basis == "energy":
         assert sorted(flying.tr) == sorted(every.tr[every.tr >= after])
+
+
+def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
+    """The energy alone shows another flight to each td; that of the window's start was shown."""
+    time = np.linspace(0.0, 1.0, 2001)
+    energy = np.exp(-6 * time) * np.sin(250 * time) ** 2 + 0.4 * np.exp(-3 * time) * np.sin(611 * time) ** 2
+    history = History(time, energy + 5 * np.exp(-(((time - 0.01) / 0.006) ** 2)), ("made",), "made", "energy")
+    asked = Settings(replay=False)
+    alone = suggest(history, 0.37, asked).situation.flight
+    assert alone.source == "energy"
+    found = explore_of(reference(history), asked, (0.27, 1.0), td=0.37, steps=4)
+    assert found.situation.flight == alone
+    assert explore_of(reference(history), asked, (0.27, 1.0), steps=4).situation.flight != alone
