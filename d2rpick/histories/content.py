@@ -29,6 +29,7 @@ _WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will
 _HELD: Final = 1 << 24  # a file up to this size is held in memory
 _TRIES: Final = 5  # readings of a small file that changes all the time
 _TICK: Final = 50_000_000  # [ns] above the resolution of any file's times: later changes show in them
+_PAUSE: Final = 0.05  # [s] for a write that may be under way: until it ends, half of it stands in the file
 
 
 class Content:
@@ -67,8 +68,8 @@ def content_of(data: bytes | Content) -> Content:
 class OnDisk(Content):
     """Bytes of a file that are read when they are asked for.
 
-    What was read is remembered by sums: where the file has changed since, all of it is read again and compared, so
-    that no numbers of two different states of the file come together.
+    What was read is remembered by sums: where the file has changed since or a moment before, all of it is read again
+    after a pause and compared, so that no numbers of two different states of the file come together.
 
     Parameters
     ----------
@@ -203,6 +204,8 @@ class OnDisk(Content):
         now = _State.of(self._file)
         if now == self._seen and now.settled:
             return
+        time.sleep(_PAUSE)
+        now = _State.of(self._file)
         if now.size < self._size or not self._is_as_before():
             raise FormatError(
                 f"{self._name}: the file was rewritten while it was read; read it again when it is complete"
@@ -238,6 +241,7 @@ def stored(name: str) -> bytes | OnDisk:
             before, data = _State.of(file), file.read()
             if before.settled and before == _State.of(file):
                 return data
+            time.sleep(_PAUSE)
             file.seek(0)
             if file.read(len(data)) == data:
                 return data

@@ -124,10 +124,11 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, 
 
 @pytest.mark.parametrize("kept", [True, False], ids=["in memory", "on disk"])
 def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_an_error(
-    kept: bool, tmp_path: Path, request: pytest.FixtureRequest
+    kept: bool, tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not kept:
         request.getfixturevalue("on_disk")
+    monkeypatch.setattr(content, "_PAUSE", 0.005)  # ten times as long as between two of the writes
     file, done = tmp_path / "glstat", Event()
     file.write_bytes(ONE)
 
@@ -152,6 +153,30 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
     finally:
         done.set()
         writer.join()
+
+
+@pytest.mark.parametrize("kept", [True, False], ids=["in memory", "on disk"])
+@pytest.mark.parametrize("share", [0.001, 0.5, 0.999])
+def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_stands(
+    kept: bool, share: float, tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not kept:
+        request.getfixturevalue("on_disk")
+    file, written = tmp_path / "glstat", int(share * len(ONE))
+    file.write_bytes(OTHER[:written] + ONE[written:])
+
+    def write_the_rest(_: float) -> None:
+        with file.open("r+b", buffering=0) as target:
+            target.seek(written)
+            target.write(OTHER[written:])
+
+    monkeypatch.setattr("d2rpick.histories.content.time.sleep", write_the_rest)
+    try:
+        energy = read_history([str(file)]).energy
+    except FormatError as error:
+        assert "rewritten" in str(error)  # noqa: PT017
+    else:
+        assert energy.tolist() == (2000.0 + STATES).tolist()
 
 
 def test_a_small_file_that_changes_later_is_signed_as_it_was_read(tmp_path: Path) -> None:
