@@ -51,6 +51,13 @@ class Content:
         """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
         return self._data.find(wanted, begin)
 
+    def rfind(self, wanted: bytes, end: int) -> int:
+        """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
+        return self._data.rfind(wanted, 0, end)
+
+    def check(self) -> None:
+        """Make sure that what was read so far is all of one state of the file; FormatError where it is not."""
+
     def view(self, begin: int, end: int) -> Bytes:
         """Bytes from one address to another, shape (end - begin,)."""
         return np.frombuffer(self._data, np.uint8)[begin:end]
@@ -104,7 +111,7 @@ class OnDisk(Content):
         if len(data) < self._size:
             raise self._shortened()
         self._views.extend((0, self._size, _sum(np.frombuffer(data, np.uint8))))
-        self._check()
+        self.check()
         return data
 
     def __getitem__(self, where: slice) -> bytes:
@@ -125,10 +132,19 @@ class OnDisk(Content):
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
         """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
-        for at in range(begin, self._size, _BLOCK):
-            found = self[at : at + _BLOCK + len(wanted) - 1].find(wanted)
+        for at in range(begin, self._size, _NEAR):
+            found = self[at : at + _NEAR + len(wanted) - 1].find(wanted)
             if found >= 0:
                 return at + found
+        return -1
+
+    def rfind(self, wanted: bytes, end: int) -> int:
+        """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
+        for stop in range(end, 0, -_NEAR):
+            first = max(0, stop - _NEAR)
+            found = self[first:stop].rfind(wanted)
+            if found >= 0:
+                return first + found
         return -1
 
     def view(self, begin: int, end: int) -> Bytes:
@@ -146,7 +162,7 @@ class OnDisk(Content):
             return found
         found = self._in_order(addresses, width)
         self._fields.append((addresses, width, _sum(found.ravel())))
-        self._check()
+        self.check()
         return found
 
     def _near(self, begin: int, end: int) -> Bytes:
@@ -179,7 +195,7 @@ class OnDisk(Content):
             digest = hashlib.sha256()
             for begin in range(0, self._size, _BLOCK):
                 digest.update(self.view(begin, min(begin + _BLOCK, self._size)).data)
-            self._check()
+            self.check()
             self._digest = digest.hexdigest()
         return self._digest
 
@@ -199,8 +215,8 @@ class OnDisk(Content):
             "is a solver writing it anew? Read it again when it has"
         )
 
-    def _check(self) -> None:
-        """Make sure that what was read so far is all of one state of the file."""
+    def check(self) -> None:
+        """Make sure that what was read so far is all of one state of the file; FormatError where it is not."""
         now = _State.of(self._file)
         if now == self._seen and now.settled:
             return
