@@ -140,8 +140,8 @@ class OnDisk(Content):
 
     def rfind(self, wanted: bytes, end: int) -> int:
         """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
-        for stop in range(end, 0, -_NEAR):
-            first = max(0, stop - _NEAR)
+        for stop in range(end, 0, -_WINDOW):
+            first = max(0, stop - _WINDOW)
             found = self[first:stop].rfind(wanted)
             if found >= 0:
                 return first + found
