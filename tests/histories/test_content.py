@@ -128,7 +128,7 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
 ) -> None:
     if not kept:
         request.getfixturevalue("on_disk")
-    monkeypatch.setattr(content, "_PAUSE", 0.005)  # ten times as long as between two of the writes
+    monkeypatch.setattr("d2rpick.file_state.PAUSE", 0.005)  # ten times as long as between two of the writes
     file, done = tmp_path / "glstat", Event()
     file.write_bytes(ONE)
 
@@ -170,7 +170,7 @@ def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_st
             target.seek(written)
             target.write(OTHER[written:])
 
-    monkeypatch.setattr("d2rpick.histories.content.time.sleep", write_the_rest)
+    monkeypatch.setattr("d2rpick.file_state.time.sleep", write_the_rest)
     try:
         energy = read_history([str(file)]).energy
     except FormatError as error:
