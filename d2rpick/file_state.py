@@ -1,4 +1,4 @@
-"""Files that others may be writing: what tells that one has changed, and what one held at a single moment."""
+"""Files that others may be writing: what tells that one has changed, and whether a change would show."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 if TYPE_CHECKING:
     from io import FileIO
 
-_TRIES: Final = 5  # looks at a file that changes all the time
+TRIES: Final = 5  # looks at a file that changes all the time
 _TICK: Final = 50_000_000  # [ns] above the resolution of any file's times: later changes show in them
 PAUSE: Final = 0.05  # [s] for a write that may be under way: until it ends, half of it stands in the file
 
@@ -54,25 +54,11 @@ def is_regular(file: FileIO) -> bool:
 
 def settled_state(file: FileIO) -> FileState | None:
     """State of a file in which a later change will show; None where it changes all the time."""
-    for _ in range(_TRIES):
+    for _ in range(TRIES):
         found = FileState.of(file)
         if found.settled:
             return found
         pause()
         if FileState.of(file).is_as(found):
             return found
-    return None
-
-
-def snapshot(file: FileIO) -> bytes | None:
-    """Bytes that a file held at one moment, or its first ones then; None where it changes all the time."""
-    for _ in range(_TRIES):
-        file.seek(0)
-        before, data = FileState.of(file), file.read()
-        if before.settled and before == FileState.of(file):
-            return data
-        pause()
-        file.seek(0)
-        if file.read(len(data)) == data:
-            return data
     return None

@@ -27,12 +27,14 @@ BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # of UTF-8
 def find_marks(file: Held | OnDisk) -> MutableSequence[int]:
     """Offsets of the ``*`` that begin a line (blanks before it allowed) and of encrypted blocks, ascending."""
     shares = _SHARES if file.size >= _SHARED else 1
-    bounds = [file.size * share // shares for share in range(shares + 1)]
-    helpers = [_Helper(partial(_between, file, *share)) for share in pairwise(bounds[1:])]
+    first = len(BYTE_ORDER_MARK) if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK else 0
+    bounds = [first + (file.size - first) * share // shares for share in range(shares + 1)]
+    searches = [partial(_between, file, first, *share) for share in pairwise(bounds)]
+    helpers = [_Helper(search) for search in searches[1:]]
     for helper in helpers:
         helper.start()
     try:
-        found = _between(file, 0, bounds[1])
+        found = searches[0]()
     finally:
         for helper in helpers:
             helper.join()
@@ -59,14 +61,13 @@ class _Helper(Thread):
         return self._search() if self._found is None else self._found
 
 
-def _between(file: Held | OnDisk, begin: int, end: int) -> MutableSequence[int]:
+def _between(file: Held | OnDisk, first: int, begin: int, end: int) -> MutableSequence[int]:
+    """Search a part of a file that begins at ``first``."""
     found = _room_for_marks(file)
     with file.opened() as read:
         for at in range(begin, end, _PIECE):
-            low = max(0, at - _LOOKBACK)
+            low = max(first, at - _LOOKBACK)
             piece = read(low, min(at + _PIECE, end))
-            if low == 0 and piece.startswith(BYTE_ORDER_MARK):
-                piece = piece.replace(BYTE_ORDER_MARK, b"\n" * len(BYTE_ORDER_MARK), 1)
             found.extend(low + place for place in sorted([*_starred(piece, at - low), *_encrypted(piece, at - low)]))
     return found
 

@@ -67,7 +67,7 @@ class SourceFile:
 
     def pieces(self, start: int, end: int | None = None) -> Iterator[bytes]:
         """Read the bytes from ``start`` to ``end`` or the end of the file in pieces of whole lines."""
-        end = self._file.size if end is None else end
+        end = min(self._file.size, self._file.size if end is None else end)
         size = _PIECE
         while start < end:
             piece = self.read(start, min(start + size, end))

@@ -8,12 +8,11 @@ cut off, the system ends the process.
 
 from __future__ import annotations
 
-import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import DeckError
-from d2rpick.file_state import FileState, is_endless, is_regular, settled_state, snapshot
+from d2rpick.file_state import FileState, is_endless, is_regular, settled_state
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -102,15 +101,11 @@ def stored(name: str) -> Held | OnDisk:
             raise DeckError(f"{name}: this is a device, a readable deck was expected")
         if not is_regular(file):
             return Held(file.read())
-        if os.fstat(file.fileno()).st_size <= _HELD:
-            data = snapshot(file)
-            if data is not None:
-                return Held(data)
-        else:
-            state = settled_state(file)
-            if state is not None:
-                return OnDisk(name, state)
-    raise DeckError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+        state = settled_state(file)
+    if state is None:
+        raise DeckError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+    on_disk = OnDisk(name, state)
+    return Held(on_disk.read(0, state.size)) if state.size <= _HELD else on_disk
 
 
 def _opened(name: str) -> FileIO:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.file_state import FileState, is_endless, is_regular, pause, snapshot
+from d2rpick.file_state import TRIES, FileState, is_endless, is_regular, pause
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -231,10 +231,16 @@ def stored(name: str) -> bytes | OnDisk:
             return file.read()
         if os.fstat(file.fileno()).st_size > _HELD:
             return OnDisk(name, os.dup(file.fileno()))
-        data = snapshot(file)
-    if data is None:
-        raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
-    return data
+        for _ in range(TRIES):
+            file.seek(0)
+            before, data = FileState.of(file), file.read()
+            if before.settled and before == FileState.of(file):
+                return data
+            pause()
+            file.seek(0)
+            if file.read(len(data)) == data:
+                return data
+    raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
 
 
 def _sum(data: Bytes) -> int:
