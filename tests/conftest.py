@@ -12,8 +12,8 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 from hypothesis import settings
 
+from d2rpick import file_state
 from d2rpick.choice import examine, explored
-from d2rpick.histories import content
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.identify import Identification, identify, identify_several
 
@@ -41,4 +41,4 @@ vars(examine).update(identify=remembered(identify), identify_several=remembered(
 # Pages explore few td: what they show of each is the same.
 vars(explored).update(STEPS=5, _LEAST=5)
 # Most tests read what they have just written: that no write is under way is sure without waiting for it.
-vars(content).update(_PAUSE=0.0)
+vars(file_state).update(PAUSE=0.0)

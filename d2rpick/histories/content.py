@@ -8,15 +8,15 @@ mapped into memory: where a mapped page is cut off, the system ends the process.
 from __future__ import annotations
 
 import os
-import stat
 import time
 from functools import cache
 from io import FileIO
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.errors import FormatError
+from d2rpick.file_state import COARSE, FileState, is_endless, is_regular, pause, snapshot
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,11 +28,6 @@ _BLOCK: Final = 1 << 19  # bytes read at a time where many are wanted: they stay
 _NEAR: Final = 1 << 13  # bytes between two that are read together: a call of the system costs more than these
 _WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, mostly behind them
 _HELD: Final = 1 << 24  # a file up to this size is held in memory
-_TRIES: Final = 5  # readings of a small file that changes all the time
-_TICK: Final = 50_000_000  # [ns] above the resolution of most files' times: later changes show in them
-_COARSE: Final = 2_000_000_000  # [ns] the resolution of the others, which give whole seconds
-_SLOWEST: Final = 5  # [ns] for a byte that is written: the times of a file are those when its last write began
-_PAUSE: Final = 0.05  # [s] for a write that may be under way: until it ends, half of it stands in the file
 _WORDS: Final = 1 << 13  # summed up at a time: their weights stay in the cache
 _MIX: Final = 0x9E3779B97F4A7C15
 
@@ -96,7 +91,7 @@ class OnDisk(Content):
 
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
-        self._seen = _State.of(self._file)
+        self._seen = FileState.of(self._file)
         self._size = self._seen.size
         self._views = array("Q")  # begin, end and sum of what was looked at
         self._fields: list[tuple[Addresses, int, int]] = []  # addresses, width and sum of what was taken
@@ -194,7 +189,7 @@ class OnDisk(Content):
             digest = hashlib.sha256()
             for begin in range(0, self._size, _BLOCK):
                 digest.update(self.view(begin, min(begin + _BLOCK, self._size)).data)
-            self.check(at_rest_for=_COARSE)
+            self.check(at_rest_for=COARSE)
             self._digest = digest.hexdigest()
         return self._digest
 
@@ -219,13 +214,13 @@ class OnDisk(Content):
 
         ``at_rest_for``: read it again if the last change is more recent, whether or not one was seen [ns].
         """
-        now = _State.of(self._file)
+        now = FileState.of(self._file)
         if now == self._seen and now.settled and time.time_ns() - now.changed >= at_rest_for:
             return
-        if not now.settled and now[:3] != self._awaited:  # else a pause was made since the last write began
-            time.sleep(_PAUSE)
-            self._awaited = now[:3]
-            now = _State.of(self._file)
+        if not now.settled and now[:-1] != self._awaited:  # else a pause was made since the last write began
+            pause()
+            self._awaited = now[:-1]
+            now = FileState.of(self._file)
         if now.size < self._size or not self._is_as_before():
             raise FormatError(
                 f"{self._name}: the file was rewritten while it was read; read it again when it is complete"
@@ -249,40 +244,16 @@ def stored(name: str) -> bytes | OnDisk:
         If a small file changes all the time, or it is a device.
     """
     with open(name, "rb", buffering=0) as file:  # noqa: PTH123
-        found = os.fstat(file.fileno())
-        if stat.S_ISCHR(found.st_mode) and not file.isatty():  # /dev/zero and /dev/full never end
+        if is_endless(file):
             raise FormatError(f"{name}: this is a device; a file, a pipe or a terminal was expected")
-        if not stat.S_ISREG(found.st_mode):
+        if not is_regular(file):
             return file.read()
-        if found.st_size > _HELD:
+        if os.fstat(file.fileno()).st_size > _HELD:
             return OnDisk(name, os.dup(file.fileno()))
-        for _ in range(_TRIES):
-            file.seek(0)
-            before, data = _State.of(file), file.read()
-            if before.settled and before == _State.of(file):
-                return data
-            time.sleep(_PAUSE)
-            file.seek(0)
-            if file.read(len(data)) == data:
-                return data
-    raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
-
-
-class _State(NamedTuple):
-    """What tells whether a file has changed; ``settled`` when no write is under way and one after it would show."""
-
-    size: int
-    modified: int
-    changed: int
-    settled: bool
-
-    @classmethod
-    def of(cls, file: FileIO) -> _State:
-        found, now = os.fstat(file.fileno()), time.time_ns()
-        # Of the two times the modification can be set, to one in the future too, which would never be past.
-        latest = max(found.st_ctime_ns, found.st_mtime_ns if found.st_mtime_ns <= now else 0)
-        room = _TICK + _SLOWEST * found.st_size + (0 if latest % 1_000_000_000 else _COARSE)
-        return cls(found.st_size, found.st_mtime_ns, found.st_ctime_ns, now - latest > room)
+        data = snapshot(file)
+    if data is None:
+        raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+    return data
 
 
 def _sum(data: Bytes) -> int:

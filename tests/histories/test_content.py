@@ -134,7 +134,7 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
 ) -> None:
     if not kept:
         request.getfixturevalue("on_disk")
-    monkeypatch.setattr(content, "_PAUSE", 0.005)  # ten times as long as between two of the writes
+    monkeypatch.setattr("d2rpick.file_state.PAUSE", 0.005)  # ten times as long as between two of the writes
     file, done = tmp_path / "glstat", Event()
     file.write_bytes(ONE)
 
@@ -176,7 +176,7 @@ def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_st
             target.seek(written)
             target.write(OTHER[written:])
 
-    monkeypatch.setattr("d2rpick.histories.content.time.sleep", write_the_rest)
+    monkeypatch.setattr("d2rpick.file_state.time.sleep", write_the_rest)
     try:
         energy = read_history([str(file)]).energy
     except FormatError as error:
@@ -245,8 +245,9 @@ def fixed_times(monkeypatch: pytest.MonkeyPatch, modified: int, changed: int) ->
     now, fstat = time.time_ns(), os.fstat
 
     def found(number: int) -> SimpleNamespace:
-        size, mode = fstat(number).st_size, fstat(number).st_mode
-        return SimpleNamespace(st_size=size, st_mode=mode, st_mtime_ns=now - modified, st_ctime_ns=now - changed)
+        really = fstat(number)
+        kept = {name: getattr(really, name) for name in ("st_dev", "st_ino", "st_size", "st_mode")}
+        return SimpleNamespace(**kept, st_mtime_ns=now - modified, st_ctime_ns=now - changed)
 
     monkeypatch.setattr(os, "fstat", found)
     monkeypatch.setattr(time, "sleep", pauses.append)
@@ -302,7 +303,8 @@ def test_times_in_whole_seconds_hide_the_changes_of_two(tmp_path: Path, monkeypa
     monkeypatch.setattr(time, "sleep", lambda _: None)
     here = time.time_ns() // 10**9 * 10**9 + 10**9 // 2
     monkeypatch.setattr(time, "time_ns", lambda: here)
-    times = SimpleNamespace(st_size=len(ONE), st_mode=file.stat().st_mode)
+    there = file.stat()
+    times = SimpleNamespace(st_dev=there.st_dev, st_ino=there.st_ino, st_size=there.st_size, st_mode=there.st_mode)
     times.st_mtime_ns = times.st_ctime_ns = here - 3 * 10**9 // 2
     monkeypatch.setattr(os, "fstat", lambda _: times)
     there = opened(file)
