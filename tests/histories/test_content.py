@@ -303,8 +303,8 @@ def test_times_in_whole_seconds_hide_the_changes_of_two(tmp_path: Path, monkeypa
     monkeypatch.setattr(time, "sleep", lambda _: None)
     here = time.time_ns() // 10**9 * 10**9 + 10**9 // 2
     monkeypatch.setattr(time, "time_ns", lambda: here)
-    there = file.stat()
-    times = SimpleNamespace(st_dev=there.st_dev, st_ino=there.st_ino, st_size=there.st_size, st_mode=there.st_mode)
+    found = file.stat()
+    times = SimpleNamespace(st_dev=found.st_dev, st_ino=found.st_ino, st_size=found.st_size, st_mode=found.st_mode)
     times.st_mtime_ns = times.st_ctime_ns = here - 3 * 10**9 // 2
     monkeypatch.setattr(os, "fstat", lambda _: times)
     there = opened(file)
