@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.cli.test_output import FORMATS, check_by_schema
+from tests.cli.test_output import FORMATS
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, codes, run
+from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
     from collections.abc import Callable

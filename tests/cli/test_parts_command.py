@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.choice.test_calibrate import run_folder
-from tests.cli.test_output import check_by_schema
 from tests.command import ROOT, answer, run
+from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
 
 if TYPE_CHECKING:
