@@ -79,9 +79,7 @@ def command(
         output.write(options["report"], text_bytes(with_options(as_page(found, typed.repeat()))))
     text = write("parts", output_format, found, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))
-    # without a deck a table of parts promises no set
-    wanted = model is not None or output_format == "value" or not found.rows
-    return finish(ctx, objection=wanted and found.recommended is None, exit_zero=exit_zero)
+    return finish(ctx, objection=found.recommended is None, exit_zero=exit_zero)
 
 
 def _times(tr: float | None, td: float | None) -> Times | float | None:

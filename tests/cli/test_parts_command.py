@@ -41,10 +41,10 @@ def test_all_forms_hold_the_same() -> None:
     assert found["recommended"]["parts"] == [1, 2]
 
 
-def test_a_set_that_is_asked_for_alone_and_not_there_is_an_objection() -> None:
+def test_without_a_set_to_take_every_form_is_an_objection() -> None:
     without_deck = run("parts", "-q", "-f", "value", BOX)
     assert (without_deck.exit_code, without_deck.stdout) == (1, "")
-    assert run("parts", "-q", BOX).exit_code == 0  # the table promises none
+    assert {run("parts", "-q", "-f", form, BOX).exit_code for form in ("table", "json", "csv", "markdown")} == {1}
     no_parts = run("parts", ENERGY)
     assert no_parts.exit_code == 1
     assert "give the matsum, binout or T01 of the run" in no_parts.stderr
