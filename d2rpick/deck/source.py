@@ -65,6 +65,13 @@ class SourceFile:
             stream.seek(start)
             yield from stream
 
+    def ends_with_line(self) -> bool:
+        """Whether the last line has its line end; an empty file has."""
+        with self._open() as stream:
+            size = stream.seek(0, io.SEEK_END)
+            stream.seek(max(0, size - 1))
+            return stream.read() in (b"", b"\n")
+
     def line_at(self, offset: int) -> int:
         """Return the number of the line, from 1, that holds the byte at ``offset``."""
         known = bisect_right(self._counted, (offset, 1 << 62)) - 1

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.deck.cut import cuts, holds_mesh
 from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.inventory import formulations, joints
-from d2rpick.deck.inventory.columns import is_cut, layout, lines_of
+from d2rpick.deck.inventory.columns import layout, lines_of
 from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of
 from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
 from d2rpick.deck.radioss.legs import find_run_windows
@@ -119,11 +120,7 @@ def _notes(
     for card, words in cards:
         if words and words[0] in _NOT_COUNTED:
             yield f"{card.file}:{card.line}: elements of /{'/'.join(words)} are not followed"
-        if words and words[0] in {*_KINDS, "NODE"} and card.block.end is None:
-            if is_cut(card.block):
-                yield f"{card.file}: the file ends within a line of its mesh; is it cut?"
-            elif card.file == starter.sources[0].name:
-                yield f"{card.file}: the starter deck ends within its mesh, without /END; is it cut?"
+    yield from (f"{block.source.name}: {told}" for block, told in cuts(run.deck) if holds_mesh(block))
     for unread in run.deck.unread:
         yield f"{unread.name.file}:{unread.name.line}: {unread.name.text} was not read: {unread.reason}"
     if starter.moved:
