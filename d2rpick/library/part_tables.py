@@ -10,7 +10,7 @@ from d2rpick.library.answers import written
 from d2rpick.library.asked import check_run, model_of
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import options_of
+from d2rpick.library.repeat import asking
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -136,7 +136,7 @@ def parts(
     )  # fmt: skip
     named = [(f"--{name}", repr(value)) for name, value in (("tr", tr), ("td", td)) if value is not None]
     window = [text for pair in named for text in pair]
-    command = ("parts", *options, *window, *options_of(run.chosen._replace(parts=names), choosing), *run.sources)
+    command = ("parts", *options, *window, *asking(run, run.chosen._replace(parts=names), choosing))
     return PartTable(run, core.rows, core.sets, core.recommended, core.cautions, command, core)
 
 

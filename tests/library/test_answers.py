@@ -189,6 +189,24 @@ def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(tmp_pa
     assert found.to_frame()["tr"].tolist() == d2.suggest(d2.from_frame(table), td=0.37).to_frame()["tr"].tolist()
 
 
+def test_the_format_that_was_named_is_in_the_command_that_repeats_it(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    file.write_text(f"*Time{Path(ENERGY).read_text()[4:]}")  # by its content this may be a deck
+    reading: Any = {"time": "*Time", "input_format": "csv"}
+    with pytest.raises(d2.D2RPickError, match="this is a deck"):
+        d2.read(file, time="*Time")
+    run, td = d2.read(file, **reading), float(TD)
+    answers: list[Any] = [d2.suggest(run, td), d2.verify(run, 0.0135867, td), d2.explore(run, steps=2), d2.plan(run)]
+    for found in (*answers, d2.study([file], td, **reading), d2.check(DECK, history=run)):
+        same(found.to_dict(), answer(*found.command))
+    assert "--input-format" not in d2.suggest(d2.read(ENERGY), td).command
+
+
+def test_numbers_of_numpy_stand_in_the_command_as_numbers() -> None:
+    found = d2.suggest(d2.read(ENERGY), np.float64(TD), margin=np.float64(0.001), tolerance=1)
+    same(found.to_dict(), answer(*found.command))
+
+
 @pytest.mark.parametrize("asked", [{"select": "D2R2", "tolerance": 0.1}, {"ignore": ["D2R203", "D2R1"]}, {}])
 def test_a_check_names_the_command_that_repeats_it(asked: dict[str, Any]) -> None:
     found = d2.check(DECK, history=d2.read(ENERGY, energy="internal_energy"), **asked)
