@@ -120,18 +120,16 @@ def parts(
     >>> [row.title for row in d2.parts(d2.read("sample_data/rollover_box.matsum")).rows]
     ['box', 'step']
     """
-    from d2rpick.choice.part_sets import parts_of
+    from d2rpick.choice.part_sets import given_parts, parts_of
     from d2rpick.histories.printed_steps import printed_steps
-    from d2rpick.histories.selection import select_parts
 
     check_run(run)
     settings = arguments.settings(choosing, with_deck=True)
     times = _times(tr, td)
     names = arguments.part_names("given", given)
     model, options = model_of(deck, weights)
-    wanted = select_parts(names, run.parts, run.files.name) if names else ()
     core = parts_of(
-        run.files, settings, model, given=[part.id for part in wanted], times=times,
+        run.files, settings, model, given=given_parts(run.files, names), times=times,
         printed=printed_steps(run.files, *options[1:2]),  # beside the deck
     )  # fmt: skip
     named = [(f"--{name}", repr(value)) for name, value in (("tr", tr), ("td", td)) if value is not None]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import groupby
 from math import isinf
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.errors import listing, printable
+from d2rpick.errors import in_rows, listing, printable
 from d2rpick.report import keys, tables
 from d2rpick.version import __version__
 
@@ -277,16 +276,14 @@ def _counted(row: PartRow) -> str | None:
 
 
 def ranges(ids: Sequence[int]) -> str:
-    """Numbers of parts as ``--part`` takes them, three and more in a row as a range.
+    """Numbers of parts as ``--part`` takes them.
 
     Examples
     --------
     >>> ranges([1, 2, 3, 5, 6, 12])
     '1-3,5,6,12'
     """
-    # in a row, number and place grow alike
-    groups = [[id_ for _, id_ in group] for _, group in groupby(enumerate(ids), lambda one: one[1] - one[0])]
-    return ",".join(f"{row[0]}-{row[-1]}" if len(row) > 2 else ",".join(map(str, row)) for row in groups)
+    return ",".join(in_rows(ids))
 
 
 def _short(value: float | None) -> str | None:

@@ -41,6 +41,12 @@ def test_all_forms_hold_the_same() -> None:
     assert found["recommended"]["parts"] == [1, 2]
 
 
+@pytest.mark.parametrize("word", ["flying", "all"])
+def test_a_set_to_compare_may_be_named_by_what_its_parts_do(word: str) -> None:
+    found = answer("parts", "--part", word, BOX)
+    assert [(one["name"], one["parts"]) for one in found["sets"]] == [("given", [1, 2])]
+
+
 def test_without_a_set_to_take_every_form_is_an_objection() -> None:
     without_deck = run("parts", "-q", "-f", "value", BOX)
     assert (without_deck.exit_code, without_deck.stdout) == (1, "")
@@ -81,6 +87,7 @@ def test_the_page_holds_parts_and_sets(tmp_path: Path) -> None:
         (("--deck", BOX, BOX), "no keyword was found"),
         (("--energy", "1", BOX), "--energy names one energy"),
         (("--part", "77", *WITH_DECK), "no part 77"),
+        (("--part", "recommended", *WITH_DECK), "name a set that it is compared with"),
         (("--weights", str(DECK), *WITH_DECK), "TOML file of weights was expected"),
     ],
 )

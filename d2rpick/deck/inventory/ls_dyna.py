@@ -17,7 +17,7 @@ from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.rows import LONG
 from d2rpick.deck.sections import NOT_TURNED
-from d2rpick.errors import listing
+from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -129,7 +129,7 @@ def _notes(deck: Deck, cards: Sequence[Card], elements: Sequence[Elements], part
     yield from (f"{block.source.name}: {told}" for block, told in cuts(deck) if holds_mesh(block))
     unknown = sorted({int(part) for one in elements for part in np.unique(one.part)} - parts.materials.keys())
     if unknown:
-        yield f"elements of part {listing(unknown)}, which no *PART of the deck defines"
+        yield f"elements of {name_units(unknown)}, which no *PART of the deck defines"
     if lost:
         yield f"{lost} nodes of elements are not in any *NODE of the deck"
 

@@ -17,7 +17,7 @@ from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData
 from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
 from d2rpick.deck.radioss.legs import find_run_windows
 from d2rpick.deck.radioss.starter import WITHOUT_FRAME
-from d2rpick.errors import listing
+from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -127,7 +127,7 @@ def _notes(
         yield "ids of a //SUBMODEL may be moved, which is not followed"
     unknown = sorted({int(part) for one in elements for part in np.unique(one.part)} - starter.parts.keys())
     if unknown:
-        yield f"elements of part {listing(unknown)}, which no /PART of the deck defines"
+        yield f"elements of {name_units(unknown)}, which no /PART of the deck defines"
     if lost:
         yield f"{lost} nodes of elements are not in any /NODE of the deck"
 
