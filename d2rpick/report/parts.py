@@ -25,6 +25,13 @@ SET_HEAD = (
     "", "set", "parts", "elements", "mass", "saved of a step", "step grows", "tr", "td", "run time", "saved",
     "out of place", "turned [deg]",
 )  # fmt: skip
+# Columns of the sets, and of the parts in two tables: as many as a screen and a sheet hold side by side.
+SETS = ("set", "parts", "saved of a step", "tr", "td", "run time", "saved", "out of place", "turned [deg]")
+TABLES = {
+    "Parts": ("part", "title", "verdict", "flies", "deforms", "energy", "scatter", "why"),
+    "Elements": ("part", "title", "elements", "formulation", "material", "mass", "cost", "step", "shares nodes with"),
+}
+_WIDTH = 110  # of a table, as screens hold side by side with other things
 
 # Keys of a part in JSON, and columns of the csv.
 PART = (
@@ -41,12 +48,30 @@ _MOST_SHOWN = 6
 
 
 def as_table(found: Parts) -> str:
-    """What was read, a row per part, a row per set, and the set to take."""
-    lines = [*heading(found), "", tables.as_text(HEAD, rows(found))]
+    """What was read, a row per part in two tables, a row per set, and the set to take; markdown has all columns."""
+    lines = heading(found)
+    for names in TABLES.values():
+        head, body = tables.known(names, columns(HEAD, names, rows(found)))
+        if body and {*head} - {"part", "title"}:
+            lines += ["", _starred(head, body, [row[0] for row in rows(found)])]
     if found.sets:
-        lines += ["", tables.as_text(SET_HEAD, set_rows(found))]
+        body = columns(SET_HEAD, SETS, set_rows(found))
+        lines += ["", _starred(SETS, body, [row[0] for row in set_rows(found)])]
     lines += ["", *(f"{name.ljust(11)}  {text}" for name, text in outlook(found))]
     return "\n".join(lines)
+
+
+def columns(
+    head: Sequence[str], names: Sequence[str], body: Sequence[Sequence[tables.Cell]]
+) -> list[list[tables.Cell]]:
+    """Take the columns with these names out of the rows of a table."""
+    at = [head.index(name) for name in names]
+    return [[row[i] for i in at] for row in body]
+
+
+def _starred(head: Sequence[str], body: Sequence[Sequence[tables.Cell]], stars: Sequence[tables.Cell]) -> str:
+    """Write rows with their stars before them."""
+    return tables.as_text(("", *head), [[star, *row] for star, row in zip(stars, body, strict=True)], _WIDTH)
 
 
 def as_markdown(found: Parts) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from d2rpick.report.parts import HEAD, SET_HEAD
 from tests.choice.test_calibrate import run_folder
 from tests.cli.test_output import check_by_schema
 from tests.command import ROOT, answer, run
@@ -45,6 +46,14 @@ def test_all_forms_hold_the_same() -> None:
 def test_a_set_to_compare_may_be_named_by_what_its_parts_do(word: str) -> None:
     found = answer("parts", "--part", word, BOX)
     assert [(one["name"], one["parts"]) for one in found["sets"]] == [("given", [1, 2])]
+
+
+def test_the_tables_fit_a_screen_and_markdown_has_every_column() -> None:
+    for args in (WITH_DECK, (BOX,)):
+        table = run("parts", "-q", *args).stdout
+        assert max(map(len, table.splitlines()[3:])) <= 110  # below the names of files
+    markdown = run("parts", "-q", "-f", "markdown", *WITH_DECK).stdout
+    assert all(f"| {name} |" in markdown for name in (*HEAD, *SET_HEAD))
 
 
 def test_without_a_set_to_take_every_form_is_an_objection() -> None:
