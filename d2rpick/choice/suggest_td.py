@@ -127,8 +127,7 @@ def within_flight(look: Look, history: History, window: tuple[float, float]) -> 
 
     RangeError when the window lies outside the record.
     """
-    for time in window:
-        history.energy_at(time, "td_window", window)
+    history.check(*window, argument="td_window")
     situation = _flying(look, window)
     return situation, (window[0], _latest(situation, window))
 

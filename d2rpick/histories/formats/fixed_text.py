@@ -186,6 +186,7 @@ class Blocks:
             found = decode(fields, grammar.decimals)
             values[at : at + _BATCH] = found
             if np.isnan(found).any():
+                self._data.check()
                 bad = int(np.argmax(np.isnan(found)))
                 address, name = int(where[bad]), names[(at + bad) % len(names)]
                 text = self.text(address, grammar.width).decode("latin-1").strip()
@@ -193,6 +194,7 @@ class Blocks:
                     f"{self.source}:{self.line(address)}: {_spoken(name)} is {text!r}, a number in its "
                     "columns was expected; cut the file before this state"
                 )
+        self._data.check()
 
     def _moving(self, names: Sequence[Hashable]) -> NDArray[np.bool_]:
         """Tell of each number whether it may differ from state to state, shape (len(names),)."""

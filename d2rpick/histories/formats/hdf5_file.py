@@ -10,7 +10,6 @@ import io
 from contextlib import contextmanager
 from functools import cached_property
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
@@ -51,13 +50,14 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]
 
 def _opened_leg(source: Source, selection: Selection) -> Database:
     _import_library(source.name)
-    file = io.BytesIO(source.data) if isinstance(source.data, bytes) else Path(source.data.path)
+    # In memory whatever its size: the library crashes on some mixtures of two states of a file.
+    file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
     branches = {} if selection.time or selection.energy else _branches(file, source.name)
     return SavedBinout(source.name, branches) if branches else Columns(file, source.name, selection)
 
 
-def _branches(file: Path | BinaryIO, source: str) -> dict[str, PartGroup]:
+def _branches(file: BinaryIO, source: str) -> dict[str, PartGroup]:
     """Open the glstat and matsum branches that lasso-python saved; none in files of other layouts."""
     with _opened(file, source) as opened:
         return {
@@ -78,7 +78,7 @@ class Columns(SolverFile):
     notes: tuple[str, ...] = ()
     parts: tuple[Part, ...] = ()
 
-    def __init__(self, file: Path | BinaryIO, source: str, selection: Selection) -> None:
+    def __init__(self, file: BinaryIO, source: str, selection: Selection) -> None:
         self._file, self.source = file, source
         with _opened(file, source) as opened:
             self._columns = columns_of(opened)
@@ -184,7 +184,7 @@ class SavedBinout(SolverFile):
 class PartGroup:
     """The glstat or matsum branch of a file that lasso-python saved."""
 
-    def __init__(self, file: Path | BinaryIO, source: str, opened: h5py.File, name: str) -> None:
+    def __init__(self, file: BinaryIO, source: str, opened: h5py.File, name: str) -> None:
         self._file, self._source, self.name = file, source, name
         group = opened[name]
         self.title = _line(group, "title")
@@ -314,7 +314,7 @@ def _import_library(source: str) -> None:
 
 
 @contextmanager
-def _opened(file: Path | BinaryIO, source: str) -> Iterator[h5py.File]:
+def _opened(file: BinaryIO, source: str) -> Iterator[h5py.File]:
     """Open the file; whatever h5py makes of a damaged one becomes a FormatError."""
     import h5py
 
