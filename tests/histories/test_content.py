@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from d2rpick.errors import FormatError
 from d2rpick.histories import content
 from d2rpick.histories.content import Content, OnDisk, stored
+from d2rpick.histories.formats import csv_table
 from d2rpick.histories.opening import Selection, open_run
 from tests.hdf5_files import ENERGY, plain, written
 from tests.histories.test_source import CONTENTS, TIMES
@@ -28,10 +29,12 @@ from tests.reading import read_history
 from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 STATES = np.arange(400)
 ONE, OTHER = (glstat_text(STATES / 8, energy + STATES) for energy in (1000.0, 2000.0))
+TABLES = [csv_table.write({"time": STATES / 8, "IE": np.float64(energy) + STATES}) for energy in (1000.0, 2000.0)]
 
 
 @pytest.fixture
@@ -130,18 +133,24 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, 
         run.files[0].sha256()
 
 
+@pytest.mark.parametrize("contents", [(ONE, OTHER), TABLES], ids=["glstat", "csv"])
 @pytest.mark.parametrize("kept", [True, False], ids=["in memory", "on disk"])
 def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_an_error(
-    kept: bool, tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+    kept: bool,
+    contents: Sequence[bytes],
+    tmp_path: Path,
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     if not kept:
         request.getfixturevalue("on_disk")
     monkeypatch.setattr("d2rpick.file_state.PAUSE", 0.005)  # ten times as long as between two of the writes
-    file, done = tmp_path / "glstat", Event()
-    file.write_bytes(ONE)
+    file, done = tmp_path / "run", Event()
+    one, other = contents
+    file.write_bytes(one)
 
     def write() -> None:
-        for data in cycle((OTHER, ONE, b"", ONE)):
+        for data in cycle((other, one, b"", one)):
             mode = "r+b" if data else "wb"
             with file.open(mode, buffering=0) as target:
                 target.write(data)
