@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext, suppress
 from itertools import cycle
 from threading import Event, Thread
@@ -73,6 +75,29 @@ def test_bytes_on_a_disk_are_those_in_memory(
     assert there.rfind(data[:1], size) == held.rfind(data[:1], size)
     assert there.rfind(data[:1], 0) == -1
     assert there.sha256() == hashlib.sha256(data).hexdigest()
+
+
+@pytest.mark.usefixtures("on_disk")
+def test_threads_that_read_one_file_together_get_each_what_it_asks_for(tmp_path: Path) -> None:
+    data = np.random.default_rng(5).bytes(2000)
+    (tmp_path / "bytes").write_bytes(data)
+    there = opened(tmp_path / "bytes")
+    places = np.arange(0, 1960, 40)
+
+    def wrong(step: int) -> int:
+        """How many readings of another length by each thread differ from the data."""
+        found = [there[at : at + 7 * step] == data[at : at + 7 * step] for at in range(0, 1900, 9)]
+        fields = there.fields(places, step).tobytes() == b"".join(data[at : at + step] for at in places.tolist())
+        return found.count(False) + (not fields)
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as threads:
+            assert not any(threads.map(wrong, range(1, 31)))
+    finally:
+        sys.setswitchinterval(before)
+    there.check()
 
 
 @pytest.mark.parametrize("kind", CONTENTS)
