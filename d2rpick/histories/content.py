@@ -269,10 +269,11 @@ def stored(name: str) -> bytes | OnDisk:
 
 def _sum(data: Bytes) -> int:
     """Sum of the 64-bit words, each by a weight of its place: words that change places change the sum."""
-    end, total = data.size - data.size % 8, data.size
-    for begin in range(0, end, 8 * _WORDS):
-        words = data[begin : min(begin + 8 * _WORDS, end)].view(np.uint64)
-        total = (total * _MIX + int(words @ _weights()[: words.size])) % 2**64
+    end, whole = data.size - data.size % 8, data.size - data.size % (8 * _WORDS)
+    rows, rest = data[:whole].view(np.uint64).reshape(-1, _WORDS), data[whole:end].view(np.uint64)
+    total, weights = data.size, _weights()
+    for one in (*np.einsum("ij,j->i", rows, weights).tolist(), int(rest @ weights[: rest.size])):
+        total = (total * _MIX + one) % 2**64
     return (total * _MIX + int.from_bytes(data[end:].tobytes())) % 2**64
 
 
