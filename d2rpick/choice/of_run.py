@@ -73,7 +73,7 @@ def suggest_of(
     Raises
     ------
     RangeError
-        If td or the window lies outside the record.
+        If td or the window lies outside the record, or no flight is seen.
     """
     if td is None:
         from d2rpick.choice.suggest_td import suggest_in_longest_flight

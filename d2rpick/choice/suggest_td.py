@@ -13,10 +13,10 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.margin import margin_before_contact
-from d2rpick.choice.ranking import best_of, like_quality, rank
+from d2rpick.choice.ranking import like_quality, rank, recommend
 from d2rpick.choice.reach_back import longest_rigid_times
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
-from d2rpick.choice.warnings import Caution
+from d2rpick.errors import RangeError
 from d2rpick.flight.flight import SOURCES, witnesses
 from d2rpick.vibration.fits import Fits
 
@@ -42,23 +42,29 @@ _MUCH: Final = 0.1
 def suggest_in_longest_flight(history: History, settings: Settings) -> Suggestion:
     """Choose both times in the longest flight of the record, td up to its end less the margin.
 
-    Where nothing shows a flight the whole record is the window, and the cautions say so.
+    Raises
+    ------
+    RangeError
+        If nothing in the record shows a flight.
     """
     fits = Fits()
-    window, cautions = longest_flight(history, settings, fits)
-    found = suggest_in_window(history, window, settings, fits)
-    return found._replace(cautions=(*cautions, *found.cautions))
+    return suggest_in_window(history, longest_flight(history, settings, fits), settings, fits)
 
 
 def longest_flight(
-    history: History, settings: Settings, fits: Fits | None = None
-) -> tuple[tuple[float, float], tuple[Caution, ...]]:
-    """Give the longest flight as a window within the record [time]; the record, with a caution, where none is seen."""
+    history: History, settings: Settings, fits: Fits | None = None, *, otherwise: tuple[float, float] | None = None
+) -> tuple[float, float]:
+    """Give the longest flight as a window within the record [time].
+
+    ``otherwise`` is given where nothing shows a flight; without it that is a RangeError.
+    """
     flights = flights_of(history, settings, fits)
+    if not flights and otherwise:
+        return otherwise
     if not flights:
-        record = float(history.time[0]), float(history.time[-1])
-        return record, (Caution("whole-record", "no flight is seen, so td is looked for in the whole record"),)
-    return max((bounds(history, flight) for flight in flights), key=lambda one: one[1] - one[0]), ()
+        found = f"{', '.join(history.source)}: nothing in the record shows a flight"
+        raise RangeError(f"{found}; name td, or a window for it")
+    return max((bounds(history, flight) for flight in flights), key=lambda one: one[1] - one[0])
 
 
 def flights_of(history: History, settings: Settings, fits: Fits | None = None) -> tuple[Flight, ...]:
@@ -203,7 +209,7 @@ def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
     asked = list(situations)
     candidates = candidates_of(asked, in_flight=True)
-    found = ((there, best_of(there, rank(some))) for there, some in zip(asked, candidates, strict=True))
+    found = ((there, recommend(rank(some)).chosen) for there, some in zip(asked, candidates, strict=True))
     return [(there, best) for there, best in found if best and not best.same_swing]
 
 

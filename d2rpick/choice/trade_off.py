@@ -69,7 +69,7 @@ def explore_of(
     reference : Reference
     settings : Settings
     td_window : (float, float), optional
-        Where td is looked for [time].  Default: the longest flight, or the record where none is seen.
+        Where td is looked for [time].  Default: the longest flight; where none is seen but td is asked for, the record.
     td : float, optional
         Offered too, and what others are compared with [time].
     steps : int
@@ -81,10 +81,11 @@ def explore_of(
     Raises
     ------
     RangeError
-        If td or the window lies outside the record.
+        If td or the window lies outside the record, or no flight is seen and neither is given.
     """
     history, fits = reference.history, Fits()
-    window, no_flight = (td_window, ()) if td_window else longest_flight(history, settings, fits)
+    record = float(history.time[0]), float(history.time[-1])
+    window = td_window or longest_flight(history, settings, fits, otherwise=None if td is None else record)
     look = looking(history, settings, fits, since)
     situation, inside = within_flight(look, history, window)
     suggestion = suggest_of(reference, window, settings, fits=fits, since=since)
@@ -102,7 +103,7 @@ def explore_of(
         suggestion=suggestion,
         td_window=inside,
         offers=tuple(offers),
-        cautions=(*no_flight, *_cautions(situation, window, inside, offers)),
+        cautions=tuple(_cautions(situation, window, inside, offers)),
         asked=asked,
         recommended=next((one for one in offers if one.recommended), None),
         start=start,

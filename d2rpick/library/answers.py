@@ -228,7 +228,7 @@ def suggest(
     td : float
         When the parts are switched back [time].
     td_window : (float, float)
-        Instead of ``td``: where to choose it [time]; without both, in the longest flight, or the record without one.
+        Instead of ``td``: where to choose it [time]; without both, in the longest flight.
     parts : number, title or several, optional
         The parts to be switched; ``"10-19"`` is a range, ``"flying"`` all deformable parts that fly together,
         ``"all"`` all that have energy.

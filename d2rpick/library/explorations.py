@@ -109,7 +109,7 @@ def explore(
     td : float, optional
         Explored too, and what others are compared with [time].
     td_window : (float, float), optional
-        Where td is looked for [time].  Default: the longest flight, or the record where none is seen.
+        Where td is looked for [time].  Default: the longest flight; where none is seen but td is named, the record.
     steps : int
         Number of evenly spaced td; peaks of the energy come on top.
     parts, flying, deck, weights, **choosing
@@ -122,7 +122,8 @@ def explore(
     Raises
     ------
     D2RPickError
-        If the run has no such parts or energy, or a time lies outside the record.
+        If the run has no such parts or energy, a time lies outside the record, or no flight is seen and no td
+        is named.
     TypeError, ValueError
         If an argument is not of its kind.
 

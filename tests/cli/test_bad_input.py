@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.cli.test_output import FORMATS, check_by_schema
+from tests.cli.test_output import FORMATS
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, codes, run
+from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -245,22 +246,6 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(
         assert [line.split(": ")[:2] for line in result.stderr.splitlines() if line.startswith("warning")] == [
             ["warning", warning["code"]] for warning in found["warnings"]
         ]
-
-
-@pytest.mark.parametrize("command", ["suggest", "explore", "plan"])
-def test_where_nothing_flies_and_no_td_is_named_every_command_has_an_answer_and_objects(
-    command: str, tmp_path: Path
-) -> None:
-    (tmp_path / "input").write_bytes(table(lambda t: t * t))
-    args = command, str(tmp_path / "input")
-    found = answer(*args)
-    check_by_schema(found)
-    assert codes(found) & {"no-flight", "whole-record"}
-    assert found.get("recommended") is None
-    assert found.get("td_window", [0.0, 1.0]) == [0.0, 1.0]
-    for form in ("table", "csv", "markdown"):
-        assert run(*args, "-f", form).exit_code == 1
-    assert run(*args, "--exit-zero").exit_code == 0
 
 
 def test_a_pair_in_the_load_is_an_objection_with_its_reason() -> None:

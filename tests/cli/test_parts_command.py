@@ -11,8 +11,8 @@ import pytest
 
 from d2rpick.report.parts import HEAD, SET_HEAD
 from tests.choice.test_calibrate import run_folder
-from tests.cli.test_output import check_by_schema
 from tests.command import ROOT, answer, run
+from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from d2rpick.choice.by_deck import selected
 from d2rpick.choice.settings import Settings
 from d2rpick.cli.deck_cost import model_of
 from d2rpick.histories.selection import Selection
-from tests.cli.test_output import check_by_schema
 from tests.command import answer, run
+from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
 from tests.shared import shared, shared_bytes
 
