@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.cost import CostModel, Weights
+from d2rpick.choice.cost import ByDeck, CostModel, Weights
 from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost, of_another_model
 from d2rpick.choice.part_sets import recommended_parts, with_cost_of
 from d2rpick.choice.rigid_bodies import bodies_of
@@ -70,7 +70,9 @@ def with_deck(settings: Settings, reference: Reference, model: CostModel) -> tup
         return replace(settings, bodies=()), told
     ids = [part.id for part in history.parts]
     found, share = with_cost_of(settings, model, ids)
-    found = replace(found, bodies=bodies_of(model.inventory, ids), placement=Placement(model.inventory))
+    source = ByDeck(model.inventory.files, model.weights if settings.cost_share is None else None)
+    placement = Placement(model.inventory)
+    found = replace(found, bodies=bodies_of(model.inventory, ids), placement=placement, by_deck=source)
     doubts = [
         *doubts_of(history.parts, model.inventory),
         *doubts_of_cost(model, used=settings.cost_share is None and share.value is not None),

@@ -31,7 +31,8 @@ def _sections(found: Parts, command: Sequence[str]) -> Iterator[Markup]:
     read = [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in heading(found)]
     if found.weights:
         read.append(("weights", found.weights.source))
-    yield section("What was read", pairs([*read, *page.digests(found.run.files)]))
+    deck = page.deck_digests(found.inventory.files, found.weights) if found.inventory else []
+    yield section("What was read", pairs([*read, *page.digests(found.run.files), *deck]))
     yield section("To repeat this", tag("pre", shlex.join(command), class_="wrap"))
 
 
