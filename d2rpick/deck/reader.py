@@ -35,7 +35,8 @@ _MOST_FILES = 10_000
 class Deck:
     """A deck as read: ``cards`` that matter, ``disabled`` ones (*COMMENT), encrypted blocks, includes.
 
-    ``problems`` are numbers of includes that could not be read.
+    ``problems`` are numbers of includes that could not be read; ``ends`` the last block of each file that has no *END,
+    and whether that file is the main one.
     """
 
     path: str
@@ -47,6 +48,7 @@ class Deck:
     problems: list[Problem] = field(default_factory=list)
     scope: Scope = field(default_factory=Scope)
     sources: list[SourceFile] = field(default_factory=list)
+    ends: list[tuple[Block, bool]] = field(default_factory=list)
     long: bool = False  # whether the main file ends in long format
 
     @property
@@ -139,6 +141,8 @@ class _Reader:
             )
         width = context.width
         for block in source.blocks():
+            if block.end is None:
+                self.deck.ends.append((block, not context.chain))
             if block.encrypted:
                 self.deck.encrypted.append(block)
                 continue

@@ -79,6 +79,10 @@ class SourceFile:
             else:
                 size *= 2  # this line is longer
 
+    def ends_with_line(self) -> bool:
+        """Whether the last line has its line end; an empty file has."""
+        return self.read(max(0, self._file.size - 1)) in (b"", b"\n")
+
     def line_at(self, offset: int) -> int:
         """Return the number of the line, from 1, that holds the byte at ``offset``."""
         known = bisect_right(self._counted, (offset, 1 << 62)) - 1

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.explored import explored_flights
+from d2rpick.choice import explored
 from d2rpick.choice.of_run import Reference, read, suggest_of
 from d2rpick.choice.plan import Plan, plan_of
 from d2rpick.choice.settings import Settings
@@ -248,13 +248,16 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_fac
 
 
 @pytest.mark.parametrize("seed", [33, 40, 72, 77])
-def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int, tmp_path: Path) -> None:
+def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The page of a plan offered pairs that were rigid while the flight before had not landed."""
+    monkeypatch.setattr(explored, "_STEPS", 120)
     reference = read(bouncing(seed, tmp_path))
     plan = plan_of(reference, Settings(replay=False))
     landings = {row.number: row.end for row in plan.rows}
     rows = [row for row in plan.rows if row.window]
-    for row, found in zip(rows, explored_flights(reference, plan), strict=True):
+    for row, found in zip(rows, explored.explored_flights(reference, plan), strict=True):
         assert found.asked is not None
         assert (found.asked.tr, found.asked.td) == row.window
         assert all(one.tr is None or one.tr >= landings.get(row.number - 1, 0.0) for one in found.offers)

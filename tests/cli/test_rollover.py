@@ -6,10 +6,8 @@ import csv
 import io
 import json
 from contextlib import contextmanager
-from importlib.resources import files
 from typing import TYPE_CHECKING
 
-import jsonschema
 import numpy as np
 import pytest
 
@@ -20,6 +18,7 @@ from d2rpick.models.rollover.run import RigidWindow, simulate
 from d2rpick.models.rollover.scan import scan
 from d2rpick.report import figures_models
 from tests.command import answer, codes, run
+from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -138,9 +137,7 @@ def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
     asked = ("rollover", "--scan", "--jobs", "1", "--td", "0.14", "--t-end", "0.15", "-q", *SMALL)
     plot = tmp_path / "scan.png"
     found = json.loads(run(*asked, "-f", "json", "--plot", str(plot)).stdout)
-    schema = json.loads((files("d2rpick") / "schemas" / "rollover-1.json").read_text("utf-8"))
-    jsonschema.Draft202012Validator.check_schema(schema)
-    jsonschema.validate(found, schema, jsonschema.Draft202012Validator)
+    check_by_schema(found)
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert found["recommended"] in [one["tr"] for one in found["runs"]]
     rows = list(csv.DictReader(io.StringIO(run(*asked, "-f", "csv").stdout)))

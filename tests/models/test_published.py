@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from importlib.resources import files
 from typing import TYPE_CHECKING
 
-import jsonschema
 import numpy as np
 import pytest
 
@@ -20,6 +17,7 @@ from d2rpick.vibration.oscillator import Oscillator, State
 from d2rpick.vibration.replay import Replay
 from tests import paper
 from tests.command import ENERGY, ROOT, answer, run
+from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -172,7 +170,7 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
 def test_its_files_are_the_same_every_time_and_replaced_only_when_told(tmp_path: Path) -> None:
     whole = ("reproduce", "--output-dir", str(tmp_path), "--section", "5")
     first = answer(*whole)
-    jsonschema.validate(first, json.loads(files("d2rpick").joinpath("schemas/reproduce-2.json").read_text("utf-8")))
+    check_by_schema(first)
     assert first["better"]["residual"] < 1e-12
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     refused = run(*whole)

@@ -115,16 +115,6 @@ def lines_of(card: Card, comments: bytes = b"$") -> Iterator[Lines]:
             yield Lines(data, card.scope, comments)
 
 
-def is_cut(block: Block) -> bool:
-    """Whether the file ends with this block, and within a line."""
-    if block.end is not None:
-        return False
-    last = b"\n"
-    for data in _pieces_of(block):
-        last = data[-1:] or last
-    return last != b"\n"
-
-
 def _pieces_of(block: Block) -> Iterator[bytes]:
     """Bytes below the keyword line, in pieces that end with a line."""
     pieces = block.source.pieces(block.start, block.end)

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.includes import Unread
+from d2rpick.deck.radioss.blocks import blocks, card_of, keyword
 from d2rpick.deck.radioss.engine import Leg, read_legs
-from d2rpick.deck.radioss.starter import Starter, card_or_none
+from d2rpick.deck.radioss.starter import KEPT, Starter
 from d2rpick.deck.reader import Deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.errors import DeckError
@@ -104,13 +105,17 @@ def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
     if run.starter is None:
         return
     run.starter.sources.append(source)
-    for card, words in card_or_none(source):
-        if words:
+    for block in blocks(source):
+        words = keyword(block)
+        if block.end is None:
+            run.deck.ends.append((block, not chain))
+        if not words:
+            _include(card_of(block), source, run, chain)
+        elif words[0] in KEPT:
+            card = card_of(block)
             run.starter.take(card, words)
             if words[0] == "RBODY":
                 run.deck.cards.append(card)
-        else:
-            _include(card, source, run, chain)
 
 
 def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:

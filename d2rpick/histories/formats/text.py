@@ -84,7 +84,11 @@ class Text:
     def lines(self, begin: int) -> Iterator[str]:
         """Lines from byte ``begin`` on, without their ends."""
         for piece in self.pieces(begin):
-            yield from self._text(piece[:-1]).split("\n")
+            yield from self.rows(piece)
+
+    def rows(self, piece: bytes) -> list[str]:
+        """Lines of a piece, without their ends."""
+        return self._text(piece[:-1]).split("\n")
 
     def sample(self, begin: int) -> list[str]:
         """Lines behind byte ``begin`` from the start, the end and evenly between; all of a short text."""
