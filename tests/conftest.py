@@ -15,10 +15,10 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 from hypothesis import settings
 
+from d2rpick import file_state
 from d2rpick.choice import examine, explored
 from d2rpick.flight import momentum
 from d2rpick.flight.window import Remembered
-from d2rpick.histories import content
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.identify import Identification, identify, identify_several
 
@@ -69,7 +69,7 @@ replace(momentum, Remembered=Misfits)
 # Pages explore few td: what they show of each is the same.
 replace(explored, _STEPS=5, _LEAST=5)
 # Most tests read what they have just written: that no write is under way is sure without waiting for it.
-replace(content, _PAUSE=0.0)
+replace(file_state, PAUSE=0.0)
 
 # Looking for garbage as often as Python does by itself takes a tenth of the time of all tests.
 gc.set_threshold(20_000, 20, 50)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.errors import ConfigurationError, listing
+from d2rpick.errors import ConfigurationError, are, name_units
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -131,7 +131,7 @@ class CostModel:
     def saved(self, parts: Collection[int]) -> Share:
         """Share of a step that is saved while these parts are rigid, c above [-]; unknown of parts beside the deck."""
         if absent := sorted(set(parts) - self.inventory.parts.keys()):
-            return Share(None, f"part {listing(absent)} is not in the deck")
+            return Share(None, f"{name_units(absent)} {are(absent)} not in the deck")
         within = self.inventory.elements_within(parts)
         rigid = _sum(self._of(part, counts) for part, counts in within.items())
         total = self.total

@@ -18,8 +18,9 @@ from d2rpick.choice.part_verdicts import rows_of
 from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.deck.inventory.placement import Placement
-from d2rpick.errors import FormatError, RangeError
-from d2rpick.histories.opening import Selection
+from d2rpick.errors import FormatError, RangeError, are, name_units
+from d2rpick.flight.flying_parts import asks_for_recommended, with_parts_by_number
+from d2rpick.histories.selection import Selection, select_parts
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
@@ -150,6 +151,23 @@ def parts_of(
     found = tuple(_with_recommendation(sets))
     cautions = tuple(_cautions(facts, model, rows, found))
     return Parts(run, inventory, model.weights if model else None, settings, facts, rows, found, cautions)
+
+
+def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
+    """Give the numbers of the parts of a set that is to be compared too.
+
+    Raises
+    ------
+    FormatError
+        If the run has no such parts, or the recommended set is asked for.
+    """
+    if not names:
+        return ()
+    if asks_for_recommended(names, run):
+        what = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
+        raise FormatError(f"{run.name}: the recommended set is what is looked for here; {what}")
+    numbers = with_parts_by_number(run, Selection(parts=tuple(names))).parts
+    return tuple(part.id for part in select_parts(numbers, run.parts, run.name))
 
 
 def recommended_parts(run: Run, settings: Settings, model: CostModel) -> tuple[int, ...]:
@@ -319,7 +337,7 @@ def _cautions(
     yield from doubts_of_bodies([row.id for row in rows if row.movable], model.inventory)
     yield from doubts_of_cost(model)
     if missing := [row.id for row in rows if row.elements is None and row.id in facts.parts]:
-        yield Caution("parts-not-in-deck", f"part {', '.join(map(str, missing))} of the history is not in the deck")
+        yield Caution("parts-not-in-deck", f"{name_units(missing)} of the history {are(missing)} not in the deck")
     if not any(row.movable for row in rows):
         yield Caution("nothing-to-switch", "no part may be switched; the reasons are listed in the rows")
     elif not any(one.recommended for one in sets):

@@ -173,11 +173,13 @@ def plan_of(
     Raises
     ------
     RangeError
-        If a time lies outside the record, or the parts were deformable in a window that is done.
+        If ``after`` or a window lies outside the record, or the parts were deformable in a window that is done.
     """
     history = reference.history
     span = float(history.time[-1] - history.time[0])
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
+    if settings.after is not None:
+        history.check(settings.after, argument="after")
     history, found, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
     fits = Fits()

@@ -8,14 +8,15 @@ mapped into memory: where a mapped page is cut off, the system ends the process.
 from __future__ import annotations
 
 import os
-import stat
 import time
+from functools import cache
 from io import FileIO
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.errors import FormatError
+from d2rpick.file_state import COARSE, FileState, is_endless, is_regular, pause, snapshot
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,9 +28,8 @@ _BLOCK: Final = 1 << 19  # bytes read at a time where many are wanted: they stay
 _NEAR: Final = 1 << 13  # bytes between two that are read together: a call of the system costs more than these
 _WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, mostly behind them
 _HELD: Final = 1 << 24  # a file up to this size is held in memory
-_TRIES: Final = 5  # readings of a small file that changes all the time
-_TICK: Final = 50_000_000  # [ns] above the resolution of any file's times: later changes show in them
-_PAUSE: Final = 0.05  # [s] for a write that may be under way: until it ends, half of it stands in the file
+_WORDS: Final = 1 << 13  # summed up at a time: their weights stay in the cache
+_MIX: Final = 0x9E3779B97F4A7C15
 
 
 class Content:
@@ -51,6 +51,10 @@ class Content:
         """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
         return self._data.find(wanted, begin)
 
+    def rfind(self, wanted: bytes, end: int) -> int:
+        """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
+        return self._data.rfind(wanted, 0, end)
+
     def view(self, begin: int, end: int) -> Bytes:
         """Bytes from one address to another, shape (end - begin,)."""
         return np.frombuffer(self._data, np.uint8)[begin:end]
@@ -58,6 +62,9 @@ class Content:
     def fields(self, addresses: Addresses, width: int) -> Bytes:
         """Bytes at many addresses, ``width`` of each, shape (n, width)."""
         return _gathered(self.view(0, len(self)), addresses, width)
+
+    def check(self) -> None:
+        """Nothing to be done: what is held does not change."""
 
 
 def content_of(data: bytes | Content) -> Content:
@@ -84,13 +91,14 @@ class OnDisk(Content):
 
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
-        self._seen = _State.of(self._file)
+        self._seen = FileState.of(self._file)
         self._size = self._seen.size
         self._views = array("Q")  # begin, end and sum of what was looked at
         self._fields: list[tuple[Addresses, int, int]] = []  # addresses, width and sum of what was taken
         self._window, self._begin = b"", 0
         self._buffer = np.empty(2 * _BLOCK, np.uint8)  # used again and again: fresh memory costs more than reading
         self._digest = ""
+        self._awaited: tuple[int, ...] = ()  # times of the file for which a pause was made
 
     def __del__(self) -> None:
         os.close(self._number)
@@ -104,7 +112,7 @@ class OnDisk(Content):
         if len(data) < self._size:
             raise self._shortened()
         self._views.extend((0, self._size, _sum(np.frombuffer(data, np.uint8))))
-        self._check()
+        self.check()
         return data
 
     def __getitem__(self, where: slice) -> bytes:
@@ -117,18 +125,21 @@ class OnDisk(Content):
             self._begin, at = begin, 0
         return self._window[at : at + end - begin] if begin < end else b""
 
-    @property
-    def path(self) -> str:
-        """Name under which another reader opens this very file, even if another one has taken its name."""
-        path = f"/proc/{os.getpid()}/fd/{self._number}"
-        return path if os.path.exists(path) else self._name  # noqa: PTH110  start-up
-
     def find(self, wanted: bytes, begin: int = 0) -> int:
         """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
-        for at in range(begin, self._size, _BLOCK):
-            found = self[at : at + _BLOCK + len(wanted) - 1].find(wanted)
+        for at in range(begin, self._size, _NEAR):
+            found = self[at : at + _NEAR + len(wanted) - 1].find(wanted)
             if found >= 0:
                 return at + found
+        return -1
+
+    def rfind(self, wanted: bytes, end: int) -> int:
+        """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
+        for stop in range(end, 0, -_NEAR):
+            first = max(0, stop - _NEAR)
+            found = self[first:stop].rfind(wanted)
+            if found >= 0:
+                return first + found
         return -1
 
     def view(self, begin: int, end: int) -> Bytes:
@@ -138,7 +149,7 @@ class OnDisk(Content):
         return data
 
     def fields(self, addresses: Addresses, width: int) -> Bytes:
-        """Bytes at many addresses, ``width`` of each, shape (n, width); FormatError when the file has changed."""
+        """Bytes at many addresses, ``width`` of each, shape (n, width); to be trusted after a `check`."""
         if np.any(addresses[1:] < addresses[:-1]):
             order = np.argsort(addresses, kind="stable")
             found = np.empty((addresses.size, width), np.uint8)
@@ -146,7 +157,6 @@ class OnDisk(Content):
             return found
         found = self._in_order(addresses, width)
         self._fields.append((addresses, width, _sum(found.ravel())))
-        self._check()
         return found
 
     def _near(self, begin: int, end: int) -> Bytes:
@@ -179,7 +189,7 @@ class OnDisk(Content):
             digest = hashlib.sha256()
             for begin in range(0, self._size, _BLOCK):
                 digest.update(self.view(begin, min(begin + _BLOCK, self._size)).data)
-            self._check()
+            self.check(at_rest_for=COARSE)
             self._digest = digest.hexdigest()
         return self._digest
 
@@ -199,13 +209,18 @@ class OnDisk(Content):
             "is a solver writing it anew? Read it again when it has"
         )
 
-    def _check(self) -> None:
-        """Make sure that what was read so far is all of one state of the file."""
-        now = _State.of(self._file)
-        if now == self._seen and now.settled:
+    def check(self, at_rest_for: int = 0) -> None:
+        """Make sure that what was read so far is all of one state of the file; FormatError where it is not.
+
+        ``at_rest_for``: read it again if the last change is more recent, whether or not one was seen [ns].
+        """
+        now = FileState.of(self._file)
+        if now == self._seen and now.settled and time.time_ns() - now.changed >= at_rest_for:
             return
-        time.sleep(_PAUSE)
-        now = _State.of(self._file)
+        if not now.settled and now[:-1] != self._awaited:  # else a pause was made since the last write began
+            pause()
+            self._awaited = now[:-1]
+            now = FileState.of(self._file)
         if now.size < self._size or not self._is_as_before():
             raise FormatError(
                 f"{self._name}: the file was rewritten while it was read; read it again when it is complete"
@@ -229,45 +244,34 @@ def stored(name: str) -> bytes | OnDisk:
         If a small file changes all the time, or it is a device.
     """
     with open(name, "rb", buffering=0) as file:  # noqa: PTH123
-        found = os.fstat(file.fileno())
-        if stat.S_ISCHR(found.st_mode) and not file.isatty():  # /dev/zero and /dev/full never end
+        if is_endless(file):
             raise FormatError(f"{name}: this is a device; a file, a pipe or a terminal was expected")
-        if not stat.S_ISREG(found.st_mode):
+        if not is_regular(file):
             return file.read()
-        if found.st_size > _HELD:
+        if os.fstat(file.fileno()).st_size > _HELD:
             return OnDisk(name, os.dup(file.fileno()))
-        for _ in range(_TRIES):
-            file.seek(0)
-            before, data = _State.of(file), file.read()
-            if before.settled and before == _State.of(file):
-                return data
-            time.sleep(_PAUSE)
-            file.seek(0)
-            if file.read(len(data)) == data:
-                return data
-    raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
-
-
-class _State(NamedTuple):
-    """What tells whether a file has changed; ``settled`` when a change after it would have shown."""
-
-    size: int
-    modified: int
-    changed: int
-    settled: bool
-
-    @classmethod
-    def of(cls, file: FileIO) -> _State:
-        found = os.fstat(file.fileno())
-        latest = max(found.st_mtime_ns, found.st_ctime_ns)
-        return cls(found.st_size, found.st_mtime_ns, found.st_ctime_ns, time.time_ns() - latest > _TICK)
+        data = snapshot(file)
+    if data is None:
+        raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+    return data
 
 
 def _sum(data: Bytes) -> int:
-    """Sum of the 64-bit words and of the bytes behind the last one."""
-    behind = data.size % 8
-    words = data[: data.size - behind].view(np.uint64)
-    return (int(words.sum()) + int.from_bytes(data[data.size - behind :].tobytes())) % 2**64
+    """Sum of the 64-bit words, each by a weight of its place: words that change places change the sum."""
+    end, total = data.size - data.size % 8, data.size
+    for begin in range(0, end, 8 * _WORDS):
+        words = data[begin : min(begin + 8 * _WORDS, end)].view(np.uint64)
+        total = (total * _MIX + int(words @ _weights()[: words.size])) % 2**64
+    return (total * _MIX + int.from_bytes(data[end:].tobytes())) % 2**64
+
+
+@cache
+def _weights() -> NDArray[np.uint64]:
+    """Odd numbers without a pattern (splitmix64), shape (_WORDS,)."""
+    weights = np.arange(1, _WORDS + 1, dtype=np.uint64) * np.uint64(_MIX)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB), (31, 1)):
+        weights = (weights ^ weights >> np.uint64(shift)) * np.uint64(factor)
+    return weights | np.uint64(1)
 
 
 def _gathered(data: Bytes, addresses: Addresses, width: int) -> Bytes:

@@ -13,8 +13,8 @@ from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
 from d2rpick.deck.source import STDIN
+from d2rpick.errors import name_units
 from d2rpick.rules import RULES, Severity
-from d2rpick.rules.base import name_units
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import os
+import time
+from contextlib import nullcontext, suppress
 from itertools import cycle
 from threading import Event, Thread
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,9 +20,12 @@ from d2rpick.errors import FormatError
 from d2rpick.histories import content
 from d2rpick.histories.content import Content, OnDisk, stored
 from d2rpick.histories.opening import Selection, open_run
-from tests.histories.test_source import CONTENTS
+from tests.hdf5_files import ENERGY, plain, written
+from tests.histories.test_source import CONTENTS, TIMES
+from tests.made_binout import binout
+from tests.made_t01 import t01
 from tests.reading import read_history
-from tests.text_files import glstat_text
+from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -128,7 +134,7 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
 ) -> None:
     if not kept:
         request.getfixturevalue("on_disk")
-    monkeypatch.setattr(content, "_PAUSE", 0.005)  # ten times as long as between two of the writes
+    monkeypatch.setattr("d2rpick.file_state.PAUSE", 0.005)  # ten times as long as between two of the writes
     file, done = tmp_path / "glstat", Event()
     file.write_bytes(ONE)
 
@@ -170,13 +176,156 @@ def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_st
             target.seek(written)
             target.write(OTHER[written:])
 
-    monkeypatch.setattr("d2rpick.histories.content.time.sleep", write_the_rest)
+    monkeypatch.setattr("d2rpick.file_state.time.sleep", write_the_rest)
     try:
         energy = read_history([str(file)]).energy
     except FormatError as error:
         assert "rewritten" in str(error)  # noqa: PT017
     else:
         assert energy.tolist() == (2000.0 + STATES).tolist()
+
+
+ANEW = {
+    "binout": bytes(binout([1, 2, 3], shift=1).data),
+    "radioss-th": bytes(t01(3, start=1).data),
+    "glstat": glstat_text(TIMES, [3, 2, 1]),
+    "matsum": matsum_text(TIMES, [7, 3], np.full((3, 2), 2.0)),
+    "hdf5": written(plain).getvalue().replace(ENERGY.tobytes(), (ENERGY + 1).tobytes()),
+    "csv": b"time,IE\n0,2\n1,1\n",
+}
+
+
+@pytest.mark.usefixtures("on_disk")
+@pytest.mark.parametrize("kind", CONTENTS)
+def test_a_file_of_any_format_that_is_written_anew_between_two_readings_gives_what_it_was(
+    kind: str, tmp_path: Path
+) -> None:
+    assert ANEW[kind] != CONTENTS[kind]
+    file = tmp_path / "run"
+    file.write_bytes(CONTENTS[kind])
+    whole = read_history([str(file)]).energy.tolist()
+    run = open_run([str(file)])
+    database = run.databases[0]
+    assert (database.time if database.channels else database.part_time).size
+    file.write_bytes(ANEW[kind])
+    with suppress(FormatError):
+        assert run.history(Selection()).energy.tolist() == whole
+    with suppress(FormatError):
+        assert run.files[0].sha256() == hashlib.sha256(CONTENTS[kind]).hexdigest()
+
+
+@pytest.mark.usefixtures("on_disk")
+@given(
+    st.binary(min_size=8, max_size=3000),
+    st.integers(0, 374),
+    st.integers(0, 374),
+    st.integers(-255, 255),
+)
+def test_bytes_that_change_places_or_make_up_for_each_other_are_seen(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes, one: int, other: int, more: int
+) -> None:
+    file = tmp_path_factory.getbasetemp() / "bytes"
+    file.write_bytes(data)
+    there = opened(file)
+    there.view(0, len(data))
+    words = np.frombuffer(data[: len(data) // 8 * 8], np.uint64).copy()
+    one, other = one % words.size, other % words.size
+    words[[one, other]] = words[[other, one]]
+    if one != other:
+        words[[one, other]] += np.array([more, -more]).astype(np.uint64)
+    changed = words.tobytes() + data[words.nbytes :]
+    file.write_bytes(changed)
+    with nullcontext() if changed == data else pytest.raises(FormatError, match="rewritten"):
+        there.check()
+
+
+def fixed_times(monkeypatch: pytest.MonkeyPatch, modified: int, changed: int) -> list[float]:
+    """Let files have these times for ever [ns before now]; the pauses that are made."""
+    pauses: list[float] = []
+    now, fstat = time.time_ns(), os.fstat
+
+    def found(number: int) -> SimpleNamespace:
+        really = fstat(number)
+        kept = {name: getattr(really, name) for name in ("st_dev", "st_ino", "st_size", "st_mode")}
+        return SimpleNamespace(**kept, st_mtime_ns=now - modified, st_ctime_ns=now - changed)
+
+    monkeypatch.setattr(os, "fstat", found)
+    monkeypatch.setattr(time, "sleep", pauses.append)
+    monkeypatch.setattr(time, "time_ns", lambda: now)
+    return pauses
+
+
+MOMENT, SECOND, HOUR = 1_000_000, 1_000_000_001, 3_600_000_000_001
+
+
+@pytest.mark.usefixtures("on_disk")
+@pytest.mark.parametrize(
+    ("modified", "changed"),
+    [(MOMENT, MOMENT), (HOUR, MOMENT), (-HOUR, MOMENT), (MOMENT, HOUR), (-MOMENT, -MOMENT)],
+    ids=["just now", "time set back", "time set ahead", "no time of change", "clock ahead"],
+)
+def test_a_change_that_the_times_may_not_show_is_looked_for(
+    modified: int, changed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "run"
+    file.write_bytes(ONE)
+    pauses = fixed_times(monkeypatch, modified, changed)
+    there = opened(file)
+    for begin in range(0, 1000, 100):
+        there.view(begin, begin + 100)
+        there.check()
+    assert len(pauses) == 1  # not at each look
+    file.write_bytes(OTHER)
+    with pytest.raises(FormatError, match="rewritten"):
+        there.check()
+
+
+@pytest.mark.parametrize(("modified", "changed"), [(HOUR, HOUR), (-HOUR, HOUR)], ids=["old", "time set ahead"])
+@pytest.mark.parametrize("kept", [True, False], ids=["in memory", "on disk"])
+def test_a_file_that_did_not_change_lately_is_read_without_a_pause(
+    kept: bool, modified: int, changed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+) -> None:  # fmt: skip
+    if not kept:
+        request.getfixturevalue("on_disk")
+    file = tmp_path / "run"
+    file.write_bytes(ONE)
+    pauses = fixed_times(monkeypatch, modified, changed)
+    history = read_history([str(file)])
+    assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()
+    assert not pauses
+
+
+@pytest.mark.usefixtures("on_disk")
+def test_times_in_whole_seconds_hide_the_changes_of_two(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "run"
+    file.write_bytes(ONE)
+    monkeypatch.setattr(time, "sleep", lambda _: None)
+    here = time.time_ns() // 10**9 * 10**9 + 10**9 // 2
+    monkeypatch.setattr(time, "time_ns", lambda: here)
+    found = file.stat()
+    times = SimpleNamespace(st_dev=found.st_dev, st_ino=found.st_ino, st_size=found.st_size, st_mode=found.st_mode)
+    times.st_mtime_ns = times.st_ctime_ns = here - 3 * 10**9 // 2
+    monkeypatch.setattr(os, "fstat", lambda _: times)
+    there = opened(file)
+    there.view(0, len(ONE))
+    file.write_bytes(OTHER)
+    with pytest.raises(FormatError, match="rewritten"):
+        there.check()
+
+
+@pytest.mark.usefixtures("on_disk")
+def test_a_write_that_began_long_ago_and_went_on_since_is_seen_by_the_signature(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "run"
+    file.write_bytes(ONE)
+    fixed_times(monkeypatch, SECOND, SECOND)
+    there = opened(file)
+    there.view(0, len(ONE))
+    file.write_bytes(OTHER)
+    with pytest.raises(FormatError, match="rewritten"):
+        there.sha256()
 
 
 def test_a_small_file_that_changes_later_is_signed_as_it_was_read(tmp_path: Path) -> None:

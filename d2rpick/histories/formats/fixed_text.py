@@ -106,7 +106,7 @@ class Blocks:
         self.source = source
         self._data = content_of(data)
         self._grammar = grammar
-        self._end = self._end_of_last_line()
+        self._end = self._data.rfind(b"\n", len(self._data)) + 1
         self._begin = begin
         self._runs = array("q")  # packed: a file whose blocks all differ must not fill the memory
         data, end = self._data, self._end  # not self: a circle would keep the file open
@@ -186,6 +186,7 @@ class Blocks:
             found = decode(fields, grammar.decimals)
             values[at : at + _BATCH] = found
             if np.isnan(found).any():
+                self._data.check()
                 bad = int(np.argmax(np.isnan(found)))
                 address, name = int(where[bad]), names[(at + bad) % len(names)]
                 text = self.text(address, grammar.width).decode("latin-1").strip()
@@ -193,6 +194,7 @@ class Blocks:
                     f"{self.source}:{self.line(address)}: {_spoken(name)} is {text!r}, a number in its "
                     "columns was expected; cut the file before this state"
                 )
+        self._data.check()
 
     def _moving(self, names: Sequence[Hashable]) -> NDArray[np.bool_]:
         """Tell of each number whether it may differ from state to state, shape (len(names),)."""
@@ -354,14 +356,6 @@ class Blocks:
             if found >= 0:
                 return at + found + 1
         return None
-
-    def _end_of_last_line(self) -> int:
-        for stop in range(len(self._data), 0, -CHUNK):
-            first = max(0, stop - CHUNK)
-            found = self._data[first:stop].rfind(b"\n")
-            if found >= 0:
-                return first + found + 1
-        return 0
 
 
 def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: int, behind: int) -> None:

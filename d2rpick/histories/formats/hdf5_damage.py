@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 from d2rpick.errors import FormatError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import h5py
 
 _DENSEST: Final = 1100  # HDF5's best compression; a larger array than that is a damaged shape
@@ -23,7 +21,7 @@ _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
 _USER_BLOCK: Final = 512  # MATLAB puts it before the file
 
 
-def check_file(file: Path | BinaryIO, source: str) -> None:
+def check_file(file: BinaryIO, source: str) -> None:
     """FormatError where a file has not the size it says, or the library would crash on it.
 
     It is read once in a child process: what ends that one would end this one.
@@ -63,7 +61,7 @@ def check_size(dataset: h5py.Dataset, source: str) -> None:
             )
 
 
-def _check_size_of_file(file: Path | BinaryIO, source: str) -> None:
+def _check_size_of_file(file: BinaryIO, source: str) -> None:
     head, size = _head_and_size(file)
     base = 0 if head.startswith(b"\x89HDF") else _USER_BLOCK
     head = head[base:]
@@ -78,16 +76,13 @@ def _check_size_of_file(file: Path | BinaryIO, source: str) -> None:
         )
 
 
-def _head_and_size(file: Path | BinaryIO) -> tuple[bytes, int]:
-    if isinstance(file, os.PathLike):
-        with file.open("rb") as content:
-            return content.read(2 * _USER_BLOCK), os.fstat(content.fileno()).st_size
+def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
     file.seek(0)
     head = file.read(2 * _USER_BLOCK)
     return head, file.seek(0, os.SEEK_END)
 
 
-def _read_and_exit(file: Path | BinaryIO) -> None:
+def _read_and_exit(file: BinaryIO) -> None:
     """Read all that could crash the library: what describes the data, and data in chunks; errors are not for here."""
     try:
         import faulthandler
@@ -101,7 +96,7 @@ def _read_and_exit(file: Path | BinaryIO) -> None:
         os._exit(0)
 
 
-def _read(file: Path | BinaryIO) -> None:
+def _read(file: BinaryIO) -> None:
     import h5py
 
     def visit(name: bytes, info: h5py.h5o.ObjInfo) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 from contextlib import contextmanager
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
@@ -49,13 +48,14 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]
 
 
 def _opened_leg(source: Source, selection: Selection) -> Database:
-    file = io.BytesIO(source.data) if isinstance(source.data, bytes) else Path(source.data.path)
+    # In memory whatever its size: the library crashes on some mixtures of two states of a file.
+    file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
     branches = {} if selection.time or selection.energy else _branches(file, source.name)
     return SavedBinout(source.name, branches) if branches else Columns(file, source.name, selection)
 
 
-def _branches(file: Path | BinaryIO, source: str) -> dict[str, PartGroup]:
+def _branches(file: BinaryIO, source: str) -> dict[str, PartGroup]:
     """Open the glstat and matsum branches that lasso-python saved; none in files of other layouts."""
     with _opened(file, source) as opened:
         return {
@@ -76,7 +76,7 @@ class Columns(SolverFile):
     notes: tuple[str, ...] = ()
     parts: tuple[Part, ...] = ()
 
-    def __init__(self, file: Path | BinaryIO, source: str, selection: Selection) -> None:
+    def __init__(self, file: BinaryIO, source: str, selection: Selection) -> None:
         self._file, self.source = file, source
         with _opened(file, source) as opened:
             self._columns = columns_of(opened)
@@ -182,7 +182,7 @@ class SavedBinout(SolverFile):
 class PartGroup:
     """The glstat or matsum branch of a file that lasso-python saved."""
 
-    def __init__(self, file: Path | BinaryIO, source: str, opened: h5py.File, name: str) -> None:
+    def __init__(self, file: BinaryIO, source: str, opened: h5py.File, name: str) -> None:
         self._file, self._source, self.name = file, source, name
         group = opened[name]
         self.title = _line(group, "title")
@@ -304,7 +304,7 @@ def _listed(columns: Sequence[Column]) -> str:
 
 
 @contextmanager
-def _opened(file: Path | BinaryIO, source: str) -> Iterator[h5py.File]:
+def _opened(file: BinaryIO, source: str) -> Iterator[h5py.File]:
     """Open the file; whatever h5py makes of a damaged one becomes a FormatError."""
     try:
         import h5py

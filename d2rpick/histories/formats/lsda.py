@@ -164,6 +164,7 @@ class Lsda:
     def read(self, positions: NDArray[np.int64], dtype: np.dtype[Any]) -> NDArray[Any]:
         """Values at any bytes of the file, in the shape of ``positions``."""
         found = self.data.fields(positions.ravel(), dtype.itemsize)
+        self.data.check()
         return np.asarray(found.view(dtype).reshape(positions.shape))
 
     def raw(self, start: int, variable: Variable) -> bytes:

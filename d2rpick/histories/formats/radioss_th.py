@@ -176,7 +176,9 @@ class TimeHistory(SolverFile):
         stride = sum(length + 2 * _WIDTH for length in self._head.lengths)
         starts = self._head.size + stride * np.arange(states)
         addresses = np.add.outer(starts, np.array(offsets, np.int64))
-        return self._data.fields(addresses.ravel(), _WIDTH).view(dtype).reshape(addresses.shape)
+        found = self._data.fields(addresses.ravel(), _WIDTH)
+        self._data.check()
+        return found.view(dtype).reshape(addresses.shape)
 
     def _whole_states(self) -> tuple[int, tuple[str, ...]]:
         """Count the states; the file may stop inside one, but nothing else may stand between them.
@@ -191,6 +193,7 @@ class TimeHistory(SolverFile):
         places = np.add.outer(self._head.size + stride * np.arange(states + 1), marks).ravel()
         places = places[places + _WIDTH <= len(self._data)]
         found = self._data.fields(places, _WIDTH).view(">i4").ravel()
+        self._data.check()
         bad = np.flatnonzero(found != np.resize(np.repeat(lengths, 2), found.size))
         if bad.size:
             state, mark = divmod(int(bad[0]), marks.size)

@@ -70,55 +70,84 @@ def _separators(piece: bytes, layout: Layout) -> tuple[NDArray[np.intp], NDArray
     """Places of the rows (n,) and of their separators (n, k); None unless all rows have their number of cells."""
     assert layout.separator
     signs = np.frombuffer(piece, np.uint8)
-    marks, ends = np.flatnonzero(signs == ord(layout.separator)), np.flatnonzero(signs == ord("\n"))
-    closed = piece.startswith(layout.separator.encode("latin-1"), int(ends[0]) - 1)  # rows end with a separator
-    each = layout.columns - 1 + closed
-    if marks.size != ends.size * each:
+    ends = signs == ord("\n")
+    closed = piece.startswith(layout.separator.encode("latin-1"), piece.index(b"\n") - 1)  # rows end with a separator
+    each, rows = layout.columns + closed, np.count_nonzero(ends)
+    marks = np.flatnonzero(ends | (signs == ord(layout.separator)))
+    if marks.size != rows * each:
         return None
-    table = marks.reshape(-1, each)
-    alike = np.all(table[:, -1] < ends) and np.all(table[1:, 0] > ends[:-1])
-    whole = alike and (not closed or np.all(table[:, -1] == ends - 1))
-    return (np.append(0, ends[:-1] + 1), table) if whole else None
+    table = marks.reshape(rows, each)
+    whole = np.all(ends[table[:, -1]]) and (not closed or np.all(np.diff(table[:, -2:]) == 1))
+    return (np.append(0, table[:-1, -1] + 1), table[:, :-1]) if whole else None
 
 
 def checked_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Samples:
-    """Values line by line, with comments and blank lines between, shape (rows, len(used)).
+    """Values with comments and blank lines between the rows, shape (rows, len(used)).
 
     Where all cells are empty the curve has ended: another one beside it goes on.  FormatError with the line that is
     wrong.
     """
-    from array import array  # not above: most tables are read in columns
-
-    values = array("d")
-    for _, state in _states(text, begin, layout, used):
-        values.extend(state)
-    return np.array(values).reshape(-1, len(used))
+    tables = [table for _, table in _tables(text, begin, layout, used)]
+    return np.concatenate(tables) if tables else np.empty((0, len(used)))
 
 
 def line_of(text: Text, begin: int, layout: Layout, time: int, state: int) -> int:
     """Give the number of the line in which a state stands, counted from 0."""
-    return next(number for i, (number, _) in enumerate(_states(text, begin, layout, [time])) if i == state)
+    for numbers, _ in _tables(text, begin, layout, [time]):
+        if state < len(numbers):
+            return numbers[state]
+        state -= len(numbers)
+    raise AssertionError("there is such a state")
 
 
-def _states(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Iterator[tuple[int, list[float]]]:
-    before: float | None = None
-    gap = ended = False
-    for number, row in enumerate(text.lines(begin), layout.start + 1):
-        if is_skipped(row):
-            gap = True
-            continue
-        cells = _cells(f"{text.name}:{number}", row, layout)
-        if not any(cells[column] for column in used) and before is not None:
-            ended = True
-            continue
-        state = [_value(f"{text.name}:{number}", layout, column, cells[column]) for column in used]
-        if ended or (gap and before is not None and state[0] <= before):
-            found = "a curve continues after empty cells" if ended else "the time starts again after a gap"
-            raise FormatError(
-                f"{text.name}:{number}: {found}, one curve was expected; repair it or put each curve into its own file"
-            )
-        gap, before = False, state[0]
-        yield number, state
+def _tables(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Iterator[tuple[Sequence[int], Samples]]:
+    """Numbers of lines and their values piece by piece: line by line only where they are not all alike."""
+    curve = _Curve(text.name, layout, used)
+    number = layout.start + 1
+    for piece in text.pieces(begin):
+        table = _plain_piece(piece, layout, used)
+        if table is not None and np.isfinite(table).all() and not curve.stops_before(float(table[0, 0])):
+            yield range(number, number + len(table)), table
+            curve.before, curve.gap = float(table[-1, 0]), False
+        else:
+            states = list(curve.states(text.rows(piece), number))
+            if states:
+                yield [line for line, _ in states], np.array([state for _, state in states])
+        number += piece.count(b"\n")
+
+
+class _Curve:
+    """What of a table was seen so far, where it is taken line by line."""
+
+    def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
+        self._name, self._layout, self._used = name, layout, used
+        self.before: float | None = None  # time of the last state
+        self.gap = self._ended = False
+
+    def stops_before(self, time: float) -> bool:
+        """Whether a state of this time is one of another curve."""
+        return self._ended or (self.gap and self.before is not None and time <= self.before)
+
+    def states(self, rows: Sequence[str], first: int) -> Iterator[tuple[int, list[float]]]:
+        """Give line and values of each state in rows of which ``first`` is the number of the first."""
+        layout, used = self._layout, self._used
+        for number, row in enumerate(rows, first):
+            if is_skipped(row):
+                self.gap = True
+                continue
+            where = f"{self._name}:{number}"
+            cells = _cells(where, row, layout)
+            if not any(cells[column] for column in used) and self.before is not None:
+                self._ended = True
+                continue
+            state = [_value(where, layout, column, cells[column]) for column in used]
+            if self.stops_before(state[0]):
+                found = "a curve continues after empty cells" if self._ended else "the time starts again after a gap"
+                raise FormatError(
+                    f"{where}: {found}, one curve was expected; repair it or put each curve into its own file"
+                )
+            self.gap, self.before = False, state[0]
+            yield number, state
 
 
 def _cells(where: str, row: str, layout: Layout) -> list[str]:
