@@ -39,8 +39,8 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
         if b"." in piece:
             return None
         piece = piece.replace(b",", b".")
-    if piece.isspace() or b'"' in piece:
-        return None  # numpy warns of the one, and a separator in quotes is none
+    if b'"' in piece:
+        return None  # a separator in quotes is none
     whole = piece.decode("latin-1")  # no other character than those of latin-1 belongs to a number
     taken, chosen = [*range(layout.columns)], None
     first = whole[: whole.index("\n")]
@@ -57,6 +57,8 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
         lines = [whole[start:cut] for start, cut in zip(starts.tolist(), marks[:, taken[-1]].tolist(), strict=True)]
     else:
         lines = whole.split("\n")[:-1]
+    if not any(map(str.strip, lines)):
+        return None  # numpy warns of it
     try:
         table = np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=chosen)
     except ValueError:

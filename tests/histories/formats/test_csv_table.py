@@ -6,7 +6,7 @@ import contextlib
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
@@ -440,6 +440,7 @@ def test_a_last_line_without_end_counts_when_it_is_whole_for_sure(rows: str, sta
 
 
 @given(st.text(alphabet='01.,;eE+- \t\n"#ntimeI', max_size=120))
+@example("\t0\n")  # nothing in the only column that is read
 def test_no_text_raises_anything_else(text: str) -> None:
     with contextlib.suppress(FormatError):
         read(text)
