@@ -11,6 +11,7 @@ from d2rpick.library.asked import check_run, model_of
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
 from d2rpick.library.repeat import options_of
+from d2rpick.report.shell import positional
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -136,7 +137,13 @@ def parts(
     )  # fmt: skip
     named = [(f"--{name}", repr(value)) for name, value in (("tr", tr), ("td", td)) if value is not None]
     window = [text for pair in named for text in pair]
-    command = ("parts", *options, *window, *options_of(run.chosen._replace(parts=names), choosing), *run.sources)
+    command = (
+        "parts",
+        *options,
+        *window,
+        *options_of(run.chosen._replace(parts=names), choosing),
+        *positional(run.sources),
+    )
     return PartTable(run, core.rows, core.sets, core.recommended, core.cautions, command, core)
 
 
