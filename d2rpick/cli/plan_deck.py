@@ -8,7 +8,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.deck_cost import cost_options
-from d2rpick.errors import DeckError
+from d2rpick.errors import DeckError, printable
 
 if TYPE_CHECKING:
     from d2rpick.choice.cost import CostModel
@@ -74,6 +74,6 @@ def write_and_check(card: PrintedCard, plan: Plan, run: Run, options: dict[str, 
     done = card.windows[: len(plan.done)]  # as printed
     judge = HistoryJudge(run, shared.selection({**options, "part": ()}), plan.settings, done)
     checked = check_deck(written[0], configuration_for(written[0], Configuration()), judge)
-    listed = [f"written  {name}" for name in written]
+    listed = [f"written  {printable(name)}" for name in written]
     text = "\n".join([*listed, "", as_table(Checks([checked]))])
     return text, all(one.severity is not Severity.ERROR for one in checked.findings)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -10,6 +9,7 @@ from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.explorer import scripts, styles
 from d2rpick.report.health import measures_of
 from d2rpick.report.html import Markup, document, join, pairs, resource, section, table, tag
+from d2rpick.report.shell import shell_line
 from d2rpick.report.situation import heading
 from d2rpick.report.tables import short
 
@@ -117,7 +117,7 @@ def evidence(situation: Situation, health: Health | None, record: PageContext) -
     yield section("Health of the reference run", *_health(health))
     yield section("Method and limits", resource("method.html"))
     stdin = [tag("p", "with the same history on standard input:")] if "-" in record.run.sources else []
-    yield section("To repeat this", *stdin, tag("pre", shlex.join(record.command), class_="wrap"))
+    yield section("To repeat this", *stdin, tag("pre", shell_line(record.command), class_="wrap"))
 
 
 def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
@@ -131,7 +131,7 @@ def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += [] if card.solver == DEFAULT else ["--solver", card.solver]
     switches = f"--{SOLVERS[card.solver].SWITCHES}"
-    line = tag("pre", shlex.join([*command, switches, "IDS", *record.judging]), class_="wrap")
+    line = tag("pre", shell_line([*command, switches, "IDS", *record.judging]), class_="wrap")
     return section(title, tag("p", "Printed, and judged again as printed, by"), line)
 
 
