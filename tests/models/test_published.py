@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from d2rpick.models import published, published_box, published_figures, saving
 from d2rpick.models.published import MISPRINTS, table
 from d2rpick.models.rollover.model import Parameters
+from d2rpick.models.rollover.run import simulate
 from d2rpick.report.figures_models import draw_exhibit
 from d2rpick.vibration.integration import integrated
 from d2rpick.vibration.oscillator import Oscillator, State
@@ -128,6 +130,7 @@ def test_the_saving_is_predicted_beside_what_was_measured() -> None:
 
 def test_the_figures_of_the_box_say_what_a_coarse_box_does(monkeypatch: pytest.MonkeyPatch) -> None:
     coarse = Parameters(mesh=4)
+    monkeypatch.setattr(published_box, "simulate", partial(simulate, interval=5e-4))
     every = tuple(published_box.variants_of(coarse))
     some = (every[0], every[2], every[6], every[-1])  # two that act after td, two before
     assert [one.before for one in some] == [False, False, True, True]
