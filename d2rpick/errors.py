@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
 # Control and format characters (escape codes, text direction), line and paragraph separators.
-_UNSEEN = frozenset({"Cc", "Cf", "Zl", "Zp"})
+UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
 
 
 class D2RPickError(Exception):
@@ -50,7 +50,7 @@ def printable(text: str) -> str:
     import unicodedata
 
     return "".join(
-        letter.encode("unicode_escape").decode() if unicodedata.category(letter) in _UNSEEN else letter
+        letter.encode("unicode_escape").decode() if unicodedata.category(letter) in UNSEEN else letter
         for letter in text
     )
 

@@ -19,7 +19,7 @@ from d2rpick.cli.card_options import (
     numbers,
     printing,
 )
-from d2rpick.cli.output import Output, finish
+from d2rpick.cli.output import Output, finish, text_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -73,7 +73,7 @@ def command(ctx: click.Context, /, exit_zero: bool, **options: Any) -> None:
     else:
         card, verified = _judged(windows, reference, options, output)
     output.notes(card.notes, ())
-    output.content(card.text.encode())
+    output.content(text_bytes(card.text))
     finish(ctx, objection=not verified, exit_zero=exit_zero)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output, finish
+from d2rpick.cli.output import Output, finish, tell
 from d2rpick.cli.wording import in_words
 from d2rpick.errors import ConfigurationError, DeckError
 from d2rpick.report.formats import FORMATS
@@ -68,7 +68,7 @@ def command(
     cautions = _cautions(results, judge)
     output.notes(judge.notes if judge else (), cautions)
     for one in failed:
-        click.echo(f"d2rpick: {one.reason}", err=True)
+        tell(f"d2rpick: {one.reason}")
     limit = Severity(fail_on)
     if results or output_format != "table":
         checks = Checks(results, failed=failed, warnings=_warnings(cautions, failed), fail_on=limit,

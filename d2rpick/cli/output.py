@@ -94,9 +94,9 @@ class Output(NamedTuple):
         if self.quiet:
             return
         for note in notes:
-            click.echo(f"note: {printable(with_options(note))}", err=True)
+            tell(f"note: {note}")
         for caution in cautions:
-            click.echo(f"warning: {caution.code}: {printable(with_options(caution.message))}", err=True)
+            tell(f"warning: {caution.code}: {caution.message}")
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file whole or not at all: into a temporary file beside it, which then takes its name.
@@ -116,6 +116,11 @@ class Output(NamedTuple):
         except (OSError, RuntimeError) as error:  # Python before 3.13 tells a loop of links by RuntimeError
             reason = getattr(error, "strerror", None) or "a loop of symbolic links"
             raise D2RPickError(f"{name}: cannot be written ({reason}); give another file") from error
+
+
+def tell(message: str) -> None:
+    """Print a message of one line to stderr, with the options of the command line and without control codes."""
+    click.echo(printable(with_options(message)), err=True)
 
 
 def text_bytes(text: str) -> bytes:

@@ -56,7 +56,6 @@ def command(
     run time that they save, and the one to take.  A set that --part names is compared too.
     """
     from d2rpick.choice.part_sets import given_parts, parts_of
-    from d2rpick.histories.printed_steps import printed_steps
 
     times = _times(tr, td)
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
@@ -66,9 +65,9 @@ def command(
         run = asked.open()
         output = Output.of(options, *run.sources)
         model = model_of(options)
-    deck = [options["deck"]] if options["deck"] else []
+    beside = [options["deck"]] if options["deck"] else []
     given = given_parts(run, options["part"])
-    found = parts_of(run, settings, model, given=given, times=times, printed=printed_steps(run, *deck))
+    found = parts_of(run, settings, model, given=given, times=times, beside=beside)
     output.notes(run.notes, found.cautions)
     if options["report"]:
         from d2rpick.report.parts_page import as_page

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from d2rpick.errors import printable
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from threading import Event
@@ -22,7 +24,7 @@ def reading(names: Sequence[str], *, quiet: bool) -> Iterator[None]:
 
     Nobody knows how long it will take: how much of a file has to be read depends on what is asked of it.
     """
-    what = "standard input" if names[0] == "-" else names[0]
+    what = "standard input" if names[0] == "-" else printable(names[0])
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     start = perf_counter()
     with _telling(lambda seconds: f"reading {what}{more} ... {seconds:.0f} s", quiet=quiet):

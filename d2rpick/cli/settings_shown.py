@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 from click.core import ParameterSource
+
+from d2rpick.cli.output import text_bytes
+from d2rpick.report.tables import as_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,7 +23,7 @@ _SOURCES: Final = {
 
 def show(ctx: click.Context) -> None:
     """Print the settings, one per line."""
-    click.echo("\n".join(_lines(ctx)))
+    click.echo(text_bytes("\n".join(_lines(ctx))))
 
 
 def _lines(ctx: click.Context) -> Iterator[str]:
@@ -39,4 +41,4 @@ def _spelled(option: click.Parameter) -> str:
 
 
 def _written(value: Any) -> str:
-    return "none" if value in (None, ()) else json.dumps(value, ensure_ascii=False)
+    return "none" if value in (None, ()) else as_line(value)

@@ -13,7 +13,7 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli import typed
-from d2rpick.cli.output import Output, finish, text_bytes
+from d2rpick.cli.output import Output, finish, tell, text_bytes
 from d2rpick.cli.progress import counting
 from d2rpick.cli.wording import in_words, with_options
 from d2rpick.errors import D2RPickError, FormatError
@@ -118,7 +118,7 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
     text = write("study", output_format, answer, Shown(ctx.meta["d2rpick.command"], lines=before))
     output.result(in_words(text, output_format))
     if not answer.judged:
-        click.echo(f"d2rpick: no run could be judged; the first: {with_options(rows[0].message or '')}", err=True)
+        tell(f"d2rpick: no run could be judged; the first: {rows[0].message or ''}")
         ctx.exit(2)
     finish(ctx, objection=answer.objection, exit_zero=exit_zero)
 
@@ -160,7 +160,8 @@ def _listed(name: str) -> Iterator[str]:
         raise FormatError(f"{name}: cannot be read ({error.strerror}); give a file with one run per line") from None
     if b"\0" in content:
         raise FormatError(f"{name}: holds NUL bytes; give a text file with one run per line")
-    for text in os.fsdecode(content).removeprefix("\ufeff").splitlines():
+    # Not splitlines(): a name may hold its other signs.
+    for text in os.fsdecode(content).removeprefix("\ufeff").split("\n"):
         if (text := text.strip()) and not text.startswith("#"):
             yield text
 
@@ -210,7 +211,7 @@ def _rows(question: Question, sources: Sequence[str], work: Work, *, quiet: bool
     known = {number: row for number, source in enumerate(sources) if ledger and (row := ledger.find(source))}
     new = [number for number in range(len(sources)) if number not in known]
     if ledger and (ledger.taken or ledger.outdated or ledger.damaged) and not work.quiet:
-        click.echo(f"note: {ledger.told(len(sources))}", err=True)
+        tell(f"note: {ledger.told(len(sources))}")
     # the processes of a cluster work in other folders
     names = [os.path.abspath(sources[n]) if work.scheduler else sources[n] for n in new]  # noqa: PTH100
     following = 0
@@ -236,6 +237,6 @@ def _farm(work: Work, calls: int) -> Farm:
     if work.scheduler and calls:
         cluster = workers.Cluster(work.scheduler)
         if not cluster.threads and not work.quiet:
-            click.echo(f"note: {work.scheduler}: no workers yet, waiting for some", err=True)
+            tell(f"note: {work.scheduler}: no workers yet, waiting for some")
         return cluster
     return workers.on_cores(min(work.jobs or workers.cores(), calls), "d2rpick.studies.study")

@@ -29,6 +29,8 @@ def judging(options: dict[str, Any]) -> list[str]:
 
 def asking() -> tuple[list[str], list[str]]:
     """Give the command line that asks for the pair of a td by the same history, in front of td and behind it."""
+    from d2rpick.report.shell import positional  # not above: most answers repeat no command
+
     context = click.get_current_context()
     given = [
         text
@@ -36,7 +38,7 @@ def asking() -> tuple[list[str], list[str]]:
         if option.name in ASKING and context.get_parameter_source(option.name) is not click.core.ParameterSource.DEFAULT
         for text in _typed(option, context.params[option.name])
     ]
-    return ["d2rpick", "suggest", "--td"], [*given, *context.params["history"]]
+    return ["d2rpick", "suggest", "--td"], [*given, *positional(context.params["history"])]
 
 
 def _typed(option: click.Parameter, value: Any) -> list[str]:

@@ -3,79 +3,82 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import partial
-from itertools import pairwise
 from threading import Thread
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import DeckError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, MutableSequence
+    from collections.abc import Callable, Iterator, MutableSequence, Sequence
 
     from d2rpick.deck.stored import Held, OnDisk
 
 _PIECE: Final = 1 << 18  # bytes looked at together: they stay in the cache
-_SHARED: Final = 1 << 22  # a file from this size on is searched by several threads; it takes long to start one
-_SHARES: Final = 2  # the system copies bytes for all of them at once, but only one searches at a time
+_SHARE: Final = 1 << 22  # bytes of a big file that one thread searches before it asks for more
+_HELPERS: Final = 1  # threads beside the first: the system copies bytes for all at once, but one at a time searches
 _LOOKBACK: Final = 32  # bytes in front of a piece, where blanks before its first mark stand, or a head that it cuts
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
 _ANCHOR: Final = _PGP.index(b"G")  # a letter that mesh data never holds: looking for it alone costs nothing
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # of UTF-8
 
 
-def find_marks(file: Held | OnDisk) -> MutableSequence[int]:
+def find_marks(file: Held | OnDisk) -> Sequence[int]:
     """Offsets of the ``*`` that begin a line (blanks before it allowed) and of encrypted blocks, ascending."""
-    shares = _SHARES if file.size >= _SHARED else 1
-    first = len(BYTE_ORDER_MARK) if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK else 0
-    bounds = [first + (file.size - first) * share // shares for share in range(shares + 1)]
-    searches = [partial(_between, file, first, *share) for share in pairwise(bounds)]
-    helpers = [_Helper(search) for search in searches[1:]]
+    search = _Search(file)
+    helpers = [Thread(target=search.help) for _ in range(_HELPERS if len(search.shares) > 1 else 0)]
     for helper in helpers:
         helper.start()
     try:
-        found = searches[0]()
+        search.go_on()
     finally:
         for helper in helpers:
             helper.join()
-    for helper in helpers:
-        found.extend(helper.result())
-    return found
+    return search.result()
 
 
-class _Helper(Thread):
-    """A search beside others."""
+class _Search:
+    """A search of a file by several threads, each of which takes the next share that waits."""
 
-    def __init__(self, search: Callable[[], MutableSequence[int]]) -> None:
-        super().__init__()
-        self._search = search
-        self._found: MutableSequence[int] | None = None
+    def __init__(self, file: Held | OnDisk) -> None:
+        self._file = file
+        self._first = len(BYTE_ORDER_MARK) if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK else 0
+        self.shares = range(self._first, file.size, _SHARE)
+        self._room: Callable[[], MutableSequence[int]] = list if len(self.shares) == 1 else _compact
+        self._waiting = iter(self.shares)
+        self._found: dict[int, Sequence[int]] = {}
 
-    def run(self) -> None:
-        """Search; what goes wrong is said by `result`, where it is heard."""
+    def go_on(self) -> None:
+        """Search what waits."""
+        for begin in self._waiting:
+            self._found[begin] = self._between(begin, min(begin + _SHARE, self._file.size))
+
+    def help(self) -> None:
+        """Search beside others; the share with which something goes wrong is left to `result`."""
         with suppress(DeckError, OSError):
-            self._found = self._search()
+            self.go_on()
 
-    def result(self) -> MutableSequence[int]:
-        """Give what was found, or search again."""
-        return self._search() if self._found is None else self._found
+    def result(self) -> Sequence[int]:
+        """All that was found; what a helper left is searched here, where an error is heard."""
+        self._waiting = iter([begin for begin in self.shares if begin not in self._found])
+        self.go_on()
+        marks = self._room()
+        for begin in self.shares:
+            marks.extend(self._found.pop(begin))
+        return marks
+
+    def _between(self, begin: int, end: int) -> Sequence[int]:
+        found = self._room()
+        with self._file.opened() as read:
+            for at in range(begin, end, _PIECE):
+                low = max(self._first, at - _LOOKBACK)
+                piece = read(low, min(at + _PIECE, end))
+                places = sorted([*_starred(piece, at - low), *_encrypted(piece, at - low)])
+                found.extend(low + place for place in places)
+        return found
 
 
-def _between(file: Held | OnDisk, first: int, begin: int, end: int) -> MutableSequence[int]:
-    """Search a part of a file that begins at ``first``."""
-    found = _room_for_marks(file)
-    with file.opened() as read:
-        for at in range(begin, end, _PIECE):
-            low = max(first, at - _LOOKBACK)
-            piece = read(low, min(at + _PIECE, end))
-            found.extend(low + place for place in sorted([*_starred(piece, at - low), *_encrypted(piece, at - low)]))
-    return found
-
-
-def _room_for_marks(file: Held | OnDisk) -> MutableSequence[int]:
-    if file.size < _SHARED:
-        return []
-    from array import array  # a fifth of the memory of a list, which counts where every line of a big file has a mark
+def _compact() -> MutableSequence[int]:
+    from array import array  # not above: most files are small, and a list of few is as good
 
     return array("q")
 

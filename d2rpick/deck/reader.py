@@ -131,6 +131,7 @@ class _Reader:
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
         self.folders = Folders(deck.path)
+        self.sources: dict[str, SourceFile] = {}  # by path: a file that is included twice is the same each time
 
     def read(self, source: SourceFile, context: _Context) -> None:
         self.deck.sources.append(source)
@@ -186,7 +187,9 @@ class _Reader:
                 reason = "no permission to read it"
             else:
                 chain = (*context.chain, os.path.realpath(card.file))
-                self.read(SourceFile(path), _Context(Scope(context.scope), width, asked.transform, chain))
+                if path not in self.sources:
+                    self.sources[path] = SourceFile(path)
+                self.read(self.sources[path], _Context(Scope(context.scope), width, asked.transform, chain))
                 continue
             self.deck.unread.append(Unread(asked.name, reason))
 

@@ -79,6 +79,16 @@ class SourceFile:
             else:
                 size *= 2  # this line is longer
 
+    def sha256(self) -> str:
+        """SHA-256 of the bytes; DeckError where the file was rewritten since it was read."""
+        import hashlib
+
+        digest = hashlib.sha256()
+        with self._file.opened() as read:
+            for at in range(0, self._file.size, _PIECE):
+                digest.update(read(at, min(at + _PIECE, self._file.size)))
+        return digest.hexdigest()
+
     def ends_with_line(self) -> bool:
         """Whether the last line has its line end; an empty file has."""
         return self.read(max(0, self._file.size - 1)) in (b"", b"\n")

@@ -88,6 +88,7 @@ class OnDisk(Content):
 
     def __init__(self, name: str, file: int) -> None:
         from array import array  # not above: most files are small
+        from threading import Lock, local
 
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
@@ -95,8 +96,7 @@ class OnDisk(Content):
         self._size = self._seen.size
         self._views = array("Q")  # begin, end and sum of what was looked at
         self._fields: list[tuple[Addresses, int, int]] = []  # addresses, width and sum of what was taken
-        self._window, self._begin = b"", 0
-        self._buffer = np.empty(2 * _BLOCK, np.uint8)  # used again and again: fresh memory costs more than reading
+        self._lock, self._own = Lock(), local()  # of each thread: its buffer and its window
         self._digest = ""
         self._awaited: tuple[int, ...] = ()  # times of the file for which a pause was made
 
@@ -107,8 +107,9 @@ class OnDisk(Content):
         return self._size
 
     def __bytes__(self) -> bytes:
-        self._file.seek(0)
-        data = self._file.readall()[: self._size]
+        with self._lock:
+            self._file.seek(0)
+            data = self._file.readall()[: self._size]
         if len(data) < self._size:
             raise self._shortened()
         self._views.extend((0, self._size, _sum(np.frombuffer(data, np.uint8))))
@@ -117,13 +118,13 @@ class OnDisk(Content):
 
     def __getitem__(self, where: slice) -> bytes:
         begin, end, _ = where.indices(self._size)
-        at = begin - self._begin
-        if begin < end and (at < 0 or end > self._begin + len(self._window)):
+        window, first = getattr(self._own, "window", (b"", 0))
+        if begin < end and (begin < first or end > first + len(window)):
             if end - begin > _WINDOW:
                 return self.view(begin, end).tobytes()
-            self._window = self.view(begin, min(begin + _WINDOW, self._size)).tobytes()
-            self._begin, at = begin, 0
-        return self._window[at : at + end - begin] if begin < end else b""
+            window, first = self.view(begin, min(begin + _WINDOW, self._size)).tobytes(), begin
+            self._own.window = window, first
+        return bytes(window[begin - first : end - first]) if begin < end else b""
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
         """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
@@ -135,15 +136,15 @@ class OnDisk(Content):
 
     def rfind(self, wanted: bytes, end: int) -> int:
         """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
-        for stop in range(end, 0, -_NEAR):
-            first = max(0, stop - _NEAR)
+        for stop in range(end, 0, -_WINDOW):
+            first = max(0, stop - _WINDOW)
             found = self[first:stop].rfind(wanted)
             if found >= 0:
                 return first + found
         return -1
 
     def view(self, begin: int, end: int) -> Bytes:
-        """Bytes from one address to another, shape (end - begin,); valid up to the next call."""
+        """Bytes from one address to another, shape (end - begin,); valid up to the next call in this thread."""
         data = self._near(begin, end)
         self._views.extend((begin, end, _sum(data)))
         return data
@@ -160,10 +161,18 @@ class OnDisk(Content):
         return found
 
     def _near(self, begin: int, end: int) -> Bytes:
-        fits = end - begin <= self._buffer.size
-        data = self._buffer[: end - begin] if fits else np.empty(end - begin, np.uint8)
+        data = self._room(end - begin)
         self._fill(data.data, begin)
         return data
+
+    def _room(self, size: int) -> Bytes:
+        """Room for so many bytes, that of few used again and again: fresh memory costs more than reading."""
+        if size > 2 * _BLOCK:
+            return np.empty(size, np.uint8)
+        if not hasattr(self._own, "buffer"):
+            self._own.buffer = np.empty(2 * _BLOCK, np.uint8)
+        buffer: Bytes = self._own.buffer
+        return buffer[:size]
 
     def _in_order(self, addresses: Addresses, width: int) -> Bytes:
         """Read what lies close together in one piece, and what lies alone by itself."""
@@ -195,13 +204,14 @@ class OnDisk(Content):
 
     def _fill(self, room: memoryview, begin: int) -> None:
         """Read as many bytes as there is room."""
-        self._file.seek(begin)
-        done = self._file.readinto(room)
-        while done < len(room):  # a single call gives 2 GB at most
-            more = self._file.readinto(room[done:])
-            if not more:
-                raise self._shortened()
-            done += more
+        with self._lock:
+            self._file.seek(begin)
+            done = self._file.readinto(room)
+            while done < len(room):  # a single call gives 2 GB at most
+                more = self._file.readinto(room[done:])
+                if not more:
+                    raise self._shortened()
+                done += more
 
     def _shortened(self) -> FormatError:
         return FormatError(
@@ -229,7 +239,8 @@ class OnDisk(Content):
 
     def _is_as_before(self) -> bool:
         """Whether everything that was read is still the same."""
-        views = zip(*(self._views[part::3] for part in range(3)), strict=True)
+        known_views = self._views[:]  # another thread may look at more meanwhile
+        views = zip(*(known_views[part::3] for part in range(3)), strict=True)
         return all(_sum(self._near(begin, end)) == known for begin, end, known in views) and all(
             _sum(self._in_order(addresses, width).ravel()) == known for addresses, width, known in self._fields
         )

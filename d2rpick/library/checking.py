@@ -9,6 +9,7 @@ from d2rpick.library import arguments
 from d2rpick.library.asked import check_run
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
+from d2rpick.report.shell import positional
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -116,7 +117,7 @@ def check(
         findings=tuple(finding for one in checked for finding in one.findings),
         windows=tuple(window for one in checked for window in one.windows),
         warnings=tuple(judge.cautions) if judge else (),
-        command=("check", *files, *judging, *rules, *names),
+        command=("check", *files, *judging, *rules, *positional(names)),
         _checked=checked,
         _history=history.sources if history else None,
     )

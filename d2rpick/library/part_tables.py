@@ -121,17 +121,14 @@ def parts(
     ['box', 'step']
     """
     from d2rpick.choice.part_sets import given_parts, parts_of
-    from d2rpick.histories.printed_steps import printed_steps
 
     check_run(run)
     settings = arguments.settings(choosing, with_deck=True)
     times = _times(tr, td)
     names = arguments.part_names("given", given)
     model, options = model_of(deck, weights)
-    core = parts_of(
-        run.files, settings, model, given=given_parts(run.files, names), times=times,
-        printed=printed_steps(run.files, *options[1:2]),  # beside the deck
-    )  # fmt: skip
+    given_ids = given_parts(run.files, names)
+    core = parts_of(run.files, settings, model, given=given_ids, times=times, beside=options[1:2])
     named = [(f"--{name}", repr(value)) for name, value in (("tr", tr), ("td", td)) if value is not None]
     window = [text for pair in named for text in pair]
     command = ("parts", *options, *window, *asking(run, run.chosen._replace(parts=names), choosing))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from d2rpick.report.shell import positional
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 
 def asking(run: Run, selection: Selection, choosing: Choosing) -> tuple[str, ...]:
     """Give what follows the times in such a command line."""
-    return (*options_of(selection, choosing, run.input_format), *run.sources)
+    return (*options_of(selection, choosing, run.input_format), *positional(run.sources))
 
 
 def options_of(selection: Selection, choosing: Choosing, input_format: str) -> tuple[str, ...]:

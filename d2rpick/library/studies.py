@@ -10,6 +10,7 @@ from d2rpick.library import arguments
 from d2rpick.library.answers import written
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
+from d2rpick.report.shell import positional
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -146,5 +147,5 @@ def study(
             rows[answer.number] = replace(row, source=names[answer.number])
     core = summarise(question.td, [rows[number] for number in range(len(names))])
     times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked))
-    command = ("study", *times, *options_of(selection, choosing, input_format), *names)
+    command = ("study", *times, *options_of(selection, choosing, input_format), *positional(names))
     return Study(core.td, core.rows, core.agree, core.common, core.cautions, command, core)

@@ -6,7 +6,6 @@ Python computes and prints everything; the script in ``explorer.js`` looks it up
 from __future__ import annotations
 
 import json
-import shlex
 from dataclasses import dataclass
 from statistics import median
 from typing import TYPE_CHECKING, Any, Final
@@ -18,6 +17,7 @@ from d2rpick.choice.view import scale_of, view_of
 from d2rpick.histories.outline import outline
 from d2rpick.report.explorer_rows import VALUES, error_name, row_of, saved_name, table_of
 from d2rpick.report.html import Markup, join, resource, tag
+from d2rpick.report.shell import shell_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -61,7 +61,7 @@ def scripts() -> tuple[Markup, ...]:
 def explorer(shown: Explorer) -> Markup:
     """Give the section, hidden until its script finds that it can run, and its data."""
     flights = [_flight(one) for one in shown.trade_offs]
-    before, behind = (shlex.join(words) for words in shown.command)
+    before, behind = (shell_line(words) for words in shown.command)
     content = (
         tag("h2", "What another td would cost"),
         tag("p", _HELP, class_="soft"),

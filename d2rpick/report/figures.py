@@ -148,6 +148,11 @@ def entries(panels: Sequence[Axes]) -> dict[str, Artist]:
     return {name: handle for pairs in known for handle, name in pairs}
 
 
+def with_unit(name: str, unit: str) -> str:
+    """Label an axis, with the unit where a file names one."""
+    return f"{name} [{plain(unit)}]" if unit else name
+
+
 def plain(name: str) -> str:
     """Keep a name from a file from being read as a formula, or, with an underscore in front, as one to be hidden.
 

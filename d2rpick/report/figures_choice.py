@@ -21,6 +21,7 @@ from d2rpick.report.figures import (
     mark_times,
     plain,
     show_span,
+    with_unit,
 )  # fmt: skip
 from d2rpick.report.figures_page import arrange
 from d2rpick.report.situation import energy_name
@@ -82,8 +83,7 @@ def _draw(
         _draw_motion(panels[1], motion)
     if better:
         _draw_better(panels, situation.at(better.td), better.tr)
-    unit = situation.history.time_unit
-    panels[-1].set_xlabel(f"time [{unit}]" if unit else "time")
+    panels[-1].set_xlabel(with_unit("time", situation.history.time_unit))
     for panel in panels:
         finish(panel, legend=not page)
     _show(panels[0], situation, seen)

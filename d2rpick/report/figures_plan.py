@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from matplotlib.figure import Figure
 
-from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, WIDTH, entries, finish
+from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, WIDTH, entries, finish, with_unit
 from d2rpick.report.figures_page import arrange
 
 if TYPE_CHECKING:
@@ -39,8 +39,7 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
             )  # fmt: skip
     low, high = axes.get_ylim()
     axes.set_ylim(low - 2 * _STRIP * (high - low), high)
-    unit = history.time_unit
-    axes.set(xlabel=f"time [{unit}]" if unit else "time", ylabel="internal energy")
+    axes.set(xlabel=with_unit("time", history.time_unit), ylabel="internal energy")
     finish(axes, legend=False)
     if page:
         arrange(figure, [axes], _PANEL)

@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from d2rpick.choice.view import scale_of
-from d2rpick.report.figures import GOOD, REFERENCE, SWITCHED, WIDTH, finish, mark_times, plain, show_span
+from d2rpick.report.figures import GOOD, REFERENCE, SWITCHED, WIDTH, finish, mark_times, plain, show_span, with_unit
 from d2rpick.report.figures_page import WIDTH as PAGE
 from d2rpick.studies.common import runs_of
 from d2rpick.studies.outliers import outliers, short_names
@@ -69,7 +69,7 @@ def draw_study(answer: Study, *, page: bool = False) -> Figure:
     _draw_times(axes, drawn)
     units = {row.time_unit for row in answer.rows if row.judged}
     unit = units.pop() if len(units) == 1 else ""
-    axes.set(xlabel=f"time [{unit}]" if unit else "time", ylabel="internal energy")
+    axes.set(xlabel=with_unit("time", unit), ylabel="internal energy")
     finish(axes, legend=False)
     _show(axes, answer, drawn)
     _name(axes, named, page=page)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from d2rpick.histories.outline import outline
-from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, STRETCHES, SWITCHED, WIDTH, entries, finish
+from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, STRETCHES, SWITCHED, WIDTH, entries, finish, with_unit
 from d2rpick.report.figures_page import arrange
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
     saved = [one.saving for one in found.offers]
     cost = any(one is not None for one in saved)
     _curve(rigid, found, saved if cost else [one.rigid_time for one in found.offers])
-    td = f"td [{history.time_unit}]" if history.time_unit else "td"
+    td = with_unit("td", history.time_unit)
     rigid.set(ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None))
     panels = (energy, error, rigid)
     for axes in panels:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections import Counter
@@ -13,7 +12,8 @@ from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
 from d2rpick.deck.source import STDIN
-from d2rpick.errors import name_units
+from d2rpick.errors import name_units, printable
+from d2rpick.report import tables
 from d2rpick.rules import RULES, Severity
 from d2rpick.version import __version__
 
@@ -59,18 +59,18 @@ def as_table(checks: Checks) -> str:
             f"  {_shown(f.file, root)}:{f.line}:{f.column}: {f.severity} {f.rule} {f.message}" for f in result.findings
         ]
     left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
-    return "\n".join([*lines, "", _summary_line(checks.results) + left_out])
+    return "\n".join([*map(printable, lines), "", _summary_line(checks.results) + left_out])
 
 
 def as_json(checks: Checks, command: Sequence[str]) -> str:
     """Give everything by schema d2rpick/check/1."""
-    return json.dumps(_content(checks, command), indent=2, allow_nan=False, ensure_ascii=False)
+    return tables.as_json(_content(checks, command))
 
 
 def as_ndjson(checks: Checks, command: Sequence[str]) -> str:
     """Give a line for each deck, by the same schema as ``as_json``."""
     contents = (_content(replace(checks, results=[result]), command) for result in checks.results)
-    return "\n".join(json.dumps(content, allow_nan=False, ensure_ascii=False) for content in contents)
+    return "\n".join(map(tables.as_line, contents))
 
 
 def _content(checks: Checks, command: Sequence[str]) -> dict[str, Any]:
@@ -183,7 +183,7 @@ def as_sarif(checks: Checks) -> str:
         "invocations": [{"executionSuccessful": not checks.failed, "toolExecutionNotifications": messages}],
         "results": found,
     }
-    return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2, ensure_ascii=False)
+    return tables.as_json({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
 
 
 def _window_lines(windows: Sequence[Window], root: Path) -> Iterator[str]:
@@ -254,9 +254,9 @@ def _uri(path: str, root: Path) -> str:
 def _escaped(text: str, more: str = "") -> str:
     for letter in "%\r\n" + more:
         text = text.replace(letter, f"%{ord(letter):02X}")
-    return text
+    return printable(text)
 
 
 def _xml(text: str) -> str:
-    """Return the text without the characters that XML 1.0 has no way to write."""
-    return _NOT_XML.sub("?", text)
+    """Return the text in characters that XML 1.0 can write and a terminal shows."""
+    return _NOT_XML.sub("?", printable(text))

@@ -22,8 +22,9 @@ _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
 _VOID = frozenset({"meta", "link", "br", "hr", "input"})
 _NOTHING = "'none'"
-# Characters that no page may hold.
-_CONTROLS = dict.fromkeys({*range(32), *range(127, 160)} - {*map(ord, "\t\n")}, "\ufffd")
+# Characters that no page may hold, and those that turn the text around them.
+_TURNING = {*range(0x202A, 0x202F), *range(0x2066, 0x206A)}
+_CONTROLS = dict.fromkeys({*range(32), *range(127, 160), *_TURNING} - {*map(ord, "\t\n")}, "\ufffd")
 
 
 class Markup(str):

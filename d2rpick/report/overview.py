@@ -39,7 +39,7 @@ def as_markdown(overview: Overview) -> str:
     parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
     listed = _health(overview)
     health = [tables.as_markdown(head(overview.health), listed)] if overview.health and listed else []
-    return "\n\n".join([facts, *parts, *health, *(f"* {printable(note)}" for note in overview.notes)])
+    return "\n\n".join([facts, *parts, *health, *(f"* {tables.in_markdown(note)}" for note in overview.notes)])
 
 
 def as_csv(overview: Overview) -> str:

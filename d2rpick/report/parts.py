@@ -106,6 +106,7 @@ def as_json(found: Parts, command: Sequence[str]) -> str:
             "deck": None
             if deck is None
             else {
+                **keys.of_files(deck.files),
                 "solver": deck.solver,
                 "parts": len(deck.parts),
                 "elements": sum(sum(counts.values()) for counts in deck.counts.values()),
@@ -115,7 +116,7 @@ def as_json(found: Parts, command: Sequence[str]) -> str:
             "weights": None
             if weights is None
             else {
-                "source": weights.source,
+                **keys.of_weights(weights),
                 "element_share": weights.element_share,
                 "rigid_node": weights.rigid_node,
                 "per_element": dict(weights.per_element),

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import TYPE_CHECKING
 
 from d2rpick.report import page
 from d2rpick.report.html import Markup, document, pairs, remarks, section, table, tag
 from d2rpick.report.parts import HEAD, SET_HEAD, SETS, TABLES, columns, heading, outlook, ranges, rows, set_rows
+from d2rpick.report.shell import shell_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -31,8 +31,9 @@ def _sections(found: Parts, command: Sequence[str]) -> Iterator[Markup]:
     read = [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in heading(found)]
     if found.weights:
         read.append(("weights", found.weights.source))
-    yield section("What was read", pairs([*read, *page.digests(found.run.files)]))
-    yield section("To repeat this", tag("pre", shlex.join(command), class_="wrap"))
+    deck = page.deck_digests(found.inventory.files, found.weights) if found.inventory else []
+    yield section("What was read", pairs([*read, *page.digests(found.run.files), *deck]))
+    yield section("To repeat this", tag("pre", shell_line(command), class_="wrap"))
 
 
 def _card(best: PartSet | None) -> Markup:

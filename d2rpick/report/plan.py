@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from d2rpick.errors import printable
 from d2rpick.report import tables
 from d2rpick.report.situation import frame_of, what_was_read
 
@@ -27,17 +28,17 @@ WINDOW = (
 def as_table(plan: Plan) -> str:
     """What was read, a row per flight, what the supported windows save, and why others are not supported."""
     table = tables.as_text(head(plan), rows(plan)) if plan.rows else "no flight"
-    named = [f"flight {row.number}  {row.reason}" for row in plan.rows if row.reason]
-    lines = [heading(plan), "", table, "", *(f"{name.ljust(9)}  {text}" for name, text in outlook(plan)), *named]
+    named = [f"flight {row.number}  {printable(row.reason)}" for row in plan.rows if row.reason]
+    told = [f"{name.ljust(9)}  {printable(text)}" for name, text in outlook(plan)]
+    lines = [heading(plan), "", table, "", *told, *named]
     return "\n".join(lines)
 
 
 def as_markdown(plan: Plan) -> str:
     """The flights as a Markdown table, and below it what is saved, and why windows are not supported."""
-    named = [f"flight {row.number}: {row.reason}" for row in plan.rows if row.reason]
-    return "\n\n".join(
-        [tables.as_markdown(head(plan), rows(plan)), *(f"{name}: {text}" for name, text in outlook(plan)), *named]
-    )
+    named = [(f"flight {row.number}", row.reason) for row in plan.rows if row.reason]
+    told = [f"{name}: {tables.in_markdown(text)}" for name, text in (*outlook(plan), *named)]
+    return "\n\n".join([tables.as_markdown(head(plan), rows(plan)), *told])
 
 
 def as_csv(plan: Plan) -> str:
@@ -49,7 +50,7 @@ def as_json(plan: Plan, command: Sequence[str]) -> str:
     """The whole plan by schema d2rpick/plan/1."""
     return tables.as_json(
         {
-            **frame_of(plan.history, SCHEMA, command, plan.cautions),
+            **frame_of(plan.history, plan.settings, SCHEMA, command, plan.cautions),
             "min_rigid": plan.min_rigid,
             "windows": [window(plan, row) for row in plan.rows],
             "rigid_time": plan.rigid_time,

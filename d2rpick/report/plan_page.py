@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import TYPE_CHECKING
 
 from d2rpick.report import page
@@ -11,6 +10,7 @@ from d2rpick.report.figures_page import svg_element
 from d2rpick.report.figures_plan import draw_plan
 from d2rpick.report.html import Markup, drawings, pairs, remarks, resource, section, table, tag
 from d2rpick.report.plan import head, heading, outlook, quality, rows
+from d2rpick.report.shell import shell_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -57,9 +57,10 @@ def _sections(
         yield section("For the solver's input", tag("pre", card, tabindex="0"))
     what, _, text = heading(plan).partition(" ")
     notes = [("note", note) for note in plan.history.notes]
-    yield section("What was read", pairs([(what, text.strip()), *page.digests(run.files), *notes]))
+    files = [*page.digests(run.files), *page.digests_of(plan.settings)]
+    yield section("What was read", pairs([(what, text.strip()), *files, *notes]))
     yield section("Method and limits", resource("method.html"))
-    yield section("To repeat this", tag("pre", shlex.join(command), class_="wrap"))
+    yield section("To repeat this", tag("pre", shell_line(command), class_="wrap"))
 
 
 def _window(row: Planned, plan: Plan) -> Markup:

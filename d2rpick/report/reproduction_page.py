@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import TYPE_CHECKING
 
 from d2rpick.models.published import MISPRINTS
@@ -10,6 +9,7 @@ from d2rpick.report.figures_models import draw_exhibit
 from d2rpick.report.figures_page import svg_element
 from d2rpick.report.html import Markup, document, section, table, tag
 from d2rpick.report.reproduction import HEAD, MODEL, cells, heading, pairs_of, verdict
+from d2rpick.report.shell import shell_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +27,7 @@ def as_page(rows: Sequence[PublishedValue], exhibits: Sequence[Exhibit], command
         section("Published and here", table("Published and here", HEAD, [cells(row) for row in rows])),
         tag("ul", *(tag("li", text) for text in pairs_of())),
         section("Misprints in the paper", tag("ul", *(tag("li", misprint) for misprint in MISPRINTS))),
-        section("To repeat this", tag("pre", shlex.join(command), class_="wrap")),
+        section("To repeat this", tag("pre", shell_line(command), class_="wrap")),
         signed=("checked by", "date", "signature"),
     )
 

@@ -32,7 +32,7 @@ def as_table(answer: Study) -> str:
 
 def as_markdown(answer: Study) -> str:
     """The runs as a Markdown table, and below what they have in common."""
-    below = "\n".join(f"* {name}: {printable(text)}" for name, text in outcome(answer))
+    below = "\n".join(f"* {name}: {tables.in_markdown(text)}" for name, text in outcome(answer))
     return f"{tables.as_markdown(HEAD, rows(answer))}\n\n{below}"
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import TYPE_CHECKING
 
 from d2rpick.report.html import Markup, document, drawings, pairs, remarks, resource, section, table, tag
+from d2rpick.report.shell import shell_line
 from d2rpick.report.study import HEAD, outcome, rows, td_of
 from d2rpick.report.tables import known
 from d2rpick.studies.common import runs_of
@@ -39,7 +39,7 @@ def _sections(answer: Study, command: Sequence[str], drawing: str) -> Iterator[M
     yield section("Runs", table("Runs", *known(head, rows(answer))))
     yield section("Files", tag("pre", _files(answer), class_="wrap"))
     yield section("Method and limits", resource("method.html"))
-    yield section("To repeat this", tag("pre", shlex.join(command), class_="wrap"))
+    yield section("To repeat this", tag("pre", shell_line(command), class_="wrap"))
 
 
 def _common(answer: Study) -> Markup:

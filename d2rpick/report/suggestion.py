@@ -41,7 +41,7 @@ def as_table(answer: Suggestion, limit: int) -> str:
 
 def as_markdown(answer: Suggestion, limit: int) -> str:
     """The candidates as a Markdown table, and the verdict below it."""
-    lines = [f"{name}: {text}" for name, text in (*verdict(answer), *outlook(answer))]
+    lines = [f"{name}: {tables.in_markdown(text)}" for name, text in (*verdict(answer), *outlook(answer))]
     return "\n\n".join([tables.as_markdown(HEAD, rows(answer, limit)), *lines])
 
 

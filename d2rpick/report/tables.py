@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from operator import gt
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.errors import printable
+from d2rpick.errors import UNSEEN, printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -112,7 +113,7 @@ def _broken(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]]:
 
 
 def as_markdown(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
-    """Give a Markdown table; bars in cells are escaped.
+    """Give a Markdown table; what would be markup in cells is escaped.
 
     Examples
     --------
@@ -122,11 +123,22 @@ def as_markdown(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     | 0.5 | crossing |
     """
     lines = [
-        [short(name) for name in head],
+        [in_markdown(short(name)) for name in head],
         ["---"] * len(head),
-        *([short(c).replace("|", r"\|") for c in row] for row in rows),
+        *([in_markdown(short(c)) for c in row] for row in rows),
     ]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def in_markdown(text: str) -> str:
+    r"""Escape what Markdown would take for markup in a name, in printable text.
+
+    Examples
+    --------
+    >>> print(in_markdown("a|b"), in_markdown("C:\\run"), in_markdown("<i>part_1</i>"))
+    a\|b C:\\run \<i>part_1\</i>
+    """
+    return re.sub(r"[\\|<*\[~]|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])", r"\\\g<0>", printable(text))
 
 
 def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
@@ -153,15 +165,22 @@ def _exact(value: Cell) -> Cell:
     return printable(value) if isinstance(value, str) else value
 
 
-def as_line(result: dict[str, Any]) -> str:
+def as_line(result: Any) -> str:
     """Write a result as JSON in one line."""
-    import json
-
-    return json.dumps(result, allow_nan=False, ensure_ascii=False)
+    return _json(result, None)
 
 
-def as_json(result: dict[str, Any]) -> str:
+def as_json(result: Any) -> str:
     """Write a result as JSON: full precision, null for what is not known; a NaN would be a fault and raises."""
-    import json
+    return _json(result, 2)
 
-    return json.dumps(result, indent=2, allow_nan=False, ensure_ascii=False)
+
+def _json(result: Any, indent: int | None) -> str:
+    r"""Write JSON in which nothing commands a terminal or turns the text around: that is written as ``\u....``."""
+    import json
+    import unicodedata
+
+    def seen(found: re.Match[str]) -> str:
+        return json.dumps(found[0])[1:-1] if unicodedata.category(found[0]) in UNSEEN else found[0]
+
+    return re.sub(r"[^\n -~]", seen, json.dumps(result, indent=indent, allow_nan=False, ensure_ascii=False))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.choice.ranking import EQUALLY_GOOD
+from d2rpick.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.situation import frame, mechanics, read_line
 
@@ -30,12 +31,12 @@ def as_table(found: TradeOff, limit: int) -> str:
     left = len(found.offers) - len(shown)
     if left:
         lines.append(f"... and {left} more td (--limit; csv and json have all)")
-    return "\n".join([*lines, "", answer(found)])
+    return "\n".join([*lines, "", printable(answer(found))])
 
 
 def as_markdown(found: TradeOff, limit: int) -> str:
     """The same offers as a Markdown table, and the answer below it."""
-    return "\n\n".join([tables.as_markdown(HEAD, rows(some_of(found, limit))), answer(found)])
+    return "\n\n".join([tables.as_markdown(HEAD, rows(some_of(found, limit))), tables.in_markdown(answer(found))])
 
 
 def as_csv(found: TradeOff) -> str:

@@ -22,7 +22,7 @@ def as_table(answer: Verdict) -> str:
     """The verdict and its reasons, what it rests on, and the measures of the pair."""
     width = max(len(name) for name in keys.of_verdict(answer))
     lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in keys.of_verdict(answer).items()]
-    reasons = [f"  {reason}" for reason in answer.reasons]
+    reasons = [f"  {printable(reason)}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
     told = [f"verdict  {_told(answer)}", *([f"quality  {answer.quality.told}"] if answer.quality else [])]
@@ -32,7 +32,7 @@ def as_table(answer: Verdict) -> str:
 def as_markdown(answer: Verdict) -> str:
     """The measures as a Markdown table of two columns, and the reasons below it."""
     table = tables.as_markdown(("measure", "value"), list({**keys.of_verdict(answer), **_of_switched(answer)}.items()))
-    return "\n".join([table, *(f"\n* {reason}" for reason in answer.reasons)])
+    return "\n".join([table, *(f"\n* {tables.in_markdown(reason)}" for reason in answer.reasons)])
 
 
 def as_csv(answer: Verdict) -> str:

@@ -275,10 +275,22 @@ def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(c
     """Between two pushes the car is rigid for 17 ms, after them for 108: the window that `parts` compares sets in."""
     found = plan_of(car, PLAIN)
     assert statuses(found) == ["left-out", "supported"]
-    assert "flight 2 for 0.108: a run supports only one window" in (found.rows[0].reason or "")
+    assert "flight 2 behind it for 0.108: this window locks in energy" in (found.rows[0].reason or "")
     longest = suggest_of(car, None, PLAIN).recommended
     assert longest is not None
     assert found.windows() == ((longest.tr, longest.td),)
+
+
+def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_where_that_waits(tmp_path: Path) -> None:
+    """Flights 2 and 3 are left out for flight 5, which waits for flight 4: without them it waits for two runs less."""
+    box = read(written(drop(height=0.1, tilt=80.0), tmp_path), BOX)
+    found = plan_of(box, PLAIN)
+    assert statuses(found)[:5] == ["supported", "left-out", "left-out", "supported", "re-plan"]
+    for row in found.rows[1:3]:
+        assert "flight 5 behind it for 0.17: this window locks in energy" in (row.reason or "")
+        assert "that flight would wait for one run more" in (row.reason or "")
+    every = plan_of(box, PLAIN, min_rigid=0.07)
+    assert statuses(every)[:5] == ["supported", "supported", "re-plan", "re-plan", "re-plan"]
 
 
 def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(car: Reference) -> None:

@@ -248,6 +248,14 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(
         ]
 
 
+def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(tmp_path: Path) -> None:
+    file = tmp_path / "input"
+    file.write_bytes(table(lambda t: t * t))
+    for command in ("suggest", "explore"):
+        assert "nothing in the record shows a flight; name td, or a window for it" in refused(command, str(file))
+    assert run("plan", str(file)).exit_code == 1
+
+
 def test_a_pair_in_the_load_is_an_objection_with_its_reason() -> None:
     found = answer("verify", "--tr", "0.0128853", "--td", "0.064", "--after", "0.1", ENERGY)
     assert (found["verified"], found["tr_ok"]) == (False, False)

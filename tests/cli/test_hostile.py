@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -100,6 +101,8 @@ def test_a_hostile_name_is_shown_escaped(hostile: str, args: tuple[str, ...]) ->
     result = run(*args, hostile)
     shown = result.stdout + result.stderr
     assert "\x1b" not in shown
+    if "markdown" in args:
+        shown = re.sub(r"\\([^\w\s])", r"\1", shown)  # as it is displayed
     assert "energy\\n\\x1b[31mred.csv" in shown
     assert not any(line.startswith(("red", "[31m", "\\x1b[31m")) for line in shown.splitlines())
 

@@ -121,13 +121,13 @@ def test_a_deck_makes_one_body_of_the_car_and_the_assumption_goes(deck: str) -> 
     assert "if the parts" not in told[0]
 
 
-def test_a_deck_without_the_parts_leaves_the_run_time_open() -> None:
+def test_the_deck_of_another_model_leaves_the_run_time_open() -> None:
     found = answer("suggest", "--td", "0.1464", "--part", "1-11", "--deck", str(DECK), car())
     assert {one["run_time_share"] for one in found["candidates"]} == {None}
     told = {warning["code"]: warning["message"] for warning in found["warnings"]}
-    assert "parts 4-11 are not in the deck" in told["cost-unknown"]
-    assert told["deck-of-another-model"].startswith(
-        "part 1 is 'floor' in the history and 'box' in the deck, and 2 more"
+    assert told["deck-of-another-model"] == (
+        "part 1 is 'floor' in the history and 'box' in the deck, and 2 more: nothing of the deck is used; name that of "
+        "the run"
     )
 
 

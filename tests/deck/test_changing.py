@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 WINDOW = [(1, 0.02, 0.09)]
 RUN = RULES["D2R401"].passing[0]
 LATER = "$ moved\n" * 3 + GOOD.replace("0.09", "0.07").replace("door", "a long door")
-TWO_FILES = f"*KEYWORD\n{PARTS}*INCLUDE\ncards.k\n*END\n"
+CARDS, OTHER_CARDS = {"cards.k": THERE + BACK}, "$\n" + BACK + THERE.replace("0.02", "0.03")
+ONCE = f"*KEYWORD\n{PARTS}*INCLUDE\ncards.k\n*END\n"
+TWICE = ONCE.replace("*END", f"*INCLUDE_TRANSFORM\ncards.k\n{0:10d}{0:10d}{1:10d}\n*END")
 
 
 @pytest.fixture(params=["small", "big", "big, by threads"])
@@ -38,8 +40,8 @@ def size(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str
             monkeypatch.setattr(module, name, value)
         monkeypatch.setattr(marks, "_PIECE", 200)
     if request.param.endswith("threads"):
-        monkeypatch.setattr(marks, "_SHARED", 0)
-        monkeypatch.setattr(marks, "_SHARES", 3)
+        monkeypatch.setattr(marks, "_SHARE", 300)
+        monkeypatch.setattr(marks, "_HELPERS", 2)
     return str(request.param)
 
 
@@ -100,7 +102,8 @@ def age(folder: Path) -> None:
 
 CASES = {
     "deck": (verdict, GOOD, {}, "main.k", LATER),
-    "include": (verdict, TWO_FILES, {"cards.k": THERE + BACK}, "cards.k", "$\n" + BACK + THERE.replace("0.02", "0.03")),
+    "include": (verdict, ONCE, CARDS, "cards.k", OTHER_CARDS),
+    "included twice": (verdict, TWICE, CARDS, "cards.k", OTHER_CARDS),
     "starter": (verdict, RUN.deck, RUN.files, RUN.name, "#\n" + RUN.deck.replace("1808", "1809")),
     "engine": (verdict, RUN.deck, RUN.files, "box_0002.rad", "#\n" + RUN.files["box_0002.rad"].replace(".09", ".07")),
     "elements": (parts, DECK.read_text(), {}, "main.k", DECK.read_text().replace("*ELEMENT", "$\n*ELEMENT")[:9000]),

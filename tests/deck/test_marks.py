@@ -8,7 +8,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.deck import marks, source, stored
@@ -46,10 +46,9 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("marks") / "deck.k"
 
 
-@given(FILES, st.integers(1, 90), st.integers(1, 4), st.integers(1, 80))
-@example(MARK + b"*", 9, 4, 9)
+@given(FILES, st.integers(1, 90), st.integers(1, 300), st.integers(0, 3), st.integers(1, 80))
 def test_pieces_and_threads_find_what_a_look_at_every_line_finds(
-    file: Path, data: bytes, piece: int, threads: int, window: int
+    file: Path, data: bytes, piece: int, share: int, helpers: int, window: int
 ) -> None:
     file.write_bytes(data)
     expected = [*line_by_line(data)]
@@ -58,7 +57,12 @@ def test_pieces_and_threads_find_what_a_look_at_every_line_finds(
     with pytest.MonkeyPatch.context() as small:
         small.setattr(marks, "_PIECE", piece)
         for module, name, value in (
-            *((marks, "_SHARED", 0), (marks, "_SHARES", threads), (stored, "_HELD", -1), (stored, "_WINDOW", window)),
+            *(
+                (marks, "_SHARE", share),
+                (marks, "_HELPERS", helpers),
+                (stored, "_HELD", -1),
+                (stored, "_WINDOW", window),
+            ),
             *((source, "_PIECE", piece), (source, "_COUNTED", piece), (source, "_FIRST", 0)),
         ):
             small.setattr(module, name, value)
@@ -98,7 +102,7 @@ def test_a_call_of_the_system_that_gives_less_is_repeated() -> None:
 def test_what_goes_wrong_in_a_thread_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "deck.k"
     path.write_bytes(b"*NODE\n" * 100)
-    for module, name, value in ((marks, "_SHARED", 0), (marks, "_PIECE", 64), (stored, "_HELD", 0)):
+    for module, name, value in ((marks, "_SHARE", 100), (marks, "_PIECE", 64), (stored, "_HELD", 0)):
         monkeypatch.setattr(module, name, value)
     filled = OnDisk._filled
 

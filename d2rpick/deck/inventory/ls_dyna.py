@@ -95,7 +95,7 @@ def read(deck: Deck) -> Inventory:
     return Inventory(
         "ls-dyna", _parts(deck, parts, elements), elements, np.concatenate([coordinates, beyond]), notes,
         parts.all_known and not notes, joints=held.placed(table), ties=held.unknown,
-        watched=places_of(_watched(deck), table), moved=_moves_nodes(deck),
+        watched=places_of(_watched(deck), table), moved=_moves_nodes(deck), files=tuple(deck.sources),
     )  # fmt: skip
 
 

@@ -102,6 +102,7 @@ def read(run: Run) -> Inventory:
         "radioss", parts, elements, np.concatenate([coordinates, beyond]), notes, not notes,
         joints=held.placed(table), ties=held.unknown,
         watched=places_of(_watched(worded), table), moved=any(words[:1] == ("TRANSFORM",) for _, words in worded),
+        files=tuple(run.deck.sources),
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
-from d2rpick.errors import DeckError
+from d2rpick.errors import DeckError, printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -118,7 +118,7 @@ def shortest(value: float, width: int = LONGEST) -> str:
 def comments(remarks: Sequence[str]) -> Iterator[str]:
     """Remarks that cannot leave their comment lines, which are as long as those of the cards."""
     for remark in remarks:
-        yield from textwrap.wrap(remark, _COMMENT_WIDTH, subsequent_indent="  ", break_long_words=False)
+        yield from textwrap.wrap(printable(remark), _COMMENT_WIDTH, subsequent_indent="  ", break_long_words=False)
 
 
 def check_windows(windows: Sequence[Times]) -> tuple[Times, ...]:

@@ -36,6 +36,7 @@ _BATCH: Final = 1 << 14  # numbers converted at a time: they stay in the cache
 _RECENT: Final = 4  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
 _NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
+OVERLONG: Final = 512  # bytes of a line that no solver writes: states were blanked, and hide in it
 _MANY: Final = 64  # of so many blocks it is remembered what differs between them, a small share of the file
 
 

@@ -10,7 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.formats import csv_table
+from d2rpick.histories.formats import csv_table, table_values
+from d2rpick.histories.formats.layout import split
 from d2rpick.histories.history import EXACT, Precision
 from d2rpick.histories.opening import Selection
 from tests.reading import history_of, states_of
@@ -290,6 +291,41 @@ def test_one_bad_line_of_many_is_named(row: int, text: str, reason: str) -> None
         read("\n".join(["time,IE", *LONG[:row], text, *LONG[row + 1 :], ""]))
 
 
+def test_only_the_neighbourhood_of_a_bad_line_is_read_line_by_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[str] = []
+
+    def counted(row: str, separator: str | None) -> list[str]:
+        taken.append(row)
+        return split(row, separator)
+
+    monkeypatch.setattr(table_values, "split", counted)
+    for bad in ("31000,#", "1,2"):
+        with pytest.raises(FormatError, match="table:31002"):
+            read("\n".join(["time,IE", *LONG[:31_000], bad, *LONG[31_001:], ""]))
+    assert 0 < len(taken) < len(LONG) / 2
+
+
+ROWS = ["{},1.5", "{},-2", "{},2,", "1,7", "0,3", "{},nan", "{},1,2", "{};3", "{},x"]
+LINES = [*ROWS, "# comment", "", "  ", ",", "time,IE"]
+
+
+@given(st.lists(st.sampled_from(LINES), max_size=8))
+def test_rows_read_piece_by_piece_are_those_read_line_by_line(lines: list[str]) -> None:
+    good = [f"{number},{number}.5" for number in range(3)]
+    numbered = [line.format(number) for number, line in enumerate([*lines, *good], start=3)]
+    content = "\n".join(["time,IE", *good, *numbered, ""])
+    found: list[object] = []
+    for piece, plain in ((8, table_values._plain_piece), (8, lambda *_: None), (1 << 17, lambda *_: None)):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("d2rpick.histories.formats.text._PIECE", piece)
+            patch.setattr(table_values, "_plain_piece", plain)
+            try:
+                found.append(states_of(read(content)))
+            except FormatError as error:
+                found.append(str(error))
+    assert found[0] == found[1] == found[2]
+
+
 @pytest.mark.parametrize("between", ["# switched\n", "\n", " \n"])
 def test_lines_between_many_rows_are_passed_over(between: str) -> None:
     text = "\n".join(["time,IE", *LONG, ""])
@@ -440,6 +476,7 @@ def test_a_last_line_without_end_counts_when_it_is_whole_for_sure(rows: str, sta
 
 
 @given(st.text(alphabet='01.,;eE+- \t\n"#ntimeI', max_size=120))
+@example(";;")
 @example("\t0\n")  # nothing in the only column that is read
 def test_no_text_raises_anything_else(text: str) -> None:
     with contextlib.suppress(FormatError):

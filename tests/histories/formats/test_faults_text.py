@@ -103,6 +103,30 @@ def test_a_first_line_longer_than_any_is_no_fault() -> None:
         matsum.Matsum(blank, "matsum")
 
 
+@pytest.mark.parametrize("byte", [b"\0", b" ", b"*", b"\xff"])
+@pytest.mark.parametrize("line", [b" time step", b" kinetic", b" internal", b" total energy.", b" time per"])
+def test_states_of_glstat_that_were_blanked_from_line_to_like_line_are_not_lost_silently(
+    byte: bytes, line: bytes
+) -> None:
+    """What is left between two of the same lines is a state with all lines, one of them very long."""
+    first, last = (borders(GLSTAT, line)[state] for state in (2, 5))
+    for inside in (0, 20):
+        blank = GLSTAT[: first + inside] + byte * (last - first) + GLSTAT[last + inside :]
+        with pytest.raises(FormatError, match=r"missing, cut or doubled|a number in its columns"):
+            glstat.Glstat(blank, "glstat").channel("internal energy")
+
+
+@pytest.mark.parametrize("line", [b" mat.#=   12", b" x-rbv", b" y-mom", b" mat.#=   13"])
+def test_states_of_matsum_that_were_blanked_from_line_to_like_line_are_not_lost_silently(line: bytes) -> None:
+    text = MATSUM[4]
+    of_state = text[borders(text, b" time =")[0] :].index(line)
+    first, last = (borders(text, b" time =")[state] + of_state for state in (2, 5))
+    for inside in (0, 9):
+        blank = text[: first + inside] + bytes(last - first) + text[last + inside :]
+        with pytest.raises(FormatError, match=r"missing, cut or doubled|a number in its columns"):
+            matsum.Matsum(blank, "matsum").part_channel("internal_energy", IDS)
+
+
 def test_a_fragment_of_another_state_is_refused() -> None:
     """Lines of one state that end up in another leave a name twice, or a line that has lost some of its columns."""
     states = GLSTAT.split(b" dt of cycle")
