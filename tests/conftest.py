@@ -13,6 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # The program is started again and again: that it is compiled each time is no part of any test.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+import pytest
 from hypothesis import settings
 
 from d2rpick import file_state
@@ -73,6 +74,11 @@ replace(file_state, PAUSE=0.0)
 
 # Looking for garbage as often as Python does by itself takes a tenth of the time of all tests.
 gc.set_threshold(20_000, 20, 50)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the slow folder that would come last: at the end one process would wait for the other."""
+    items.sort(key=lambda item: not item.nodeid.startswith("tests/vibration/"))
 
 
 def pytest_collection_finish() -> None:
