@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Addresses = NDArray[np.int64]
 
-_BLOCK: Final = 1 << 19  # bytes read at a time where many are wanted: they stay in the cache while they are used
+_BLOCK: Final = 1 << 19  # bytes read at a time where many are wanted, a power of 2: they stay in the cache meanwhile
 _NEAR: Final = 1 << 13  # bytes between two that are read together: a call of the system costs more than these
 _WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, mostly behind them
 _HELD: Final = 1 << 24  # a file up to this size is held in memory
@@ -177,7 +177,7 @@ class OnDisk(Content):
     def _in_order(self, addresses: Addresses, width: int) -> Bytes:
         """Read what lies close together in one piece, and what lies alone by itself."""
         found = np.empty((addresses.size, width), np.uint8)
-        apart = (np.diff(addresses) > _NEAR) | (np.diff(addresses // _BLOCK) > 0)
+        apart = (np.diff(addresses) > _NEAR) | (np.diff(addresses & -_BLOCK) > 0)
         firsts = np.flatnonzero(np.append(True, apart)) if addresses.size else np.empty(0, np.int64)
         ends = np.append(firsts[1:], addresses.size)
         several = ends - firsts > 1
@@ -269,10 +269,11 @@ def stored(name: str) -> bytes | OnDisk:
 
 def _sum(data: Bytes) -> int:
     """Sum of the 64-bit words, each by a weight of its place: words that change places change the sum."""
-    end, total = data.size - data.size % 8, data.size
-    for begin in range(0, end, 8 * _WORDS):
-        words = data[begin : min(begin + 8 * _WORDS, end)].view(np.uint64)
-        total = (total * _MIX + int(words @ _weights()[: words.size])) % 2**64
+    end, whole = data.size - data.size % 8, data.size - data.size % (8 * _WORDS)
+    rows, rest = data[:whole].view(np.uint64).reshape(-1, _WORDS), data[whole:end].view(np.uint64)
+    total, weights = data.size, _weights()
+    for one in (*np.einsum("ij,j->i", rows, weights).tolist(), int(rest @ weights[: rest.size])):
+        total = (total * _MIX + one) % 2**64
     return (total * _MIX + int.from_bytes(data[end:].tobytes())) % 2**64
 
 

@@ -36,7 +36,7 @@ _BATCH: Final = 1 << 14  # numbers converted at a time: they stay in the cache
 _RECENT: Final = 4  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
 _NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
-OVERLONG: Final = 512  # bytes of a line that no solver writes: states were blanked, and hide in it
+_OVERLONG: Final = 512  # bytes of a line that no solver writes
 _MANY: Final = 64  # of so many blocks it is remembered what differs between them, a small share of the file
 
 
@@ -366,6 +366,11 @@ def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: in
     """
     for piece in changing.finditer(block, first, behind):
         literal[piece.start() : piece.end()] = 0
+
+
+def overlong(block: bytes) -> bool:
+    """Whether a line is longer than solvers write: states were blanked, and hide in it."""
+    return max(map(len, block.split(b"\n"))) >= _OVERLONG
 
 
 def _spoken(name: Hashable) -> str:
