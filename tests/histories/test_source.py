@@ -87,6 +87,7 @@ def test_files_of_one_run_are_not_mixed_with_those_of_the_next(
 ) -> None:
     for name, kind in (("run.glstat", "glstat"), ("run.matsum", "matsum"), ("next", "glstat")):
         Path(name).write_bytes(CONTENTS[kind])
+
     def stored_while_it_changes(name: str) -> bytes | OnDisk:
         found = stored(name)
         if name.endswith("matsum"):
