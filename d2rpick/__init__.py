@@ -17,6 +17,7 @@ TYPE_CHECKING = False  # type checkers take it for theirs; importing typing is l
 if TYPE_CHECKING:
     from typing import Any
 
+    from d2rpick.choice.cost import Weights as Weights
     from d2rpick.errors import ConfigurationError as ConfigurationError
     from d2rpick.errors import D2RPickError as D2RPickError
     from d2rpick.errors import DeckError as DeckError
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from d2rpick.library.answers import Verdict as Verdict
     from d2rpick.library.answers import suggest as suggest
     from d2rpick.library.answers import verify as verify
+    from d2rpick.library.calibrations import Calibration as Calibration
+    from d2rpick.library.calibrations import calibrate as calibrate
     from d2rpick.library.checking import Findings as Findings
     from d2rpick.library.checking import check as check
     from d2rpick.library.explorations import Exploration as Exploration
@@ -47,6 +50,7 @@ _HOME = {
         ("ConfigurationError", "D2RPickError", "DeckError", "FormatError", "HistoryError", "RangeError"), "errors"
     ),
     **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "library.answers"),
+    **dict.fromkeys(("Calibration", "calibrate"), "library.calibrations"),
     **dict.fromkeys(("Findings", "check"), "library.checking"),
     **dict.fromkeys(("Exploration", "explore"), "library.explorations"),
     **dict.fromkeys(("PartTable", "parts"), "library.part_tables"),
@@ -54,6 +58,7 @@ _HOME = {
     **dict.fromkeys(("Run", "from_frame", "read"), "library.runs"),
     **dict.fromkeys(("Study", "study"), "library.studies"),
     "Oscillator": "vibration.oscillator",
+    "Weights": "choice.cost",
 }
 
 __all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604  names of strings all

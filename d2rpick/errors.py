@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
 # Control and format characters (escape codes, text direction), line and paragraph separators.
 UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
@@ -53,6 +53,40 @@ def printable(text: str) -> str:
         letter.encode("unicode_escape").decode() if unicodedata.category(letter) in UNSEEN else letter
         for letter in text
     )
+
+
+def in_rows(ids: Iterable[int]) -> list[str]:
+    """Write numbers in order, three and more in a row as a range.
+
+    Examples
+    --------
+    >>> in_rows([6, 1, 2, 3, 5, 12])
+    ['1-3', '5', '6', '12']
+    """
+    rows: list[list[int]] = []
+    for number in sorted(set(ids)):
+        if rows and rows[-1][-1] == number - 1:
+            rows[-1].append(number)
+        else:
+            rows.append([number])
+    return [text for row in rows for text in ([f"{row[0]}-{row[-1]}"] if len(row) > 2 else map(str, row))]
+
+
+def name_units(ids: Iterable[int], kind: str = "part") -> str:
+    """Name parts briefly.
+
+    Examples
+    --------
+    >>> name_units([7]), name_units([3, 1, 2, 9])
+    ('part 7', 'parts 1-3, 9')
+    """
+    every = set(ids)
+    return f"{kind}{'s' if len(every) > 1 else ''} {listing(in_rows(every))}"
+
+
+def are(things: Collection[object]) -> str:
+    """Give the verb of one thing, or of several."""
+    return "is" if len(things) == 1 else "are"
 
 
 def listing(names: Sequence[object], most: int = 20, between: str = ", ") -> str:

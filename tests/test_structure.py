@@ -25,7 +25,7 @@ PACKAGE = ROOT / "d2rpick"
 
 # Each folder imports only from itself and from those on the lines above its own.
 LAYERS = (
-    ("errors", "version"),
+    ("errors", "file_state", "version"),
     ("histories", "deck"),
     ("vibration",),
     ("flight",),
@@ -189,7 +189,7 @@ UNNEEDED = {
     "tomllib", "difflib", "zlib", "importlib.metadata", "importlib.resources", "traceback",
 }  # fmt: skip
 # Each module costs start-up, too: one more is worth a thought.
-MOST_MODULES = 80
+MOST_MODULES = 81
 
 
 def test_a_plain_table_loads_only_what_its_answer_needs() -> None:

@@ -5,19 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.cost import CostModel, Weights
-from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost
+from d2rpick.choice.cost import ByDeck, CostModel, Weights
+from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost, of_another_model
 from d2rpick.choice.part_sets import recommended_parts, with_cost_of
 from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.inventory import read_inventory
 from d2rpick.deck.inventory.model import DISCRETE
 from d2rpick.deck.inventory.placement import Placement
+from d2rpick.errors import FormatError
 from d2rpick.flight.flying_parts import asks_for_recommended
 
 if TYPE_CHECKING:
+    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.settings import Settings
-    from d2rpick.histories.history import History
     from d2rpick.histories.run import Run
     from d2rpick.histories.selection import Selection
 
@@ -43,6 +44,10 @@ def selected(run: Run, selection: Selection, settings: Settings, model: CostMode
     FormatError
         If no set can be recommended.
     """
+    if foreign := of_another_model(run, model.inventory):
+        if asks_for_recommended(selection.parts, run):
+            raise FormatError(f"{run.name}: no set of parts can be recommended: {foreign.message}, or the parts")
+        return selection
     counts = model.inventory.counts
     springs = {part.id for part in run.springs} | {part for part, kinds in counts.items() if {*kinds} <= DISCRETE}
     parts = selection.parts
@@ -51,18 +56,23 @@ def selected(run: Run, selection: Selection, settings: Settings, model: CostMode
     return selection._replace(parts=parts, springs=tuple(map(str, sorted(springs))))
 
 
-def with_deck(settings: Settings, history: History, model: CostModel) -> tuple[Settings, tuple[Caution, ...]]:
+def with_deck(settings: Settings, reference: Reference, model: CostModel) -> tuple[Settings, tuple[Caution, ...]]:
     """Let the deck tell the cost share of the parts of a history, unless it is given, and which bodies they become.
 
-    What stays unknown is in the cautions.
+    What stays unknown is in the cautions; the deck of another model tells nothing.
     """
+    if foreign := of_another_model(reference.run, model.inventory):
+        return replace(settings, bodies=()), (foreign,)
+    history = reference.history
     if not history.parts:
         why = "no parts are named whose elements are saved; give them with `parts`"
         told = () if settings.cost_share is not None else (Caution("cost-unknown", f"the run time stays open: {why}"),)
         return replace(settings, bodies=()), told
     ids = [part.id for part in history.parts]
     found, share = with_cost_of(settings, model, ids)
-    found = replace(found, bodies=bodies_of(model.inventory, ids), placement=Placement(model.inventory))
+    source = ByDeck(model.inventory.files, model.weights if settings.cost_share is None else None)
+    placement = Placement(model.inventory)
+    found = replace(found, bodies=bodies_of(model.inventory, ids), placement=placement, by_deck=source)
     doubts = [
         *doubts_of(history.parts, model.inventory),
         *doubts_of_cost(model, used=settings.cost_share is None and share.value is not None),

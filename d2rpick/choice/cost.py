@@ -18,12 +18,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.errors import ConfigurationError, listing
+from d2rpick.errors import ConfigurationError, are, name_units
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
 
     from d2rpick.deck.inventory.model import Inventory
+    from d2rpick.deck.source import SourceFile
+    from d2rpick.histories.source import Source
 
 # us per element and cycle, of shells with one point through the thickness, and of each further integration point: a fit
 # to legs of a car of 1516 elements after its first impact, with and without rigid sets, and with its shells in one
@@ -45,13 +47,15 @@ _LARGEST: Final = 1e100
 class Weights:
     """Cost of an element per cycle by its formulation or class, of a node of a rigid body, and the elements' share.
 
-    Only ratios count: the unit is that of ``per_element``.
+    Only ratios count: the unit is that of ``per_element``.  ``file`` is what they were read from, None where they were
+    not.
     """
 
     per_element: Mapping[str, float] = field(default_factory=lambda: MEASURED)
     element_share: float = ELEMENT_SHARE
     rigid_node: float = RIGID_NODE
     source: str = _SOURCE
+    file: Source | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Raise ConfigurationError with the name of a number that makes no sense."""
@@ -104,6 +108,13 @@ class Share(NamedTuple):
     reason: str | None = None
 
 
+class ByDeck(NamedTuple):
+    """Where what a deck tells comes from: its files, and the weights, None where the cost was given."""
+
+    files: tuple[SourceFile, ...]
+    weights: Weights | None
+
+
 class CostModel:
     """Cost of the elements of a deck with some weights; elements that are rigid from the start cost nothing."""
 
@@ -131,7 +142,7 @@ class CostModel:
     def saved(self, parts: Collection[int]) -> Share:
         """Share of a step that is saved while these parts are rigid, c above [-]; unknown of parts beside the deck."""
         if absent := sorted(set(parts) - self.inventory.parts.keys()):
-            return Share(None, f"part {listing(absent)} is not in the deck")
+            return Share(None, f"{name_units(absent)} {are(absent)} not in the deck")
         within = self.inventory.elements_within(parts)
         rigid = _sum(self._of(part, counts) for part, counts in within.items())
         total = self.total

@@ -1,26 +1,53 @@
-"""What may be wrong with what a deck says: of another model, not followed as a whole, weights taken over."""
+"""What may be wrong with what a deck says: of another model, not followed as a whole, weights taken over.
+
+The deck of another model tells numbers of parts that have nothing to do with the run: nothing of it is used.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.warnings import Caution
+from d2rpick.errors import FormatError, are, name_units
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from d2rpick.choice.cost import CostModel
     from d2rpick.deck.inventory.model import Inventory
     from d2rpick.histories.history import Part
+    from d2rpick.histories.run import Run
+
+
+def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
+    """Say why a deck is not that of a run; None where nothing shows it.
+
+    It is not where more of the parts that both have differ in their titles than agree, or where all of the deck was
+    read and parts with energy are not in it.
+    """
+    titled = [one for one in run.parts if one.id in inventory.parts and one.title and _title(one, inventory)]
+    other = [one for one in titled if _differ(one.title, _title(one, inventory))]
+    found = _named(other, inventory) if 2 * len(other) > len(titled) else ""
+    absent = [one for one in run.parts if one.id not in inventory.parts]
+    if not found and inventory.complete and _has_energy(run, absent):
+        found = f"{name_units(one.id for one in absent)} of the history {are(absent)} not in the deck"
+    told = f"{found}: nothing of the deck is used; name that of the run"
+    return Caution("deck-of-another-model", told) if found else None
+
+
+def _has_energy(run: Run, parts: Sequence[Part]) -> bool:
+    """Whether parts are seen to have energy."""
+    try:
+        return bool(parts) and bool(run.part_energies(parts).any())
+    except FormatError:  # it is not written
+        return False
 
 
 def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
-    """Say so where parts of a history have other titles in the deck: what it says may be of another model."""
+    """Say so where some parts of a history have other titles in the deck: what it says may be of another model."""
     other = [part for part in parts if part.id in inventory.parts and _differ(part.title, _title(part, inventory))]
     if other:
-        first, more = other[0], f", and {len(other) - 1} more" if len(other) > 1 else ""
-        named = f"part {first.id} is {first.title!r} in the history and {_title(first, inventory)!r} in the deck{more}"
-        yield Caution("deck-of-another-model", f"{named}: is this the deck of the run?")
+        yield Caution("deck-of-another-model", f"{_named(other, inventory)}: is this the deck of the run?")
 
 
 def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
@@ -40,12 +67,22 @@ def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
         yield Caution("weights-by-analogy", taken)
 
 
+def _named(other: Sequence[Part], inventory: Inventory) -> str:
+    """Name the first of the parts whose titles differ."""
+    first, more = other[0], f", and {len(other) - 1} more" if len(other) > 1 else ""
+    return f"part {first.id} is {first.title!r} in the history and {_title(first, inventory)!r} in the deck{more}"
+
+
 def _title(part: Part, inventory: Inventory) -> str:
     return inventory.parts[part.id].title
 
 
 def _differ(one: str, other: str) -> bool:
-    """Whether two titles are there and differ, but for blanks, capitals, and where a format cuts them."""
-    first, second = (" ".join(title.split()).casefold() for title in (one, other))
+    """Whether two titles are there and differ, but for blanks, capitals, and where a format cuts them.
+
+    Letters beyond ASCII are not compared: files of one run encode them in different ways.
+    """
+    plain = ("".join(filter(str.isascii, title)) for title in (one, other))
+    first, second = (" ".join(title.split()).casefold() for title in plain)
     shorter = min(len(first), len(second))
     return first[:shorter] != second[:shorter]

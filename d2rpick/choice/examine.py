@@ -41,7 +41,7 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
             f"{', '.join(history.source)}: energies up to {largest:g}, at most {LARGEST_ENERGY:g} was expected"
         )
     if settings.after is not None:
-        _inside(history, settings.after, "`after`")
+        history.check(settings.after, argument="after")
     seen = seen_flight(history, td)
     flying = None if seen.refusal else seen.flight
     # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
@@ -70,8 +70,7 @@ def _oscillator(
     if settings.after is not None:
         bounds = bounds._replace(start=min(settings.after, td))
     if settings.fit_window:
-        for bound in settings.fit_window:
-            _inside(history, bound, "`fit_window`")
+        history.check(*settings.fit_window, argument="fit_window")
         fit = identify_within(history, Span(*settings.fit_window))
         return _resolved(history, fit, fits), span_of(history, td, fit, bounds) if fit.describes_record else None
     if settings.oscillator:
@@ -107,11 +106,3 @@ def _with_parts(evidence: Evidence, history: History, td: float, within: Span, f
     parts = fits.once(("parts", *within), lambda: read_parts(time, energies, history.part_names))
     whole = energy_at(history, td, evidence).mode or upper_envelope(time, energy)
     return evidence._replace(parts=parts, signed=PartVibration(parts, whole) if parts.signed and whole else None)
-
-
-def _inside(history: History, time: float, argument: str) -> None:
-    if not history.time[0] <= time <= history.time[-1]:
-        raise RangeError(
-            f"{', '.join(history.source)}: {argument} {time:g} lies outside the record, "
-            f"{history.time[0]:g} to {history.time[-1]:g}"
-        )

@@ -37,7 +37,7 @@ def explored_around(
     situation: Situation,
     window: tuple[float, float] | None = None,
     *,
-    steps: int = _STEPS,
+    steps: int | None = None,
     since: float | None = None,
 ) -> TradeOff | None:
     """Find what other td cost than that of a situation.
@@ -50,7 +50,7 @@ def explored_around(
     window : (float, float), optional
         Where td was looked for [time].  Default: the flight that td lies in.
     steps : int, optional
-        So many td on an even grid.
+        So many td on an even grid.  Default: as many as a page needs.
     since : float, optional
         No flight is taken to begin before [time].
 
@@ -64,6 +64,6 @@ def explored_around(
         return None
     try:
         span = window or bounds(situation.history, flight)
-        return explore_of(reference, situation.settings, span, td=situation.td, steps=steps, since=since)
+        return explore_of(reference, situation.settings, span, td=situation.td, steps=steps or _STEPS, since=since)
     except RangeError:  # the window holds no state
         return None

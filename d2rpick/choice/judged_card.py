@@ -119,7 +119,7 @@ def _remarks(verdicts: Sequence[Verdict]) -> Iterator[str]:
 def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
     candidate, history = verdict.candidate, verdict.situation.history
     poor = verdict.quality is not None and verdict.quality.grade == "poor"
-    held = "verified, but of poor quality" if poor else "verified"
+    held = f"{verdict.word}{', but of poor quality' * poor}"
     result = held if verdict.verified else f"NOT verified ({'; '.join(verdict.reasons)})"
     yield f"Judged by {', '.join(history.source)}, {history.channel}:{which} {result}."
     measures = [

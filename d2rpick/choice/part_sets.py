@@ -10,7 +10,7 @@ import numpy as np
 
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share
-from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost
+from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost, of_another_model
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
 from d2rpick.choice.part_facts import facts_of
 from d2rpick.choice.part_steps import steps_of
@@ -18,12 +18,14 @@ from d2rpick.choice.part_verdicts import rows_of
 from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.deck.inventory.placement import Placement
-from d2rpick.errors import FormatError, RangeError
-from d2rpick.histories.opening import Selection
+from d2rpick.errors import FormatError, RangeError, are, name_units
+from d2rpick.flight.flying_parts import asks_for_recommended, with_parts_by_number
+from d2rpick.histories.printed_steps import printed_steps
+from d2rpick.histories.selection import Selection, select_parts
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.part_facts import RunFacts
@@ -114,7 +116,7 @@ def parts_of(
     *,
     given: Sequence[int] = (),
     times: Times | float | None = None,
-    printed: Mapping[int, tuple[float, str]] | None = None,
+    beside: Sequence[str] = (),
 ) -> Parts:
     """Judge every part of a run, and compare sets of them.
 
@@ -131,16 +133,19 @@ def parts_of(
     times : (float, float) or float, optional
         tr and td of the comparison, or td alone [time].  Default: td at the end of the longest flight, for each set
         with the tr of ``suggest``.
-    printed : mapping, optional
-        Smallest steps by part that the solver printed, with their source.
+    beside : sequence of str
+        The deck, in whose folder a d3hsp with the smallest steps of parts is looked for too.
 
     Returns
     -------
     Parts
     """
     facts = facts_of(run, settings)
+    foreign = of_another_model(run, model.inventory) if model else None
+    model = None if foreign else model
+    printed = printed_steps(run, *(beside if model else ()))
     inventory = model.inventory if model else None
-    steps = steps_of(inventory, printed or {})
+    steps = steps_of(inventory, printed)
     rows = rows_of(facts, model, steps)
     comparison = _Comparison(run, settings, model, rows, steps)
     sets: list[PartSet] = []
@@ -148,8 +153,25 @@ def parts_of(
         td = next((other.window[1] for other in sets if other.window), None)  # the same for all, to be compared
         sets.append(comparison.of(one, times or td))
     found = tuple(_with_recommendation(sets))
-    cautions = tuple(_cautions(facts, model, rows, found))
+    cautions = (*((foreign,) if foreign else ()), *_cautions(facts, model, rows, found))
     return Parts(run, inventory, model.weights if model else None, settings, facts, rows, found, cautions)
+
+
+def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
+    """Give the numbers of the parts of a set that is to be compared too.
+
+    Raises
+    ------
+    FormatError
+        If the run has no such parts, or the recommended set is asked for.
+    """
+    if not names:
+        return ()
+    if asks_for_recommended(names, run):
+        what = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
+        raise FormatError(f"{run.name}: the recommended set is what is looked for here; {what}")
+    numbers = with_parts_by_number(run, Selection(parts=tuple(names))).parts
+    return tuple(part.id for part in select_parts(numbers, run.parts, run.name))
 
 
 def recommended_parts(run: Run, settings: Settings, model: CostModel) -> tuple[int, ...]:
@@ -319,7 +341,7 @@ def _cautions(
     yield from doubts_of_bodies([row.id for row in rows if row.movable], model.inventory)
     yield from doubts_of_cost(model)
     if missing := [row.id for row in rows if row.elements is None and row.id in facts.parts]:
-        yield Caution("parts-not-in-deck", f"part {', '.join(map(str, missing))} of the history is not in the deck")
+        yield Caution("parts-not-in-deck", f"{name_units(missing)} of the history {are(missing)} not in the deck")
     if not any(row.movable for row in rows):
         yield Caution("nothing-to-switch", "no part may be switched; the reasons are listed in the rows")
     elif not any(one.recommended for one in sets):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.inventory.model import DISCRETE
-from d2rpick.errors import listing
+from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -132,7 +132,7 @@ def _joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
     others = inventory.joined.get(row.id, {}) if inventory else {}
     if others:
         kinds = ", ".join(sorted(frozenset[str]().union(*others.values())))
-        yield f"joined to part {listing(sorted(others))} ({kinds})"
+        yield f"joined to {name_units(others)} ({kinds})"
 
 
 def _to_keep(row: PartRow, fact: PartFacts | None, data: PartData | None, alone: int | None) -> Iterator[str]:

@@ -173,11 +173,13 @@ def plan_of(
     Raises
     ------
     RangeError
-        If a time lies outside the record, or the parts were deformable in a window that is done.
+        If ``after`` or a window lies outside the record, or the parts were deformable in a window that is done.
     """
     history = reference.history
     span = float(history.time[-1] - history.time[0])
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
+    if settings.after is not None:
+        history.check(settings.after, argument="after")
     history, found, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
     fits = Fits()
@@ -249,7 +251,7 @@ def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
 
 
 def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
-    """Leave a window that locks in energy out for a much longer one behind it: a run supports only one of them."""
+    """Leave a window that locks in energy out for a much longer one behind it, even where that waits for another."""
     for at, row in enumerate(rows):
         rigid = row.rigid_time or 0.0
         behind = max(rows[at + 1 :], key=lambda one: one.rigid_time or 0.0, default=row)
@@ -257,10 +259,11 @@ def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
             yield row
             continue
         tr, td = row.window or (0.0, 0.0)
-        own = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, flight {behind.number} for {behind.rigid_time:.3g}"
-        why = f"{own}: a run supports only one window that locks in energy"
-        cure = f"with `min_rigid` below {rigid:.6g} this one comes first"
-        yield replace(row, status="left-out", reason=f"{why}; {cure}, and the other waits for the run switched so")
+        longer = f"flight {behind.number} behind it for {behind.rigid_time:.3g}"
+        own = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, {longer}"
+        why = "this window locks in energy and moves the landings after it, so that flight would wait for one run more"
+        cure = f"with `min_rigid` below {rigid:.6g} this one is planned too"
+        yield replace(row, status="left-out", reason=f"{own}: {why}; {cure}")
 
 
 def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Planned]:

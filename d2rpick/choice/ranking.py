@@ -93,7 +93,7 @@ def kept(situation: Situation, candidates: Candidates) -> NDArray[np.bool_]:
     return found
 
 
-def best_of(situation: Situation, ranked: Candidates) -> Candidate | None:
-    """Give the first candidate that is acceptable and keeps the limits asked for."""
-    places = np.flatnonzero(kept(situation, ranked))
-    return ranked[int(places[0])] if places.size else None
+def recommend(ranked: Candidates) -> Candidates:
+    """Recommend the first candidate that is acceptable and keeps the limits asked for, where there is one."""
+    places = np.flatnonzero(kept(ranked.situation, ranked))
+    return ranked.recommending(int(places[0])) if places.size else ranked

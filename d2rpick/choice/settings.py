@@ -7,6 +7,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from d2rpick.choice.cost import ByDeck
     from d2rpick.deck.inventory.placement import Placement
     from d2rpick.flight.bodies import RigidBody
     from d2rpick.vibration.one_mode import Mode
@@ -37,6 +38,7 @@ class Settings:
     ``bodies``: what the parts become while they are rigid, by a deck; None without one, empty where it does not tell.
     Then one body is assumed.
     ``placement``: where the deck puts the parts, or None without one.
+    ``by_deck``: the files that these, and a cost share that is not given, come from; None where no deck tells anything.
     """
 
     after: float | None = None
@@ -52,6 +54,7 @@ class Settings:
     step_ratio: float = 1.0
     bodies: tuple[RigidBody, ...] | None = None
     placement: Placement | None = field(default=None, compare=False, repr=False)
+    by_deck: ByDeck | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Raise ValueError with the name of an argument that is out of its range."""

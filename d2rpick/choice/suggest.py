@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
-from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, over_limits, rank
+from d2rpick.choice.ranking import EQUALLY_GOOD, over_limits, rank, recommend
 from d2rpick.choice.verify import verify_at
 from d2rpick.choice.warnings import Caution, cautions_of, out_of_place
 from d2rpick.errors import RangeError
@@ -118,10 +118,8 @@ def suggest_at(situation: Situation, *, with_better: bool = True, found: Candida
 
     ``found`` are the candidates where they are known; those before the flight may be missing.
     """
-    candidates = rank(find_candidates(situation) if found is None else found)
-    best = best_of(situation, candidates)
-    if best:
-        candidates = candidates.recommending(best.rank - 1)
+    candidates = recommend(rank(find_candidates(situation) if found is None else found))
+    best = candidates.chosen
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
     if best:
@@ -151,7 +149,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
         there = situation.at(td)
         if there.vibration.doubts:
             continue
-        best = best_of(there, rank(find_candidates(there, in_flight=True)))
+        best = recommend(rank(find_candidates(there, in_flight=True))).chosen
         if best and not best.same_swing:
             if _verifies(situation, best.tr, td):
                 return Pair(best.tr, td, best.residual)

@@ -13,7 +13,7 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.margin import margin_before_contact
-from d2rpick.choice.ranking import best_of, like_quality, rank
+from d2rpick.choice.ranking import like_quality, rank, recommend
 from d2rpick.choice.reach_back import longest_rigid_times
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
 from d2rpick.errors import RangeError
@@ -127,8 +127,7 @@ def within_flight(look: Look, history: History, window: tuple[float, float]) -> 
 
     RangeError when the window lies outside the record.
     """
-    for time in window:
-        history.energy_at(time, "td_window", window)
+    history.check(*window, argument="td_window")
     situation = _flying(look, window)
     return situation, (window[0], _latest(situation, window))
 
@@ -210,7 +209,7 @@ def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
     asked = list(situations)
     candidates = candidates_of(asked, in_flight=True)
-    found = ((there, best_of(there, rank(some))) for there, some in zip(asked, candidates, strict=True))
+    found = ((there, recommend(rank(some)).chosen) for there, some in zip(asked, candidates, strict=True))
     return [(there, best) for there, best in found if best and not best.same_swing]
 
 

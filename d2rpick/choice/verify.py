@@ -39,6 +39,13 @@ class Verdict(NamedTuple):
     health: Health | None = None
 
     @property
+    def word(self) -> str:
+        """The verdict in a few words."""
+        if self.verified and self.situation.basis == "energy":
+            return "verified by the energy level alone"
+        return "verified" if self.verified else "unknown" if self.tr_ok is None else "not verified"
+
+    @property
     def quality(self) -> Quality | None:
         """How good the pair is; None where it does not verify."""
         if not self.verified:

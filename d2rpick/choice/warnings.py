@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.errors import listing
+from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 POOR_KINETIC_SHARE = 0.5
 # An E_plastic above this share of the vibration is worth a word: energy alone cannot tell it from a preload.
 _NOTABLE_PLASTIC = 0.05
-# Parts that a warning names of a rigid body; the JSON document has all.
-_NAMED = 10
 
 
 class Caution(NamedTuple):
@@ -94,7 +92,7 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
     worst = bodies.worst(tr, situation.td)
     if worst is None or worst.error <= bodies.limit:
         return
-    drift, which = worst.drift, f" of {_named(worst.body)}" if worst.body else ""
+    drift, which = worst.drift, f" of {name_units(worst.body.parts)}" if worst.body else ""
     share, last = worst.error / float(drift.path[-1]), float(drift.time[-1] - drift.time[0])
     found = f"{drift.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
     off = f"there the body{which} is off by {worst.error:.3g}, {share:.1%} of its path in the flight"
@@ -107,11 +105,8 @@ def _not_predicted(told: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> s
     """Name the first body whose error is not known, and why."""
     first, more = unknown[0], f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
     why = "" if first.whole else "; its pieces do not hang together"
-    return f"{len(told)} rigid bodies: how far that of {_named(first)}{more} is out of place is not predicted{why}"
-
-
-def _named(body: RigidBody) -> str:
-    return f"part {listing(body.parts, most=_NAMED)}"
+    which = f"that of {name_units(first.parts)}{more}"
+    return f"{len(told)} rigid bodies: how far {which} is out of place is not predicted{why}"
 
 
 def end_of_load(situation: Situation) -> str:

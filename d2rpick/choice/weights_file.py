@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from d2rpick.choice.cost import Weights
 from d2rpick.errors import ConfigurationError
+from d2rpick.histories.source import Source
 
 _NUMBERS: Final = ("element_share", "rigid_node")
 _KEYS: Final = (*_NUMBERS, "per_element", "source")
@@ -22,7 +23,8 @@ def read_weights(path: str) -> Weights:
         If the file cannot be read, has unknown keys, or a number that makes no sense.
     """
     try:
-        found = tomllib.loads(Path(path).read_text("utf-8"))
+        content = Path(path).read_bytes()
+        found = tomllib.loads(content.decode("utf-8"))
     except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ConfigurationError(f"{path}: cannot be read ({reason}), a TOML file of weights was expected") from None
@@ -34,7 +36,7 @@ def read_weights(path: str) -> Weights:
     given: dict[str, Any] = {key: _number(path, key, found[key]) for key in _NUMBERS if key in found}
     weights = {name: _number(path, name, value) for name, value in per_element.items()}
     try:
-        return Weights(weights, source=str(found.get("source", path)), **given)
+        return Weights(weights, source=str(found.get("source", path)), file=Source(path, content), **given)
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from None
 

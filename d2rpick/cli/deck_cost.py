@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from d2rpick.choice.cost import CostModel
+    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.warnings import Caution
-    from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
 
 _DECK = (
@@ -77,18 +77,19 @@ def with_deck(run: Run, options: dict[str, Any], settings: Settings, model: Cost
 
 
 def with_cost(
-    settings: Settings, history: History, model: CostModel | None, merge: int | None
+    settings: Settings, reference: Reference, model: CostModel | None, merge: int | None
 ) -> tuple[Settings, tuple[Caution, ...]]:
     """Let a deck tell what the parts of a history cost, and which bodies they become; all one where ``--merge`` is."""
     cautions: tuple[Caution, ...] = ()
     if model is not None:
         from d2rpick.choice import by_deck
 
-        settings, cautions = by_deck.with_deck(settings, history, model)
-    if merge is not None and history.parts:
+        settings, cautions = by_deck.with_deck(settings, reference, model)
+    parts = reference.history.parts
+    if merge is not None and parts:
         from d2rpick.flight.bodies import RigidBody
 
-        merged = tuple(sorted({part.id for part in history.parts} | {merge}))
+        merged = tuple(sorted({part.id for part in parts} | {merge}))
         told = any(body.whole for body in settings.bodies or ())  # a part alone may be of pieces
         settings = replace(settings, bodies=(RigidBody(merged, whole=len(merged) > 1 or told),))
     return settings, cautions

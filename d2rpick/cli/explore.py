@@ -81,7 +81,7 @@ def command(
         model = deck_cost.model_of(options)
         options = deck_cost.with_deck(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
-        settings, unknown = deck_cost.with_cost(settings, reference.history, model, options["merge"])
+        settings, unknown = deck_cost.with_cost(settings, reference, model, options["merge"])
     found = explore_of(reference, settings, td_window, td=td, steps=steps)
     found = found._replace(cautions=(*found.cautions, *unknown))
     output.notes(reference.history.notes, found.cautions)

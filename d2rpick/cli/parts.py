@@ -55,9 +55,7 @@ def command(
     Each part with its elements, material, mass and energy, and a verdict with its reasons; then sets of parts with the
     run time that they save, and the one to take.  A set that --part names is compared too.
     """
-    from d2rpick.choice.part_sets import parts_of
-    from d2rpick.histories.printed_steps import printed_steps
-    from d2rpick.histories.selection import select_parts
+    from d2rpick.choice.part_sets import given_parts, parts_of
 
     times = _times(tr, td)
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
@@ -67,11 +65,9 @@ def command(
         run = asked.open()
         output = Output.of(options, *run.sources)
         model = model_of(options)
-    given = select_parts(options["part"], run.parts, run.name) if options["part"] else ()
-    deck = [options["deck"]] if options["deck"] else []
-    found = parts_of(
-        run, settings, model, given=[part.id for part in given], times=times, printed=printed_steps(run, *deck)
-    )
+    beside = [options["deck"]] if options["deck"] else []
+    given = given_parts(run, options["part"])
+    found = parts_of(run, settings, model, given=given, times=times, beside=beside)
     output.notes(run.notes, found.cautions)
     if options["report"]:
         from d2rpick.report.parts_page import as_page
@@ -79,9 +75,7 @@ def command(
         output.write(options["report"], text_bytes(with_options(as_page(found, typed.repeat()))))
     text = write("parts", output_format, found, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))
-    # without a deck a table of parts promises no set
-    wanted = model is not None or output_format == "value" or not found.rows
-    return finish(ctx, objection=wanted and found.recommended is None, exit_zero=exit_zero)
+    return finish(ctx, objection=found.recommended is None, exit_zero=exit_zero)
 
 
 def _times(tr: float | None, td: float | None) -> Times | float | None:

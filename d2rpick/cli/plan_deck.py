@@ -8,9 +8,10 @@ import click
 
 from d2rpick.cli import options as shared
 from d2rpick.cli.deck_cost import cost_options
-from d2rpick.errors import printable
+from d2rpick.errors import DeckError, printable
 
 if TYPE_CHECKING:
+    from d2rpick.choice.cost import CostModel
     from d2rpick.choice.plan import Plan
     from d2rpick.deck.printing.common import PrintedCard
     from d2rpick.histories.opening import Run
@@ -29,6 +30,15 @@ def check_usage(deck: str | None, folder: str | None) -> None:
     """Raise UsageError where there is no deck to be copied."""
     if folder is not None and deck is None:
         raise click.UsageError("--write-deck needs --deck, the deck that is copied with the cards")
+
+
+def check_model(run: Run, model: CostModel | None, options: dict[str, Any]) -> None:
+    """Raise DeckError where the deck that is to be copied is not that of the run."""
+    from d2rpick.choice.deck_doubts import of_another_model
+
+    foreign = of_another_model(run, model.inventory) if model and options["write_deck"] else None
+    if foreign:
+        raise DeckError(f"{options['deck']}: {foreign.message}")
 
 
 def for_deck(options: dict[str, Any]) -> dict[str, Any]:

@@ -88,7 +88,7 @@ def command(
         model = deck_cost.model_of(options)
         options = deck_cost.with_deck(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
-        settings, unknown = deck_cost.with_cost(settings, reference.history, model, options["merge"])
+        settings, unknown = deck_cost.with_cost(settings, reference, model, options["merge"])
     answer = suggest_of(reference, td_window if td is None else td, settings)
     answer = answer._replace(cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)

@@ -78,7 +78,7 @@ def command(
         other = finished.open() if finished else None
         output = Output.of(options, *run.sources, *(other.sources if other else ()))
         reference = Reference(run, energy_of(run, options, prints=prints))
-        settings, unknown = deck_cost.with_cost(settings, reference.history, model, options["merge"])
+        settings, unknown = deck_cost.with_cost(settings, reference, model, options["merge"])
     answer = verify_of(reference, tr, td, settings)
     if other and finished:
         with reading(finished.names, quiet=asked.quiet):

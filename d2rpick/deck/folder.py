@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.deck.radioss import run_files
 from d2rpick.deck.reader import read_deck
+from d2rpick.deck.source import SourceFile
 from d2rpick.errors import DeckError
 
 if TYPE_CHECKING:
@@ -52,9 +53,8 @@ def _files(folder: str) -> Iterator[str]:
 def _begins(path: str) -> bool:
     """Whether a file says near its beginning that it is a main deck."""
     try:
-        with Path(path).open("rb") as stream:
-            head = stream.read(_HEAD)
-    except OSError:
+        head = SourceFile(path).read(0, _HEAD) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe gives it once
+    except DeckError:
         return False
     lines = (line.strip().upper() for line in head.removeprefix(b"\xef\xbb\xbf").splitlines())
     first = next((line for line in lines if line[:1] in {b"*", b"/"}), b"")

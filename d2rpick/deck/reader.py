@@ -35,7 +35,8 @@ _MOST_FILES = 10_000
 class Deck:
     """A deck as read: ``cards`` that matter, ``disabled`` ones (*COMMENT), encrypted blocks, includes.
 
-    ``problems`` are numbers of includes that could not be read.
+    ``problems`` are numbers of includes that could not be read; ``ends`` the last block of each file that has no *END,
+    and whether that file is the main one.
     """
 
     path: str
@@ -46,8 +47,14 @@ class Deck:
     unread: list[Unread] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
     scope: Scope = field(default_factory=Scope)
-    files: list[str] = field(default_factory=list)
+    sources: list[SourceFile] = field(default_factory=list)
+    ends: list[tuple[Block, bool]] = field(default_factory=list)
     long: bool = False  # whether the main file ends in long format
+
+    @property
+    def files(self) -> list[str]:
+        """Names of all files that were read, the deck itself first."""
+        return [source.name for source in self.sources]
 
     def named(self, *names: str) -> list[Card]:
         """Cards whose keyword is one of ``names``, or one of them with an option behind ``_``."""
@@ -103,9 +110,8 @@ def read_deck(path: str, content: bytes | None = None) -> Deck:
     deck = Deck(path)
     main = SourceFile(path, content)
     if next(main.blocks(), None) is None:
-        ended = any(line.upper().startswith(b"*END") for line in main.lines_from(0))
-        found = "only *END was found, no keyword before it" if ended else "no keyword was found"
-        wanted = "*KEYWORD and the cards were expected" if ended else "an LS-DYNA deck was expected"
+        found = "only *END was found, no keyword before it" if main.marks else "no keyword was found"
+        wanted = "*KEYWORD and the cards were expected" if main.marks else "an LS-DYNA deck was expected"
         raise DeckError(f"{path}: {found} (a line that begins with *), {wanted}")
     _Reader(deck).read(main, _Context(deck.scope))
     return deck
@@ -125,15 +131,18 @@ class _Reader:
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
         self.folders = Folders(deck.path)
+        self.sources: dict[str, SourceFile] = {}  # by path: a file that is included twice is the same each time
 
     def read(self, source: SourceFile, context: _Context) -> None:
-        self.deck.files.append(source.name)
-        if len(self.deck.files) > _MOST_FILES:
+        self.deck.sources.append(source)
+        if len(self.deck.sources) > _MOST_FILES:
             raise DeckError(
                 f"{source.name}: more than {_MOST_FILES} includes were read; do the files include each other?"
             )
         width = context.width
         for block in source.blocks():
+            if block.end is None:
+                self.deck.ends.append((block, not context.chain))
             if block.encrypted:
                 self.deck.encrypted.append(block)
                 continue
@@ -178,7 +187,9 @@ class _Reader:
                 reason = "no permission to read it"
             else:
                 chain = (*context.chain, os.path.realpath(card.file))
-                self.read(SourceFile(path), _Context(Scope(context.scope), width, asked.transform, chain))
+                if path not in self.sources:
+                    self.sources[path] = SourceFile(path)
+                self.read(self.sources[path], _Context(Scope(context.scope), width, asked.transform, chain))
                 continue
             self.deck.unread.append(Unread(asked.name, reason))
 

@@ -1,144 +1,108 @@
-"""A deck file on disk: where its keywords stand, and the lines between two of them."""
+"""A deck file: where its keywords stand, and the lines between two of them."""
 
 from __future__ import annotations
 
-import io
-import os
 import re
-import stat
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING
+from itertools import islice, zip_longest
+from typing import TYPE_CHECKING, Final
 
+from d2rpick.deck.marks import BYTE_ORDER_MARK, find_marks
+from d2rpick.deck.stored import Held, stored
 from d2rpick.errors import DeckError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
-STDIN = "-"  # name of what was read from standard input
-_CHUNK = 256 * 1024
-_LOOKBACK = 32  # bytes of the chunk before, so that what stands in front of a hit is always at hand
-_PGP = b"-----BEGIN PGP MESSAGE"
-_ANCHOR = _PGP.index(b"G")  # a letter that mesh data never holds: looking for it alone costs nothing
-_MARK = b"\xef\xbb\xbf"  # byte order mark of UTF-8
-_GZIP = b"\x1f\x8b\x08"
-_HEAD = 1024  # longest keyword line that is looked at
-_BEFORE = 4096  # how far back comments belonging to a keyword are looked for
+STDIN: Final = "-"  # name of what was read from standard input
+_COUNTED: Final = 1 << 18  # bytes in which line ends are counted together
+_PIECE: Final = 4 << 20  # bytes of whole lines that are looked at together
+_GZIP: Final = b"\x1f\x8b\x08"
+_FIRST: Final = 1 << 16  # bytes in which the first line end is looked for
+_HEAD: Final = 1024  # longest keyword line that is looked at
+_BEFORE: Final = 4096  # how far back comments belonging to a keyword are looked for
 _SILENCE = re.compile(r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)", re.IGNORECASE)
 
 
 class SourceFile:
-    """One deck file, read as bytes and shown as Latin-1; nothing that lies in a file is kept in memory.
+    """One deck file, read as bytes and shown as Latin-1: all that is read of it is of one state of the file.
 
     ``name`` is the path as messages show it; ``content`` is given for what does not lie in a file.  Line
     numbers are counted when they are asked for: in a large deck counting costs more than finding the keywords.
+
+    Raises
+    ------
+    DeckError
+        If it cannot be opened; from any method, if the file was rewritten or replaced since then.
     """
 
     def __init__(self, name: str, content: bytes | None = None) -> None:
         self.name = name
-        self._content = content
+        self._file = stored(name) if content is None else Held(content)
         self._counted = [(0, 1)]  # (offset, number of the line that holds it), ascending
+
+    @cached_property
+    def marks(self) -> Sequence[int]:
+        """Offsets of all keywords and encrypted blocks; DeckError for a file that no reader of decks would take."""
+        first = self.read(0, _FIRST)
+        if first.startswith(_GZIP):
+            raise DeckError(f"{self.name}: compressed with gzip, a deck as its solver reads it was expected; unpack it")
+        if b"\r" in first and b"\n" not in first:
+            raise DeckError(f"{self.name}: lines end in CR alone, line ends LF or CR LF were expected")
+        return find_marks(self._file)
 
     def blocks(self) -> Iterator[Block]:
         """Keyword blocks and encrypted blocks in the order of the file, up to ``*END``."""
-        previous: tuple[int, str] | None = None
-        for offset, head in self._marks():
-            if previous is not None:
-                yield Block(self, previous[0], offset, previous[1])
-            previous = offset, head
+        for start, end in zip_longest(self.marks, islice(self.marks, 1, None)):
+            head = self.read(start, start + _HEAD).partition(b"\n")[0].rstrip(b"\r").decode("latin-1")
             if head.upper().startswith("*END") and not head[4:5].strip():
                 return
-        if previous is not None:
-            yield Block(self, previous[0], None, previous[1])
+            yield Block(self, start, end, head)
 
-    def read(self, start: int, end: int) -> bytes:
+    def read(self, start: int, end: int | None = None) -> bytes:
         """Read the bytes from ``start`` to ``end``, less where the file ends before."""
-        with self._open() as stream:
-            stream.seek(start)
-            return stream.read(end - start)
+        return self._file.read(start, self._file.size if end is None else end)
 
-    def lines_from(self, start: int) -> Iterator[bytes]:
-        """Lines from the byte at ``start`` on, with their ends."""
-        with self._open() as stream:
-            stream.seek(start)
-            yield from stream
+    def pieces(self, start: int, end: int | None = None) -> Iterator[bytes]:
+        """Read the bytes from ``start`` to ``end`` or the end of the file in pieces of whole lines."""
+        end = min(self._file.size, self._file.size if end is None else end)
+        size = _PIECE
+        while start < end:
+            piece = self.read(start, min(start + size, end))
+            if start + len(piece) < end:
+                piece = piece[: piece.rfind(b"\n") + 1]
+            if piece:
+                yield piece
+                start += len(piece)
+            else:
+                size *= 2  # this line is longer
+
+    def sha256(self) -> str:
+        """SHA-256 of the bytes; DeckError where the file was rewritten since it was read."""
+        import hashlib
+
+        digest = hashlib.sha256()
+        with self._file.opened() as read:
+            for at in range(0, self._file.size, _PIECE):
+                digest.update(read(at, min(at + _PIECE, self._file.size)))
+        return digest.hexdigest()
+
+    def ends_with_line(self) -> bool:
+        """Whether the last line has its line end; an empty file has."""
+        return self.read(max(0, self._file.size - 1)) in (b"", b"\n")
 
     def line_at(self, offset: int) -> int:
         """Return the number of the line, from 1, that holds the byte at ``offset``."""
         known = bisect_right(self._counted, (offset, 1 << 62)) - 1
         position, line = self._counted[known]
-        buffer = bytearray(min(_CHUNK, max(0, offset - position)))
-        with self._open() as stream:
-            stream.seek(position)
-            while position < offset and (count := stream.readinto(buffer)):
-                count = min(count, offset - position)
-                line += buffer.count(b"\n", 0, count)
-                position += count
-        if known == len(self._counted) - 1 and position > self._counted[-1][0]:
-            self._counted.append((position, line))
+        with self._file.opened() as read:
+            for at in range(position, offset, _COUNTED):
+                line += read(at, min(at + _COUNTED, offset)).count(b"\n")
+        if known == len(self._counted) - 1 and offset > position:
+            self._counted.append((offset, line))
         return line
-
-    def _marks(self) -> Iterator[tuple[int, str]]:
-        """Find lines that start with ``*`` (blanks before it allowed) and heads of encrypted blocks."""
-        buffer = bytearray(b"\n" * _LOOKBACK + bytes(_CHUNK))
-        base = -_LOOKBACK
-        with self._open() as stream:
-            while count := stream.readinto(memoryview(buffer)[_LOOKBACK:]):
-                end = _LOOKBACK + count
-                if base < 0:
-                    self._start(buffer, end)
-                for at in sorted([*_starred(buffer, end), *_encrypted(buffer, end)]):
-                    cut = at + _HEAD > end
-                    piece = self.read(base + at, base + at + _HEAD) if cut else bytes(buffer[at : at + _HEAD])
-                    yield base + at, piece.partition(b"\n")[0].rstrip(b"\r").decode("latin-1")
-                buffer[:_LOOKBACK] = buffer[end - _LOOKBACK : end]
-                base += count
-
-    def _start(self, buffer: bytearray, end: int) -> None:
-        """Pass over a byte order mark; refuse what no reader of decks would see: compressed files, ends in CR alone."""
-        if buffer.startswith(_GZIP, _LOOKBACK):
-            raise DeckError(f"{self.name}: compressed with gzip, a deck as its solver reads it was expected; unpack it")
-        if buffer.startswith(_MARK, _LOOKBACK):
-            buffer[_LOOKBACK : _LOOKBACK + len(_MARK)] = b"\n" * len(_MARK)
-        if buffer.find(b"\r", _LOOKBACK, end) >= 0 > buffer.find(b"\n", _LOOKBACK, end):
-            raise DeckError(f"{self.name}: lines end in CR alone, line ends LF or CR LF were expected")
-
-    def _open(self) -> io.BufferedReader | io.BytesIO:
-        if self._content is not None:
-            return io.BytesIO(self._content)
-        try:
-            stream = Path(self.name).open("rb")  # noqa: SIM115  it is given back
-        except FileNotFoundError:
-            raise DeckError(f"{self.name}: no such file; check the name and the folder") from None
-        except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-            reason = getattr(error, "strerror", None) or error
-            raise DeckError(f"{self.name}: cannot be read ({reason}); check the name and the permissions") from None
-        if stat.S_ISCHR(os.fstat(stream.fileno()).st_mode) and not stream.isatty():  # /dev/zero never ends
-            stream.close()
-            raise DeckError(f"{self.name}: this is a device, a readable deck was expected")
-        return stream
-
-
-def _starred(buffer: bytearray, end: int) -> Iterator[int]:
-    at = buffer.find(b"*", _LOOKBACK, end)
-    while at >= 0:
-        before = buffer[at - _LOOKBACK : at].rstrip(b" ")
-        if before.endswith(b"\n"):
-            yield at
-        at = buffer.find(b"*", at + 1, end)
-
-
-def _encrypted(buffer: bytearray, end: int) -> Iterator[int]:
-    # a head cut by the end of this chunk is found in the next one, where all of it stands in the lookback
-    tail = len(_PGP) - _ANCHOR
-    at = buffer.find(b"G", _LOOKBACK - tail + 1, end)
-    while at >= 0:
-        start = at - _ANCHOR
-        if at + tail <= end and buffer.startswith(_PGP, start) and buffer[start - 1] == ord("\n"):
-            yield start
-        at = buffer.find(b"G", at + 1, end)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,13 +131,16 @@ class Block:
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Read the data lines, with their distance to the keyword, without comments."""
-        position = self.start
-        for distance, raw in enumerate(self.source.lines_from(self.start)):
-            position += len(raw)
-            if self.end is not None and position > self.end:
-                return
-            if distance and not raw.startswith(self._comment):
-                yield distance, raw.rstrip(b"\r\n").decode("latin-1")
+        for distance, line in enumerate(self._lines()):
+            if distance and not line.startswith(self._comment):
+                yield distance, line.rstrip(b"\r").decode("latin-1")
+
+    def _lines(self) -> Iterator[bytes]:
+        for piece in self.source.pieces(self.start, self.end):
+            *lines, rest = piece.split(b"\n")
+            yield from lines
+            if rest and self.end is None:  # otherwise these are the blanks in front of the next keyword
+                yield rest
 
     @cached_property
     def silenced(self) -> tuple[str, ...]:
@@ -181,7 +148,8 @@ class Block:
 
         Only what stands directly behind it counts, so that a reason may follow; a word that is no id is given too.
         """
-        before = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(_MARK).decode("latin-1")
+        above = self.source.read(max(0, self.start - _BEFORE), self.start)
+        before = above.removeprefix(BYTE_ORDER_MARK).decode("latin-1")
         rules: list[str] = []
         for line in reversed(before.split("\n")[:-1]):
             if not line.encode("latin-1").startswith(self._comment):

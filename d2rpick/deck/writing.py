@@ -91,9 +91,9 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     ((name, text),) = card.files.items()
     if deck.long:
         text = text.replace("_AUTOMATIC\n", "_AUTOMATIC-\n")  # the minus keeps its fields 10 columns wide
-    yield Path(main).name, _with_include(main, name)
+    yield Path(main).name, _with_include(deck.sources[0], name)
     yield name, text.encode()
-    yield from _copies(deck.files[1:], main, {name, Path(main).name})
+    yield from _copies(deck.sources[1:], main, {name, Path(main).name})
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:
@@ -113,11 +113,11 @@ def _refuse_switched(deck: Deck, printed: Deck) -> None:
             raise DeckError(f"{found}; print them with other ids")
 
 
-def _with_include(main: str, name: str) -> bytes:
+def _with_include(main: SourceFile, name: str) -> bytes:
     """Insert the include into the bytes of the main file: before ``*END``, else at its end."""
-    content = Path(main).read_bytes()
+    content = main.read(0)
     newline = b"\r\n" if b"\r\n" in content else b"\n"
-    last = list(SourceFile(main).blocks())[-1]
+    *_, last = main.blocks()
     at = len(content) if last.end is None else content.rfind(b"\n", 0, last.end) + 1
     before = content[:at]
     if before and not before.endswith(b"\n"):
@@ -125,15 +125,15 @@ def _with_include(main: str, name: str) -> bytes:
     return before + newline.join([b"*INCLUDE", name.encode(), b""]) + content[at:]
 
 
-def _copies(files: Sequence[str], main: str, taken: set[str]) -> Iterator[tuple[str, bytes]]:
+def _copies(files: Sequence[SourceFile], main: str, taken: set[str]) -> Iterator[tuple[str, bytes]]:
     """Files below the folder of the deck, by their relative names; others must be named by an absolute path."""
     base = os.path.abspath(Path(main).parent)  # noqa: PTH100 - resolve() would follow links to elsewhere
-    for file in dict.fromkeys(files):
+    for file, source in {source.name: source for source in files}.items():
         relative = os.path.relpath(os.path.abspath(file), base)  # noqa: PTH100
         if not relative.startswith(os.pardir):
             if relative in taken:
                 raise DeckError(f"{file}: the deck includes a file with the name of the cards, {relative!r}; rename it")
-            yield relative, Path(file).read_bytes()
+            yield relative, source.read(0)
         elif os.path.normpath(file) != file or not Path(file).is_absolute():
             raise DeckError(f"{file}: included from outside the folder of the deck by a relative path; copy it there")
 
@@ -149,12 +149,12 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     (leg,) = run.legs
     _refuse_other_run(leg, printed)
     starter = run.starter.sources[0].name
-    yield Path(starter).name, Path(starter).read_bytes()
+    yield Path(starter).name, run.starter.sources[0].read(0)
     further = list(blocks(leg.run.block.source))
     for (name, text), mine in zip(card.files.items(), printed, strict=True):
         kept = (_text(block) for block in further if _repeated(keyword(block), mine))
         yield name, text.encode() + b"".join(kept)
-    yield from _copies([one.name for one in run.starter.sources[1:]], starter, {Path(starter).name, *card.files})
+    yield from _copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files})
 
 
 def _refuse_other_run(leg: Leg, printed: Sequence[Leg]) -> None:
@@ -177,6 +177,5 @@ def _repeated(words: tuple[str, ...], leg: Leg) -> bool:
 
 
 def _text(block: Block) -> bytes:
-    source = block.source
-    content = b"".join(source.lines_from(block.start)) if block.end is None else source.read(block.start, block.end)
+    content = block.source.read(block.start, block.end)
     return content if content.endswith(b"\n") else content + b"\n"

@@ -100,7 +100,7 @@ def lasting_window(law: Law, td: float, extent: float, noise: float) -> tuple[in
         return None
     if _length(time, longest_window(law, at, strict)) < (1 + np.cbrt(strict / room)) / 2 * length:
         return None
-    first, last = _tightened(law, window, max(noise, _ROUND_OFF * extent))
+    first, last = _tightened(law, window, max(noise, _ROUND_OFF * extent), room)
     return (first, last) if time[first] <= td <= time[last] and _long_enough(time, (first, last)) else None
 
 
@@ -145,11 +145,13 @@ def all_windows(time: Samples, around: Callable[[float], FreeFlight | None]) -> 
     return tuple(found)
 
 
-def _tightened(law: Law, window: tuple[int, int], noise: float) -> tuple[int, int]:
+def _tightened(law: Law, window: tuple[int, int], noise: float, loose: float) -> tuple[int, int]:
     """Shrink a window until its ends deviate no more than its middle: what is left of a load there is cut off.
 
     The tolerance hides the last, weak pushes of a load.  The middle of the flight knows how exactly the run obeys
-    the law, be that by printed digits, round-off or the solver's own errors.
+    the law, be that by printed digits, round-off or the solver's own errors.  Where that is more strict than ``loose``,
+    by which the window was found, and still reaches farther, a state of a contact at the edge of ``loose`` had stopped
+    the search on the other side.
     """
     start, room = window[0], 0.0
     for _ in range(_MOST_SHRINKS):
@@ -158,7 +160,7 @@ def _tightened(law: Law, window: tuple[int, int], noise: float) -> tuple[int, in
         own = law.misfit(first + inset, last - inset)
         room = _REACH_OF_DIGITS * noise + _REACH * max(0.0, own - noise)
         tight = longest_window(law, (first + last) // 2, room)
-        tighter = max(first, tight[0]), min(last, tight[1])
+        tighter = tight if room <= loose else (max(first, tight[0]), min(last, tight[1]))
         if tighter == window:
             break
         window = tighter

@@ -8,15 +8,15 @@ mapped into memory: where a mapped page is cut off, the system ends the process.
 from __future__ import annotations
 
 import os
-import stat
 import time
 from functools import cache
 from io import FileIO
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.errors import FormatError
+from d2rpick.file_state import COARSE, FileState, is_endless, is_regular, pause, snapshot
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,15 +24,10 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Addresses = NDArray[np.int64]
 
-_BLOCK: Final = 1 << 19  # bytes read at a time where many are wanted: they stay in the cache while they are used
+_BLOCK: Final = 1 << 19  # bytes read at a time where many are wanted, a power of 2: they stay in the cache meanwhile
 _NEAR: Final = 1 << 13  # bytes between two that are read together: a call of the system costs more than these
 _WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, mostly behind them
 _HELD: Final = 1 << 24  # a file up to this size is held in memory
-_TRIES: Final = 5  # readings of a small file that changes all the time
-_TICK: Final = 50_000_000  # [ns] above the resolution of most files' times: later changes show in them
-_COARSE: Final = 2_000_000_000  # [ns] the resolution of the others, which give whole seconds
-_SLOWEST: Final = 5  # [ns] for a byte that is written: the times of a file are those when its last write began
-_PAUSE: Final = 0.05  # [s] for a write that may be under way: until it ends, half of it stands in the file
 _WORDS: Final = 1 << 13  # summed up at a time: their weights stay in the cache
 _MIX: Final = 0x9E3779B97F4A7C15
 
@@ -55,6 +50,10 @@ class Content:
     def find(self, wanted: bytes, begin: int = 0) -> int:
         """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
         return self._data.find(wanted, begin)
+
+    def rfind(self, wanted: bytes, end: int) -> int:
+        """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
+        return self._data.rfind(wanted, 0, end)
 
     def view(self, begin: int, end: int) -> Bytes:
         """Bytes from one address to another, shape (end - begin,)."""
@@ -89,15 +88,15 @@ class OnDisk(Content):
 
     def __init__(self, name: str, file: int) -> None:
         from array import array  # not above: most files are small
+        from threading import Lock, local
 
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
-        self._seen = _State.of(self._file)
+        self._seen = FileState.of(self._file)
         self._size = self._seen.size
         self._views = array("Q")  # begin, end and sum of what was looked at
         self._fields: list[tuple[Addresses, int, int]] = []  # addresses, width and sum of what was taken
-        self._window, self._begin = b"", 0
-        self._buffer = np.empty(2 * _BLOCK, np.uint8)  # used again and again: fresh memory costs more than reading
+        self._lock, self._own = Lock(), local()  # of each thread: its buffer and its window
         self._digest = ""
         self._awaited: tuple[int, ...] = ()  # times of the file for which a pause was made
 
@@ -108,8 +107,9 @@ class OnDisk(Content):
         return self._size
 
     def __bytes__(self) -> bytes:
-        self._file.seek(0)
-        data = self._file.readall()[: self._size]
+        with self._lock:
+            self._file.seek(0)
+            data = self._file.readall()[: self._size]
         if len(data) < self._size:
             raise self._shortened()
         self._views.extend((0, self._size, _sum(np.frombuffer(data, np.uint8))))
@@ -118,24 +118,33 @@ class OnDisk(Content):
 
     def __getitem__(self, where: slice) -> bytes:
         begin, end, _ = where.indices(self._size)
-        at = begin - self._begin
-        if begin < end and (at < 0 or end > self._begin + len(self._window)):
+        window, first = getattr(self._own, "window", (b"", 0))
+        if begin < end and (begin < first or end > first + len(window)):
             if end - begin > _WINDOW:
                 return self.view(begin, end).tobytes()
-            self._window = self.view(begin, min(begin + _WINDOW, self._size)).tobytes()
-            self._begin, at = begin, 0
-        return self._window[at : at + end - begin] if begin < end else b""
+            window, first = self.view(begin, min(begin + _WINDOW, self._size)).tobytes(), begin
+            self._own.window = window, first
+        return bytes(window[begin - first : end - first]) if begin < end else b""
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
         """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
-        for at in range(begin, self._size, _BLOCK):
-            found = self[at : at + _BLOCK + len(wanted) - 1].find(wanted)
+        for at in range(begin, self._size, _NEAR):
+            found = self[at : at + _NEAR + len(wanted) - 1].find(wanted)
             if found >= 0:
                 return at + found
         return -1
 
+    def rfind(self, wanted: bytes, end: int) -> int:
+        """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
+        for stop in range(end, 0, -_WINDOW):
+            first = max(0, stop - _WINDOW)
+            found = self[first:stop].rfind(wanted)
+            if found >= 0:
+                return first + found
+        return -1
+
     def view(self, begin: int, end: int) -> Bytes:
-        """Bytes from one address to another, shape (end - begin,); valid up to the next call."""
+        """Bytes from one address to another, shape (end - begin,); valid up to the next call in this thread."""
         data = self._near(begin, end)
         self._views.extend((begin, end, _sum(data)))
         return data
@@ -152,15 +161,23 @@ class OnDisk(Content):
         return found
 
     def _near(self, begin: int, end: int) -> Bytes:
-        fits = end - begin <= self._buffer.size
-        data = self._buffer[: end - begin] if fits else np.empty(end - begin, np.uint8)
+        data = self._room(end - begin)
         self._fill(data.data, begin)
         return data
+
+    def _room(self, size: int) -> Bytes:
+        """Room for so many bytes, that of few used again and again: fresh memory costs more than reading."""
+        if size > 2 * _BLOCK:
+            return np.empty(size, np.uint8)
+        if not hasattr(self._own, "buffer"):
+            self._own.buffer = np.empty(2 * _BLOCK, np.uint8)
+        buffer: Bytes = self._own.buffer
+        return buffer[:size]
 
     def _in_order(self, addresses: Addresses, width: int) -> Bytes:
         """Read what lies close together in one piece, and what lies alone by itself."""
         found = np.empty((addresses.size, width), np.uint8)
-        apart = (np.diff(addresses) > _NEAR) | (np.diff(addresses // _BLOCK) > 0)
+        apart = (np.diff(addresses) > _NEAR) | (np.diff(addresses & -_BLOCK) > 0)
         firsts = np.flatnonzero(np.append(True, apart)) if addresses.size else np.empty(0, np.int64)
         ends = np.append(firsts[1:], addresses.size)
         several = ends - firsts > 1
@@ -181,19 +198,20 @@ class OnDisk(Content):
             digest = hashlib.sha256()
             for begin in range(0, self._size, _BLOCK):
                 digest.update(self.view(begin, min(begin + _BLOCK, self._size)).data)
-            self.check(at_rest_for=_COARSE)
+            self.check(at_rest_for=COARSE)
             self._digest = digest.hexdigest()
         return self._digest
 
     def _fill(self, room: memoryview, begin: int) -> None:
         """Read as many bytes as there is room."""
-        self._file.seek(begin)
-        done = self._file.readinto(room)
-        while done < len(room):  # a single call gives 2 GB at most
-            more = self._file.readinto(room[done:])
-            if not more:
-                raise self._shortened()
-            done += more
+        with self._lock:
+            self._file.seek(begin)
+            done = self._file.readinto(room)
+            while done < len(room):  # a single call gives 2 GB at most
+                more = self._file.readinto(room[done:])
+                if not more:
+                    raise self._shortened()
+                done += more
 
     def _shortened(self) -> FormatError:
         return FormatError(
@@ -206,13 +224,13 @@ class OnDisk(Content):
 
         ``at_rest_for``: read it again if the last change is more recent, whether or not one was seen [ns].
         """
-        now = _State.of(self._file)
+        now = FileState.of(self._file)
         if now == self._seen and now.settled and time.time_ns() - now.changed >= at_rest_for:
             return
-        if not now.settled and now[:3] != self._awaited:  # else a pause was made since the last write began
-            time.sleep(_PAUSE)
-            self._awaited = now[:3]
-            now = _State.of(self._file)
+        if not now.settled and now[:-1] != self._awaited:  # else a pause was made since the last write began
+            pause()
+            self._awaited = now[:-1]
+            now = FileState.of(self._file)
         if now.size < self._size or not self._is_as_before():
             raise FormatError(
                 f"{self._name}: the file was rewritten while it was read; read it again when it is complete"
@@ -221,7 +239,8 @@ class OnDisk(Content):
 
     def _is_as_before(self) -> bool:
         """Whether everything that was read is still the same."""
-        views = zip(*(self._views[part::3] for part in range(3)), strict=True)
+        known_views = self._views[:]  # another thread may look at more meanwhile
+        views = zip(*(known_views[part::3] for part in range(3)), strict=True)
         return all(_sum(self._near(begin, end)) == known for begin, end, known in views) and all(
             _sum(self._in_order(addresses, width).ravel()) == known for addresses, width, known in self._fields
         )
@@ -236,48 +255,25 @@ def stored(name: str) -> bytes | OnDisk:
         If a small file changes all the time, or it is a device.
     """
     with open(name, "rb", buffering=0) as file:  # noqa: PTH123
-        found = os.fstat(file.fileno())
-        if stat.S_ISCHR(found.st_mode) and not file.isatty():  # /dev/zero and /dev/full never end
+        if is_endless(file):
             raise FormatError(f"{name}: this is a device; a file, a pipe or a terminal was expected")
-        if not stat.S_ISREG(found.st_mode):
+        if not is_regular(file):
             return file.read()
-        if found.st_size > _HELD:
+        if os.fstat(file.fileno()).st_size > _HELD:
             return OnDisk(name, os.dup(file.fileno()))
-        for _ in range(_TRIES):
-            file.seek(0)
-            before, data = _State.of(file), file.read()
-            if before.settled and before == _State.of(file):
-                return data
-            time.sleep(_PAUSE)
-            file.seek(0)
-            if file.read(len(data)) == data:
-                return data
-    raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
-
-
-class _State(NamedTuple):
-    """What tells whether a file has changed; ``settled`` when no write is under way and one after it would show."""
-
-    size: int
-    modified: int
-    changed: int
-    settled: bool
-
-    @classmethod
-    def of(cls, file: FileIO) -> _State:
-        found, now = os.fstat(file.fileno()), time.time_ns()
-        # Of the two times the modification can be set, to one in the future too, which would never be past.
-        latest = max(found.st_ctime_ns, found.st_mtime_ns if found.st_mtime_ns <= now else 0)
-        room = _TICK + _SLOWEST * found.st_size + (0 if latest % 1_000_000_000 else _COARSE)
-        return cls(found.st_size, found.st_mtime_ns, found.st_ctime_ns, now - latest > room)
+        data = snapshot(file)
+    if data is None:
+        raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+    return data
 
 
 def _sum(data: Bytes) -> int:
     """Sum of the 64-bit words, each by a weight of its place: words that change places change the sum."""
-    end, total = data.size - data.size % 8, data.size
-    for begin in range(0, end, 8 * _WORDS):
-        words = data[begin : min(begin + 8 * _WORDS, end)].view(np.uint64)
-        total = (total * _MIX + int(words @ _weights()[: words.size])) % 2**64
+    end, whole = data.size - data.size % 8, data.size - data.size % (8 * _WORDS)
+    rows, rest = data[:whole].view(np.uint64).reshape(-1, _WORDS), data[whole:end].view(np.uint64)
+    total, weights = data.size, _weights()
+    for one in (*np.einsum("ij,j->i", rows, weights).tolist(), int(rest @ weights[: rest.size])):
+        total = (total * _MIX + one) % 2**64
     return (total * _MIX + int.from_bytes(data[end:].tobytes())) % 2**64
 
 

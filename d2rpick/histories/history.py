@@ -275,25 +275,31 @@ class History:
     def _turns(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         return find_turns(self.energy)
 
-    def energy_at(self, time: float, argument: str = "", given: Sequence[float] = ()) -> float:
-        """Energy at ``time``, linear between the states; RangeError outside the record, naming the ``argument``.
+    def check(self, *times: float, argument: str = "") -> None:
+        """Raise RangeError unless all times of an ``argument`` lie in the record."""
+        low, high = self.time[0], self.time[-1]
+        if all(low <= time <= high for time in times):
+            return
+        from d2rpick.histories.legs import later_legs  # not above: pathlib costs start-up
 
-        ``given`` are all times of an argument that takes several.
-        """
-        if not self.time[0] <= time <= self.time[-1]:
-            span = f"{self.time[0]:g} to {self.time[-1]:g}"
-            from d2rpick.histories.legs import later_legs  # not above: pathlib costs start-up
+        legs = later_legs(self.source) if max(times) > high else []
+        more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
+        more = more or (self._in_another_unit(times, argument) if argument else "")
+        what = f"{f'`{argument}`' if argument else 'time'} {' '.join(f'{time:g}' for time in times)}"
+        found = "reaches" if any(low <= time <= high for time in times) else "lies"
+        raise RangeError(f"{', '.join(self.source)}: {what} {found} outside the record, {low:g} to {high:g}{more}")
 
-            legs = later_legs(self.source) if time > self.time[-1] else []
-            more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
-            more = more or (self._in_another_unit(given or (time,), argument) if argument else "")
-            raise RangeError(f"{', '.join(self.source)}: time {time:g} lies outside the record, {span}{more}")
+    def energy_at(self, time: float, argument: str = "") -> float:
+        """Energy at ``time``, linear between the states; RangeError outside the record, naming the ``argument``."""
+        self.check(time, argument=argument)
         before = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
         cell = slice(before, before + 2)  # of whole arrays that are read-only, numpy would make copies
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def _in_another_unit(self, times: Sequence[float], argument: str) -> str:
-        """Ask whether an argument was given in another unit, in which it lies in the record."""
+        """Ask whether an argument was given in another unit, in which it lies in the record as it does not now."""
+        if any(self.time[0] <= time <= self.time[-1] for time in times if time):
+            return ""
         for unit, size in (("ms", 1e-3), ("us", 1e-6)):
             values = [float(f"{time * size:.12g}") for time in times]
             if values[-1] > 0 and all(self.time[0] <= value <= self.time[-1] for value in values):

@@ -70,7 +70,7 @@ def asked_of(
 
     selection = selected(run.files, chosen, settings, model)
     reference = Reference.of(run.files, selection)
-    settings, unknown = with_deck(settings, reference.history, model)
+    settings, unknown = with_deck(settings, reference, model)
     return Asked(reference, selection, settings, unknown, options)
 
 

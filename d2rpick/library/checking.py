@@ -111,7 +111,7 @@ def check(
     checked = tuple(check_deck(name, configuration_for(name, asked), judge) for name in names)
     files = [text for name in (history.sources if history else ()) for text in ("--history", name)]
     rules = [text for name in ("select", "ignore") for one in getattr(asked, name) for text in (f"--{name}", one)]
-    judging = options_of(history.chosen, choosing) if history else ()
+    judging = options_of(history.chosen, choosing, history.input_format) if history else ()
     return Findings(
         decks=names,
         findings=tuple(finding for one in checked for finding in one.findings),

@@ -10,8 +10,7 @@ from d2rpick.library.answers import written
 from d2rpick.library.asked import check_run, model_of
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import options_of
-from d2rpick.report.shell import positional
+from d2rpick.library.repeat import asking
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -121,29 +120,18 @@ def parts(
     >>> [row.title for row in d2.parts(d2.read("sample_data/rollover_box.matsum")).rows]
     ['box', 'step']
     """
-    from d2rpick.choice.part_sets import parts_of
-    from d2rpick.histories.printed_steps import printed_steps
-    from d2rpick.histories.selection import select_parts
+    from d2rpick.choice.part_sets import given_parts, parts_of
 
     check_run(run)
     settings = arguments.settings(choosing, with_deck=True)
     times = _times(tr, td)
     names = arguments.part_names("given", given)
     model, options = model_of(deck, weights)
-    wanted = select_parts(names, run.parts, run.files.name) if names else ()
-    core = parts_of(
-        run.files, settings, model, given=[part.id for part in wanted], times=times,
-        printed=printed_steps(run.files, *options[1:2]),  # beside the deck
-    )  # fmt: skip
+    given_ids = given_parts(run.files, names)
+    core = parts_of(run.files, settings, model, given=given_ids, times=times, beside=options[1:2])
     named = [(f"--{name}", repr(value)) for name, value in (("tr", tr), ("td", td)) if value is not None]
     window = [text for pair in named for text in pair]
-    command = (
-        "parts",
-        *options,
-        *window,
-        *options_of(run.chosen._replace(parts=names), choosing),
-        *positional(run.sources),
-    )
+    command = ("parts", *options, *window, *asking(run, run.chosen._replace(parts=names), choosing))
     return PartTable(run, core.rows, core.sets, core.recommended, core.cautions, command, core)
 
 

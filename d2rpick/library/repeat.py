@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 
 def asking(run: Run, selection: Selection, choosing: Choosing) -> tuple[str, ...]:
     """Give what follows the times in such a command line."""
-    return (*options_of(selection, choosing), *positional(run.sources))
+    return (*options_of(selection, choosing, run.input_format), *positional(run.sources))
 
 
-def options_of(selection: Selection, choosing: Choosing) -> tuple[str, ...]:
-    """Give the options that select an energy and say how to choose."""
-    return (*_selected(selection), *_options(choosing))
+def options_of(selection: Selection, choosing: Choosing, input_format: str) -> tuple[str, ...]:
+    """Give the options that say how to read a history, select an energy of it and choose."""
+    form = () if input_format == "auto" else ("--input-format", input_format)
+    return (*form, *_selected(selection), *_options(choosing))
 
 
 def _selected(selection: Selection) -> Iterator[str]:
@@ -46,10 +47,10 @@ def _options(choosing: Choosing) -> Iterator[str]:
         elif name == "fit_window" and value is not None:
             yield from ("--fit-window", *(repr(float(time)) for time in value))  # type: ignore[attr-defined]
         elif value is not None:
-            yield from (f"--{name.replace('_', '-')}", repr(value))
+            yield from (f"--{name.replace('_', '-')}", repr(float(value)))  # type: ignore[arg-type]
 
 
 def _oscillator(oscillator: Oscillator) -> Iterator[str]:
     names = {"stiffness": "stiffness", "mass": "mass", "frame_mass": "frame-mass", "alpha": "alpha"}
     for name, option in names.items():
-        yield from (f"--{option}", repr(getattr(oscillator, name)))
+        yield from (f"--{option}", repr(float(getattr(oscillator, name))))

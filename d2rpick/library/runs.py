@@ -24,11 +24,13 @@ if TYPE_CHECKING:
 class Run:
     """One run: its files, opened, and which columns of a table were named; nothing of it changes.
 
-    ``files`` is what was opened, ``chosen`` the columns.  Energies are read when they are asked for.
+    ``files`` is what was opened, ``chosen`` the columns, ``input_format`` what the files were read as, ``"auto"`` where
+    their content decided.  Energies are read when they are asked for.
     """
 
     files: histories.Run
     chosen: Selection
+    input_format: str = "auto"
 
     def __repr__(self) -> str:
         return f"Run({', '.join(map(repr, self.sources))})"
@@ -150,7 +152,7 @@ def read(
     from d2rpick.histories.opening import open_run
 
     chosen = selection_of(time, energy, channels)
-    return Run(open_run(names, chosen, known_format(input_format)), chosen)
+    return Run(open_run(names, chosen, known_format(input_format)), chosen, input_format)
 
 
 def from_frame(
@@ -212,7 +214,7 @@ def _in_memory(file: Any) -> Source:
 def _opened(sources: list[Source], chosen: Selection, input_format: str) -> Run:
     from d2rpick.histories.opening import open_sources
 
-    return Run(open_sources(sources, chosen, known_format(input_format)), chosen)
+    return Run(open_sources(sources, chosen, known_format(input_format)), chosen, input_format)
 
 
 def known_format(input_format: str) -> str:

@@ -147,5 +147,5 @@ def study(
             rows[answer.number] = replace(row, source=names[answer.number])
     core = summarise(question.td, [rows[number] for number in range(len(names))])
     times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked))
-    command = ("study", *times, *options_of(selection, choosing), *positional(names))
+    command = ("study", *times, *options_of(selection, choosing, input_format), *positional(names))
     return Study(core.td, core.rows, core.agree, core.common, core.cautions, command, core)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 SCHEMA = "d2rpick/calibrate/1"
 HEAD = ("formulation", "weight", "measured with OpenRadioss", "by")
+COLUMNS = ("formulation", "weight", "measured", "told")
 LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
 
 
@@ -40,7 +41,7 @@ def as_markdown(found: Calibration) -> str:
 
 def as_csv(found: Calibration) -> str:
     """A row per formulation."""
-    return tables.as_csv(("formulation", "weight", "measured", "told"), _plain(found)).rstrip("\n")
+    return tables.as_csv(COLUMNS, plain_rows(found)).rstrip("\n")
 
 
 def as_toml(found: Calibration) -> str:
@@ -76,7 +77,8 @@ def _leg(one: Observation) -> dict[str, Any]:
     }
 
 
-def _plain(found: Calibration) -> list[list[tables.Cell]]:
+def plain_rows(found: Calibration) -> list[list[tables.Cell]]:
+    """Cells of a row per formulation at full precision, below ``COLUMNS``."""
     return [[name, weight, MEASURED[name], name in found.told] for name, weight in found.weights.per_element.items()]
 
 

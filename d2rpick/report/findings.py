@@ -12,10 +12,9 @@ from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
 from d2rpick.deck.source import STDIN
-from d2rpick.errors import printable
+from d2rpick.errors import name_units, printable
 from d2rpick.report import tables
 from d2rpick.rules import RULES, Severity
-from d2rpick.rules.base import name_units
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:

@@ -5,13 +5,14 @@ Keys are only ever added.  The schemas in ``d2rpick/schemas`` say what they mean
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.comparison import Comparison
+    from d2rpick.choice.cost import Weights
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.health import Health
     from d2rpick.choice.quality import Quality
@@ -27,6 +28,33 @@ if TYPE_CHECKING:
 def of_warnings(cautions: Iterable[Caution]) -> list[dict[str, Any]]:
     """Code and sentence of each warning."""
     return [{"code": caution.code, "message": caution.message} for caution in cautions]
+
+
+class Read(Protocol):
+    """A file that was read."""
+
+    @property
+    def name(self) -> str:
+        """Name that the user gave it."""
+
+    def sha256(self) -> str:
+        """SHA-256 of what was read."""
+
+
+def of_files(files: Iterable[Read]) -> dict[str, Any]:
+    """Names of files, and the SHA-256 of what was read of each; a file that is included twice once."""
+    found = {file.name: file for file in files}
+    return {"source": list(found), "sha256": [file.sha256() for file in found.values()]}
+
+
+def of_weights(weights: Weights) -> dict[str, Any]:
+    """Where weights come from: in words, and the file with its SHA-256, null where they were not read from one."""
+    file = weights.file
+    return {
+        "source": weights.source,
+        "file": file.name if file else None,
+        "sha256": file.sha256() if file else None,
+    }
 
 
 def of_parts(parts: Sequence[Part] | None) -> list[dict[str, Any]] | None:

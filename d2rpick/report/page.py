@@ -17,15 +17,18 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.cost import Weights
     from d2rpick.choice.health import Health
     from d2rpick.choice.judged_card import SolverInput
+    from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
-    from d2rpick.histories.source import Source
     from d2rpick.report.explorer import Explorer
+    from d2rpick.report.keys import Read
 
 
+_MOST_FILES: Final = 20  # of a deck that are named
 SIGNED: Final = ("chosen by", "date", "signature")  # lines of a page to be filled in by hand
 
 
@@ -76,9 +79,23 @@ def rigid_for(times: tuple[float, float], history: History) -> str:
     return f"rigid for {short(td - tr)}{unit}, {(td - tr) / span:.0%} of the record"
 
 
-def digests(files: Iterable[Source]) -> list[tuple[str, str]]:
+def digests(files: Iterable[Read]) -> list[tuple[str, str]]:
     """Name each file with the SHA-256 of what was read of it."""
     return [("SHA-256", f"{file.name}: {file.sha256()}") for file in files]
+
+
+def deck_digests(deck: Iterable[Read], weights: Weights | None) -> list[tuple[str, str]]:
+    """The same of a deck, its main file first, and of a file of weights; of many includes the first are named."""
+    files = list({file.name: file for file in deck}.values())
+    more = len(files) - _MOST_FILES
+    left = [("SHA-256", f"of {more} more files of the deck: in the JSON result")] if more > 0 else []
+    return [*digests(files[:_MOST_FILES]), *left, *digests([weights.file] if weights and weights.file else [])]
+
+
+def digests_of(settings: Settings) -> list[tuple[str, str]]:
+    """The same of the deck that an answer rests on; nothing without one."""
+    used = settings.by_deck
+    return deck_digests(used.files, used.weights) if used else []
 
 
 def parts(candidate: Candidate | None) -> Markup:
@@ -120,7 +137,7 @@ def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
 
 def _read(situation: Situation, run: Run) -> Markup:
     listed = [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in heading(situation)]
-    listed += digests(run.files)
+    listed += [*digests(run.files), *digests_of(situation.settings)]
     listed += [(f"{database.format} by", database.version) for database in run.databases if database.version]
     whole = "the files end after a complete state" if situation.history.complete else "only complete states were used"
     listed += [("complete", whole)]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import groupby
 from math import isinf
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.errors import listing, printable
+from d2rpick.errors import in_rows, listing, printable
 from d2rpick.report import keys, tables
 from d2rpick.version import __version__
 
@@ -26,6 +25,13 @@ SET_HEAD = (
     "", "set", "parts", "elements", "mass", "saved of a step", "step grows", "tr", "td", "run time", "saved",
     "out of place", "turned [deg]",
 )  # fmt: skip
+# Columns of the sets, and of the parts in two tables: as many as a screen and a sheet hold side by side.
+SETS = ("set", "parts", "saved of a step", "tr", "td", "run time", "saved", "out of place", "turned [deg]")
+TABLES = {
+    "Parts": ("part", "title", "verdict", "flies", "deforms", "energy", "scatter", "why"),
+    "Elements": ("part", "title", "elements", "formulation", "material", "mass", "cost", "step", "shares nodes with"),
+}
+_WIDTH = 110  # of a table, as screens hold side by side with other things
 
 # Keys of a part in JSON, and columns of the csv.
 PART = (
@@ -42,12 +48,30 @@ _MOST_SHOWN = 6
 
 
 def as_table(found: Parts) -> str:
-    """What was read, a row per part, a row per set, and the set to take."""
-    lines = [*heading(found), "", tables.as_text(HEAD, rows(found))]
+    """What was read, a row per part in two tables, a row per set, and the set to take; markdown has all columns."""
+    lines = heading(found)
+    for names in TABLES.values():
+        head, body = tables.known(names, columns(HEAD, names, rows(found)))
+        if body and {*head} - {"part", "title"}:
+            lines += ["", _starred(head, body, [row[0] for row in rows(found)])]
     if found.sets:
-        lines += ["", tables.as_text(SET_HEAD, set_rows(found))]
+        body = columns(SET_HEAD, SETS, set_rows(found))
+        lines += ["", _starred(SETS, body, [row[0] for row in set_rows(found)])]
     lines += ["", *(f"{name.ljust(11)}  {text}" for name, text in outlook(found))]
     return "\n".join(lines)
+
+
+def columns(
+    head: Sequence[str], names: Sequence[str], body: Sequence[Sequence[tables.Cell]]
+) -> list[list[tables.Cell]]:
+    """Take the columns with these names out of the rows of a table."""
+    at = [head.index(name) for name in names]
+    return [[row[i] for i in at] for row in body]
+
+
+def _starred(head: Sequence[str], body: Sequence[Sequence[tables.Cell]], stars: Sequence[tables.Cell]) -> str:
+    """Write rows with their stars before them."""
+    return tables.as_text(("", *head), [[star, *row] for star, row in zip(stars, body, strict=True)], _WIDTH)
 
 
 def as_markdown(found: Parts) -> str:
@@ -82,6 +106,7 @@ def as_json(found: Parts, command: Sequence[str]) -> str:
             "deck": None
             if deck is None
             else {
+                **keys.of_files(deck.files),
                 "solver": deck.solver,
                 "parts": len(deck.parts),
                 "elements": sum(sum(counts.values()) for counts in deck.counts.values()),
@@ -91,7 +116,7 @@ def as_json(found: Parts, command: Sequence[str]) -> str:
             "weights": None
             if weights is None
             else {
-                "source": weights.source,
+                **keys.of_weights(weights),
                 "element_share": weights.element_share,
                 "rigid_node": weights.rigid_node,
                 "per_element": dict(weights.per_element),
@@ -277,16 +302,14 @@ def _counted(row: PartRow) -> str | None:
 
 
 def ranges(ids: Sequence[int]) -> str:
-    """Numbers of parts as ``--part`` takes them, three and more in a row as a range.
+    """Numbers of parts as ``--part`` takes them.
 
     Examples
     --------
     >>> ranges([1, 2, 3, 5, 6, 12])
     '1-3,5,6,12'
     """
-    # in a row, number and place grow alike
-    groups = [[id_ for _, id_ in group] for _, group in groupby(enumerate(ids), lambda one: one[1] - one[0])]
-    return ",".join(f"{row[0]}-{row[-1]}" if len(row) > 2 else ",".join(map(str, row)) for row in groups)
+    return ",".join(in_rows(ids))
 
 
 def _short(value: float | None) -> str | None:

@@ -50,7 +50,7 @@ def as_json(plan: Plan, command: Sequence[str]) -> str:
     """The whole plan by schema d2rpick/plan/1."""
     return tables.as_json(
         {
-            **frame_of(plan.history, SCHEMA, command, plan.cautions),
+            **frame_of(plan.history, plan.settings, SCHEMA, command, plan.cautions),
             "min_rigid": plan.min_rigid,
             "windows": [window(plan, row) for row in plan.rows],
             "rigid_time": plan.rigid_time,

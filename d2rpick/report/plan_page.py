@@ -57,7 +57,8 @@ def _sections(
         yield section("For the solver's input", tag("pre", card, tabindex="0"))
     what, _, text = heading(plan).partition(" ")
     notes = [("note", note) for note in plan.history.notes]
-    yield section("What was read", pairs([(what, text.strip()), *page.digests(run.files), *notes]))
+    files = [*page.digests(run.files), *page.digests_of(plan.settings)]
+    yield section("What was read", pairs([(what, text.strip()), *files, *notes]))
     yield section("Method and limits", resource("method.html"))
     yield section("To repeat this", tag("pre", shell_line(command), class_="wrap"))
 

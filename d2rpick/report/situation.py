@@ -12,6 +12,7 @@ from d2rpick.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.warnings import Caution
     from d2rpick.flight.flight import Flight
@@ -82,12 +83,15 @@ def _basis(situation: Situation) -> str:
 
 
 def frame(situation: Situation, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
-    """Keys that every JSON result begins with, and the history it rests on."""
-    return frame_of(situation.history, schema, command, cautions)
+    """Keys that every JSON result begins with, and the history, deck and weights it rests on."""
+    return frame_of(situation.history, situation.settings, schema, command, cautions)
 
 
-def frame_of(history: History, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
+def frame_of(
+    history: History, settings: Settings, schema: str, command: Sequence[str], cautions: Iterable[Caution]
+) -> dict[str, Any]:
     """Give the same keys where no td is looked at."""
+    used = settings.by_deck
     return {
         "schema": schema,
         "tool_version": __version__,
@@ -105,6 +109,8 @@ def frame_of(history: History, schema: str, command: Sequence[str], cautions: It
             "complete": history.complete,
             "notes": list(history.notes),
         },
+        "deck": keys.of_files(used.files) if used else None,
+        "weights": keys.of_weights(used.weights) if used and used.weights else None,
     }
 
 

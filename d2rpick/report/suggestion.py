@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.errors import printable
+from d2rpick.errors import name_units, printable
 from d2rpick.report import keys, tables
 from d2rpick.report.situation import frame, heading, mechanics
 
@@ -172,7 +172,8 @@ def position(best: Candidate, *, deck: bool) -> str:
     taken += " (`deck` tells which do)" if taken and not deck else ""
     if best.position_error_part is None:
         return f"in place at td{taken}, as far as parts tell: none moves against the others of its rigid body"
-    body = f", the body of part {best.position_error_body}" if best.position_error_body else ""
+    parts = best.position_error_body
+    body = f", the body of {name_units(map(int, parts.split(',')))}" if parts else ""
     return f"off by {best.position_error:.2g} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
 
 

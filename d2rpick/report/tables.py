@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from operator import gt
+from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.errors import UNSEEN, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
+# A longer word, as a title without blanks or a list of parts, is broken where a table would be too wide.
+_WORD: Final = 32
 
 
 def short(value: Cell) -> str:
@@ -52,8 +55,10 @@ def known(head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> tuple[list[str
     return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
 
 
-def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]], width: int | None = None) -> str:
     """Columns in line, numbers to the right of their column, two blanks between.
+
+    Where it would be wider than ``width``, words of the widest columns go on in further lines.
 
     Examples
     --------
@@ -61,15 +66,50 @@ def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
        tr  kind
       0.5  crossing
     10.25  extremum
+    >>> print(as_text(["part", "why"], [[7, "never any internal energy"]], width=20))
+    part  why
+       7  never any
+          internal
+          energy
     """
     body = list(rows)
     texts = [[short(name) for name in head], *([short(cell) for cell in row] for row in body)]
     widths = [max(len(row[i]) for row in texts) for i in range(len(head))]
     right = [all(row[i] is None or isinstance(row[i], (int, float)) for row in body) for i in range(len(head))]
+    if width is not None:
+        widths = _narrowed(texts, widths, width)
+        texts = [line for row in texts for line in _broken(row, widths)]
     lines = (
         "  ".join(t.rjust(w) if r else t.ljust(w) for t, w, r in zip(row, widths, right, strict=True)) for row in texts
     )
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _narrowed(texts: Sequence[Sequence[str]], widths: Sequence[int], width: int) -> list[int]:
+    """Take from the widest columns what is too much: names break before cells, and both only between words."""
+    found = list(widths)
+    names, *cells = ([min(_WORD, max(map(len, text.split()), default=1)) for text in row] for row in texts)
+    whole = [max(name, *(len(row[i]) for row in texts[1:])) for i, name in enumerate(names)]
+    words = [max(column) for column in zip(names, *cells, strict=True)]
+    excess = sum(widths) + 2 * (len(widths) - 1) - width
+    for least in (whole, words):
+        while excess > 0 and any(map(gt, found, least)):
+            widest = max((i for i in range(len(found)) if found[i] > least[i]), key=lambda i: found[i])
+            found[widest] -= 1
+            excess -= 1
+    return found
+
+
+def _broken(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]]:
+    """Give the lines of a row whose cells are no wider than their columns."""
+    from itertools import zip_longest
+    from textwrap import wrap
+
+    cells = (
+        wrap(text, width, break_on_hyphens=False) if len(text) > width else [text]
+        for text, width in zip(row, widths, strict=True)
+    )
+    yield from (list(line) for line in zip_longest(*cells, fillvalue=""))
 
 
 def as_markdown(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:

@@ -64,16 +64,9 @@ def as_json(answer: Verdict, command: Sequence[str]) -> str:
 def _told(answer: Verdict) -> str:
     """The verdict, and what a pair that verifies keeps."""
     if not answer.verified:
-        return word(answer)
+        return answer.word
     held = "its level is" if answer.situation.basis == "energy" else "its sign matches and its error is"
-    return f"{word(answer)}: tr lies in the flight, {held} within the tolerance"
-
-
-def word(answer: Verdict) -> str:
-    """The verdict in a few words."""
-    if answer.verified and answer.situation.basis == "energy":
-        return "verified by the energy level alone"
-    return "verified" if answer.verified else "unknown" if answer.tr_ok is None else "not verified"
+    return f"{answer.word}: tr lies in the flight, {held} within the tolerance"
 
 
 def comparison(switched: Comparison) -> list[tuple[str, float, float]]:

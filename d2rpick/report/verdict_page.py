@@ -9,7 +9,7 @@ from d2rpick.report.explorer import explorer
 from d2rpick.report.html import drawings, pairs, remarks, section, table, tag
 from d2rpick.report.keys import of_verdict
 from d2rpick.report.tables import measure, short
-from d2rpick.report.verdict import COMPARED, comparison, deviations, word
+from d2rpick.report.verdict import COMPARED, comparison, deviations
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -39,7 +39,7 @@ def _sections(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
     times = candidate.tr, situation.td
     poor = answer.quality is not None and answer.quality.grade == "poor"
     shown = page.pair(
-        f"{word(answer).capitalize()}{', but of poor quality' * poor}",
+        f"{answer.word.capitalize()}{', but of poor quality' * poor}",
         times,
         tag("p", _left_over(candidate.residual), "; ", page.rigid_for(times, situation.history)),
         situation.history,

@@ -171,22 +171,3 @@ class Rule:
     passing: tuple[Example, ...]
     failing: tuple[Example, ...]
     solvers: tuple[str, ...] = (LS_DYNA,)  # whose decks it looks at
-
-
-def name_units(ids: Iterable[int], kind: str = "part") -> str:
-    """Name parts briefly.
-
-    Examples
-    --------
-    >>> name_units([7]), name_units([3, 1, 2, 9])
-    ('part 7', 'parts 1-3, 9')
-    """
-    ordered = sorted(set(ids))
-    runs: list[list[int]] = []
-    for number in ordered:
-        if runs and runs[-1][-1] == number - 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    pieces = [f"{run[0]}-{run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
-    return f"{kind}{'s' if len(ordered) > 1 else ''} {', '.join(pieces)}"

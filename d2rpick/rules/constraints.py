@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.constraints import read_constraints
 from d2rpick.deck.elements import nodes_of
-from d2rpick.rules.base import BOTH, Example, Rule, Severity, name_units
+from d2rpick.errors import name_units
+from d2rpick.rules.base import BOTH, Example, Rule, Severity
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
 if TYPE_CHECKING:

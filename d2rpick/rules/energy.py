@@ -6,7 +6,8 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.rules.base import BOTH, Example, Rule, Severity, name_units
+from d2rpick.errors import name_units
+from d2rpick.rules.base import BOTH, Example, Rule, Severity
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, automatic
 from d2rpick.rules.formats import factor_of, mistaken
 

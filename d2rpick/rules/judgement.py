@@ -12,7 +12,8 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import Reference, verify_of
 from d2rpick.choice.suggest import find_better_pair, suggest_at
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution
-from d2rpick.rules.base import Fault, name_units
+from d2rpick.errors import name_units
+from d2rpick.rules.base import Fault
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

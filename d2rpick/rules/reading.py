@@ -1,9 +1,10 @@
-"""D2R001-003, D2R109, D2R110, D2R303: what must be readable before anything can be judged."""
+"""D2R001-003, D2R011, D2R109, D2R110, D2R303: what must be readable before anything can be judged."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.deck.cut import cuts
 from d2rpick.deck.includes import UNKNOWN_KIND
 from d2rpick.deck.rows import Field
 from d2rpick.deck.switching import misspelt
@@ -106,6 +107,12 @@ def _encrypted(case: Case) -> Iterator[Objection]:
         )
 
 
+def _cut(case: Case) -> Iterator[Objection]:
+    for block, told in cuts(case.deck):
+        cure = "what is missing was not checked: take the whole file, or end its last line"
+        yield Field("", block, 0, 1), f"{told} {cure}"
+
+
 _INNER = THERE + BACK + END
 
 
@@ -174,6 +181,18 @@ RULES: Final = (
         _includes,
         (Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}),),
         (Example(HEAD + "*INCLUDE\nnowhere.k\n" + END), Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END)),
+        solvers=BOTH,
+    ),
+    Rule(
+        "D2R011",
+        Severity.WARNING,
+        "a file of the deck seems to be cut",
+        "A file without *END (Radioss: /END) whose last line has no line end may have lost the end of a number, and "
+        "all that came after it; so may a main deck without *END whose last lines are nodes or elements. Switching "
+        "cards, parts or parameters may be missing. d2rpick parts takes the cost of parts from no such mesh.",
+        _cut,
+        (Example(GOOD.removesuffix(END)),),
+        (Example(GOOD.removesuffix("      PART\n" + END)), Example(GOOD.removesuffix(END) + "*NODE\n       1\n")),
         solvers=BOTH,
     ),
     Rule(

@@ -5,7 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.rules.base import RADIOSS, Example, Rule, Severity, name_units
+from d2rpick.errors import name_units
+from d2rpick.rules.base import RADIOSS, Example, Rule, Severity
 from d2rpick.rules.run_case import RunCase
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME
-from d2rpick.rules.base import BOTH, Example, Rule, Severity, name_units
+from d2rpick.errors import name_units
+from d2rpick.rules.base import BOTH, Example, Rule, Severity
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 
 if TYPE_CHECKING:

@@ -99,7 +99,8 @@ def _why_none(judged: Sequence[StudyRow]) -> str:
     """Say which tr suits most runs, and which runs it does not suit."""
     stretches, counts = coverage([row.acceptable for row in judged])
     if not counts.size:
-        return f"no tr is acceptable in any of {runs_of(len(judged))}"
+        which = f"any of {runs_of(len(judged))}" if len(judged) > 1 else "the run that was judged"
+        return f"no tr is acceptable in {which}"
     tr = fewest_digits(*stretches[np.argmax(counts)])
     left = [row.source for row in judged if not _holds(row.acceptable, tr)]
     return (

@@ -11,8 +11,8 @@ import pytest
 from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
 from d2rpick.errors import RangeError
 from d2rpick.histories.history import History, Track
-from tests.cli.test_output import check_by_schema
 from tests.command import ENERGY, OSCILLATOR, answer, run
+from tests.json_schemas import check_by_schema
 from tests.shared import shared
 
 if TYPE_CHECKING:

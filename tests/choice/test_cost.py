@@ -90,7 +90,7 @@ def test_a_deck_that_is_not_whole_leaves_the_cost_open() -> None:
 
 def test_a_part_that_the_deck_does_not_have_leaves_what_it_saves_open() -> None:
     share = CostModel(inventory({1: 30, 2: 70})).saved([2, 3, 4])
-    assert (share.value, share.reason) == (None, "part 3, 4 is not in the deck")
+    assert (share.value, share.reason) == (None, "parts 3, 4 are not in the deck")
 
 
 def test_formulations_that_were_not_measured_are_named() -> None:

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from d2rpick.histories.writing import TABLE_WRITERS
-from tests.cli.test_output import check_by_schema
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.json_schemas import check_by_schema
 from tests.shared import shared
 
 REPLAY = ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4")

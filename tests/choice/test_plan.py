@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.explored import explored_flights
+from d2rpick.choice import explored
 from d2rpick.choice.of_run import Reference, read, suggest_of
 from d2rpick.choice.plan import Plan, plan_of
 from d2rpick.choice.settings import Settings
@@ -205,11 +205,11 @@ def test_the_switched_car_landed_as_computed() -> None:
 
 def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) -> None:
     """One window was offered for two flights that lay in each other, as the energy before and after a load tells."""
-    record = drop(tilt=35.0)
+    record = drop(tilt=35.0, interval=1e-4)
     rows = zip(record.time.tolist(), record.internal_energy[:, 0].tolist(), strict=True)
     table = tmp_path / "energy.csv"
     table.write_text("time,internal_energy\n" + "".join(f"{t!r},{energy!r}\n" for t, energy in rows))
-    found = plan_of(read([str(table)]), PLAIN)
+    found = plan_of(read([str(table)]), Settings(replay=False))
     assert len(found.rows) == 3
     assert all(one.end < other.start for one, other in pairwise(found.rows))
     windows = found.windows(every=True)
@@ -248,13 +248,16 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_fac
 
 
 @pytest.mark.parametrize("seed", [33, 40, 72, 77])
-def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int, tmp_path: Path) -> None:
+def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The page of a plan offered pairs that were rigid while the flight before had not landed."""
+    monkeypatch.setattr(explored, "_STEPS", 120)
     reference = read(bouncing(seed, tmp_path))
     plan = plan_of(reference, Settings(replay=False))
     landings = {row.number: row.end for row in plan.rows}
     rows = [row for row in plan.rows if row.window]
-    for row, found in zip(rows, explored_flights(reference, plan), strict=True):
+    for row, found in zip(rows, explored.explored_flights(reference, plan), strict=True):
         assert found.asked is not None
         assert (found.asked.tr, found.asked.td) == row.window
         assert all(one.tr is None or one.tr >= landings.get(row.number - 1, 0.0) for one in found.offers)
@@ -272,10 +275,22 @@ def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(c
     """Between two pushes the car is rigid for 17 ms, after them for 108: the window that `parts` compares sets in."""
     found = plan_of(car, PLAIN)
     assert statuses(found) == ["left-out", "supported"]
-    assert "flight 2 for 0.108: a run supports only one window" in (found.rows[0].reason or "")
+    assert "flight 2 behind it for 0.108: this window locks in energy" in (found.rows[0].reason or "")
     longest = suggest_of(car, None, PLAIN).recommended
     assert longest is not None
     assert found.windows() == ((longest.tr, longest.td),)
+
+
+def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_where_that_waits(tmp_path: Path) -> None:
+    """Flights 2 and 3 are left out for flight 5, which waits for flight 4: without them it waits for two runs less."""
+    box = read(written(drop(height=0.1, tilt=80.0), tmp_path), BOX)
+    found = plan_of(box, PLAIN)
+    assert statuses(found)[:5] == ["supported", "left-out", "left-out", "supported", "re-plan"]
+    for row in found.rows[1:3]:
+        assert "flight 5 behind it for 0.17: this window locks in energy" in (row.reason or "")
+        assert "that flight would wait for one run more" in (row.reason or "")
+    every = plan_of(box, PLAIN, min_rigid=0.07)
+    assert statuses(every)[:5] == ["supported", "supported", "re-plan", "re-plan", "re-plan"]
 
 
 def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(car: Reference) -> None:

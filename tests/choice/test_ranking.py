@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import read
-from d2rpick.choice.ranking import EQUALLY_GOOD, best_of, keeps, kept, order, rank
+from d2rpick.choice.ranking import EQUALLY_GOOD, keeps, kept, order, rank, recommend
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
@@ -85,7 +85,7 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
     fits, found = Fits(), []
     for td in np.arange(0.141, 0.1502, 0.0007).tolist():
         situation = examine(car(parts), td, Settings(), fits)
-        best = best_of(situation, rank(find_candidates(situation)))
+        best = recommend(rank(find_candidates(situation))).chosen
         assert best is not None
         assert best.level_error is not None
         assert best.level_error < 0.06

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
-from d2rpick.choice.ranking import best_of, rank
+from d2rpick.choice.ranking import rank, recommend
 from d2rpick.choice.reach_back import longest_rigid_times
 from d2rpick.choice.settings import Settings
 from tests import paper
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def rigid_time(situation: Situation) -> float:
-    best = best_of(situation, rank(find_candidates(situation)))
+    best = recommend(rank(find_candidates(situation))).chosen
     return best.rigid_time if best and not best.same_swing else 0.0
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import Reference, read
-from d2rpick.choice.ranking import best_of, rank
+from d2rpick.choice.ranking import rank, recommend
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.trade_off import explore_of
@@ -118,7 +118,7 @@ def test_candidates_before_the_flight_never_change_what_is_best(
 ) -> None:
     situation = examine(history, td, Settings(after=after, replay=replay))
     every, flying = (rank(find_candidates(situation, in_flight=one)) for one in (False, True))
-    assert best_of(situation, flying) == best_of(situation, every)
+    assert recommend(flying).chosen == recommend(every).chosen
     if situation.basis == "energy":
         assert sorted(flying.tr) == sorted(every.tr[every.tr >= after])
 

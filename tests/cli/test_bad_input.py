@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.cli.test_output import FORMATS, check_by_schema
+from tests.cli.test_output import FORMATS
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, codes, run
+from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,9 +71,9 @@ FILES = {
     ),
     "column zero": (table(math.cos), ("--energy", "0"), ["no column '0'", "1 'time'"]),
     "energy is the time": (table(math.cos), ("--energy", "time"), ["input: ", "choose another one as energy"]),
-    "td after the record": (table(math.cos), ("--td", "7"), ["input: ", "time 7 lies outside the record, 0 to 1"]),
+    "td after the record": (table(math.cos), ("--td", "7"), ["input: ", "--td 7 lies outside the record, 0 to 1"]),
     "after outside": (table(math.cos), ("--after", "7"), ["input: --after 7 lies outside the record, 0 to 1"]),
-    "window outside": (table(math.cos), ("--fit-window", "0", "7"), ["--fit-window 7 lies outside the record, 0 to 1"]),
+    "window outside": (table(math.cos), ("--fit-window", "0", "7"), ["--fit-window 0 7 reaches outside the record"]),
 }  # fmt: skip
 
 
@@ -143,8 +144,8 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         # contradictions
         (f"verify --tr 0.07 --td 0.064 {ENERGY}", ["tr 0.07 is not before td 0.064"]),
         (f"verify --tr 0.064 --td 0.064 {ENERGY}", ["tr 0.064 is not before td 0.064"]),
-        (f"suggest --td -1 {ENERGY}", [ENERGY, "time -1 lies outside the record, 0 to 0.15"]),
-        (f"verify --tr -1 --td 0.064 {ENERGY}", [ENERGY, "time -1 lies outside the record, 0 to 0.15"]),
+        (f"suggest --td -1 {ENERGY}", [ENERGY, "--td -1 lies outside the record, 0 to 0.15"]),
+        (f"verify --tr -1 --td 0.064 {ENERGY}", [ENERGY, "--tr -1 lies outside the record, 0 to 0.15"]),
         (f"suggest --td 0.064 {GIVEN} --no-verify {ENERGY}", ["an oscillator", "--no-verify", "exclude"]),
         (f"suggest --td 0.064 {GIVEN} --fit-window 0 0.1 {ENERGY}", ["an oscillator", "--fit-window", "exclude"]),
         (f"suggest --td 0.064 --no-verify --fit-window 0 0.1 {ENERGY}", ["--no-verify", "--fit-window", "exclude"]),
@@ -245,6 +246,14 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(
         assert [line.split(": ")[:2] for line in result.stderr.splitlines() if line.startswith("warning")] == [
             ["warning", warning["code"]] for warning in found["warnings"]
         ]
+
+
+def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(tmp_path: Path) -> None:
+    file = tmp_path / "input"
+    file.write_bytes(table(lambda t: t * t))
+    for command in ("suggest", "explore"):
+        assert "nothing in the record shows a flight; name td, or a window for it" in refused(command, str(file))
+    assert run("plan", str(file)).exit_code == 1
 
 
 def test_a_pair_in_the_load_is_an_objection_with_its_reason() -> None:

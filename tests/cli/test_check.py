@@ -8,17 +8,16 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-import jsonschema
 import numpy as np
 import pytest
 
 from d2rpick.rules import RULES
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
-from tests.command import BOX, DECK, ENERGY, GLSTAT, ROOT, answer, run
+from tests.command import BOX, DECK, ENERGY, GLSTAT, answer, run
+from tests.json_schemas import check_by_schema
 from tests.report.test_findings import junit_is_valid, sarif_is_valid
 
 FORMATS = ("table", "json", "github", "junit", "sarif")
-SCHEMA = json.loads((ROOT / "d2rpick/schemas/check-1.json").read_text())
 LATE = HEAD + PARTS + THERE + automatic(2, "0.5", deformable=["1"]) + END
 COARSE = GOOD.replace("    0.0001", "      0.01")
 
@@ -50,7 +49,7 @@ def rules(found: dict[str, Any]) -> list[str]:
 def valid(form: str, text: str) -> None:
     """Hold an output against the schema of its format."""
     if form == "json":
-        jsonschema.validate(json.loads(text), SCHEMA)
+        check_by_schema(json.loads(text))
     elif form == "sarif":
         sarif_is_valid(text)
     elif form == "junit":
@@ -72,7 +71,7 @@ def test_a_deck_that_looks_right_is_caught_by_the_history() -> None:
 
 def test_json_says_where_and_by_what() -> None:
     found = answer("check", DECK, "--history", ENERGY)
-    jsonschema.validate(found, SCHEMA)
+    check_by_schema(found)
     assert rules(found) == ["D2R202", "D2R203"]
     assert found["history"] == [ENERGY]
     assert found["summary"] == {"errors": 1, "warnings": 1, "infos": 0, "decks": 1}
@@ -214,7 +213,7 @@ def test_the_files_of_a_radioss_run_are_one_deck(chosen: slice) -> None:
     assert len(found["decks"]) == 1
     assert found["findings"] == []
     assert [(w["part"], w["tr"], w["td"]) for w in found["windows"]] == [(1, 0.02, 0.09)]
-    jsonschema.validate(found, SCHEMA)
+    check_by_schema(found)
 
 
 def test_a_radioss_run_is_judged_by_a_history_and_found_in_a_folder() -> None:

@@ -8,13 +8,13 @@ import json
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-import jsonschema
 import numpy as np
 import pandas as pd
 import pytest
 
 import d2rpick as d2
 from tests.command import BOX, ENERGY, ROOT, answer, run
+from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,7 +37,7 @@ def test_the_json_keeps_its_schema_and_every_offer_is_what_suggest_says(
     explored: tuple[str, ...], options: tuple[str, ...], source: str
 ) -> None:
     found = answer("explore", *explored, *options, source)
-    jsonschema.validate(found, SCHEMA)
+    check_by_schema(found)
     offers = found["offers"]
     assert offers[0].keys() == SCHEMA["properties"]["offers"]["items"]["properties"].keys()
     assert all(low["td"] < high["td"] for low, high in pairwise(offers))

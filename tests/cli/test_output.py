@@ -7,7 +7,6 @@ import hashlib
 import io
 import json
 import threading
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from hypothesis import strategies as st
 
 from d2rpick import __version__
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.json_schemas import check_by_schema
 
 SUGGEST = ("suggest", "--td", "0.064")
 VERIFY = ("verify", "--tr", "0.0135867", "--td", "0.0687534")
@@ -32,14 +32,6 @@ ANSWERS = [
     ("verify", "--tr", "0.1", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER),
 ]
 FORMATS = {"suggest": ("table", "json", "csv", "markdown", "value"), "verify": ("table", "json", "csv", "markdown")}
-
-
-def check_by_schema(found: dict[str, Any]) -> None:
-    """Hold an answer against the schema that ships with the package under its name."""
-    _, command, version = found["schema"].split("/")
-    schema = json.loads((files("d2rpick") / "schemas" / f"{command}-{version}.json").read_text("utf-8"))
-    jsonschema.Draft202012Validator.check_schema(schema)
-    jsonschema.validate(found, schema, jsonschema.Draft202012Validator)
 
 
 def rows_of(text: str) -> list[dict[str, Any]]:

@@ -11,8 +11,8 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.history import EXACT, Given, History, Momenta, Part
-from tests.cli.test_output import check_by_schema
 from tests.command import OSCILLATOR, answer, codes, run
+from tests.json_schemas import check_by_schema
 from tests.records import ENERGY, TIME
 from tests.shared import shared
 

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from d2rpick.report.parts import HEAD, SET_HEAD
 from tests.choice.test_calibrate import run_folder
-from tests.cli.test_output import check_by_schema
 from tests.command import ROOT, answer, run
+from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
 
 if TYPE_CHECKING:
@@ -41,10 +42,24 @@ def test_all_forms_hold_the_same() -> None:
     assert found["recommended"]["parts"] == [1, 2]
 
 
-def test_a_set_that_is_asked_for_alone_and_not_there_is_an_objection() -> None:
+@pytest.mark.parametrize("word", ["flying", "all"])
+def test_a_set_to_compare_may_be_named_by_what_its_parts_do(word: str) -> None:
+    found = answer("parts", "--part", word, BOX)
+    assert [(one["name"], one["parts"]) for one in found["sets"]] == [("given", [1, 2])]
+
+
+def test_the_tables_fit_a_screen_and_markdown_has_every_column() -> None:
+    for args in (WITH_DECK, (BOX,)):
+        table = run("parts", "-q", *args).stdout
+        assert max(map(len, table.splitlines()[3:])) <= 110  # below the names of files
+    markdown = run("parts", "-q", "-f", "markdown", *WITH_DECK).stdout
+    assert all(f"| {name} |" in markdown for name in (*HEAD, *SET_HEAD))
+
+
+def test_without_a_set_to_take_every_form_is_an_objection() -> None:
     without_deck = run("parts", "-q", "-f", "value", BOX)
     assert (without_deck.exit_code, without_deck.stdout) == (1, "")
-    assert run("parts", "-q", BOX).exit_code == 0  # the table promises none
+    assert {run("parts", "-q", "-f", form, BOX).exit_code for form in ("table", "json", "csv", "markdown")} == {1}
     no_parts = run("parts", ENERGY)
     assert no_parts.exit_code == 1
     assert "give the matsum, binout or T01 of the run" in no_parts.stderr
@@ -81,6 +96,7 @@ def test_the_page_holds_parts_and_sets(tmp_path: Path) -> None:
         (("--deck", BOX, BOX), "no keyword was found"),
         (("--energy", "1", BOX), "--energy names one energy"),
         (("--part", "77", *WITH_DECK), "no part 77"),
+        (("--part", "recommended", *WITH_DECK), "name a set that it is compared with"),
         (("--weights", str(DECK), *WITH_DECK), "TOML file of weights was expected"),
     ],
 )

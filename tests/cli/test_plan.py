@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.choice.plan import plan_of
-from tests.cli.test_output import check_by_schema
 from tests.command import BOX, ENERGY, answer, run
 from tests.drops import drop, written
+from tests.json_schemas import check_by_schema
 from tests.shared import shared
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ import json
 import os
 import signal
 import time
-from importlib.resources import files
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,8 +17,8 @@ import pytest
 
 from d2rpick import __version__
 from tests import variants
-from tests.cli.test_output import check_by_schema
 from tests.command import BOX, ENERGY, GLSTAT, answer, run, started
+from tests.json_schemas import check_by_definition, check_by_schema
 from tests.variants import STUDY
 
 if TYPE_CHECKING:
@@ -37,8 +36,7 @@ def runs(tmp_path: Path) -> list[str]:
 
 def check_line(found: dict[str, Any], kind: str) -> None:
     """Hold a line of newline-delimited JSON against the schema that ships."""
-    schema = json.loads((files("d2rpick") / "schemas" / "study-1.json").read_text("utf-8"))
-    jsonschema.validate(found, {"$ref": f"#/$defs/{kind}", "$defs": schema["$defs"]})
+    check_by_definition(found, "study-1", kind)
 
 
 def lines_of(text: str) -> list[dict[str, Any]]:

@@ -73,7 +73,7 @@ def text_of(written: Written) -> str:
             lines += [line(part, 0, "PART") if to_rigid else line(part, "PART")]
     if written.comments:
         lines = [piece for row in lines for piece in ("$ a comment, *END", row)]
-    text = written.ending.join(lines)
+    text = "".join(row + written.ending for row in lines)
     return text if written.upper else text.lower()
 
 

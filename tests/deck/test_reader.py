@@ -103,7 +103,7 @@ def test_no_cut_between_chunks_hides_a_keyword(tmp_path: Path, monkeypatch: pyte
     path = write(tmp_path, text)
     whole = [(block.start, block.end, block.head, block.line) for block in SourceFile(path).blocks()]
     assert len(whole) == text.count("\n*") + 2
-    monkeypatch.setattr("d2rpick.deck.source._CHUNK", chunk)
+    monkeypatch.setattr("d2rpick.deck.marks._PIECE", chunk)
     assert [(block.start, block.end, block.head, block.line) for block in SourceFile(path).blocks()] == whole
 
 

@@ -26,7 +26,7 @@ FOUND: dict[str, dict[str, int]] = {
     "tmpl_automatic_d2r.k": {"D2R002": 2},
     "tmpl_plain.k": {"D2R002": 1, "D2R302": 1},
     "misc/car5.k": {},
-    "misc/control_cards.k": {"D2R003": 1},
+    "misc/control_cards.k": {"D2R003": 1, "D2R011": 1},
     "misc/elementary_main.k": {"D2R003": 1},
     "misc/encoding_sample.k": {},
     "params/collision_main.k": {"D2R003": 2},

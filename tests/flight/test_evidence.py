@@ -21,8 +21,8 @@ from d2rpick.histories.selection import Selection
 from d2rpick.models.rollover.files import WRITERS
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import simulate
-from tests.cli.test_output import check_by_schema
 from tests.command import ENERGY, ROLLOVER, answer, codes, run
+from tests.json_schemas import check_by_schema
 from tests.sample_box import t01
 from tests.shared import columns, shared
 

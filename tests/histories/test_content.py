@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext, suppress
 from itertools import cycle
 from threading import Event, Thread
@@ -19,6 +21,7 @@ from hypothesis import strategies as st
 from d2rpick.errors import FormatError
 from d2rpick.histories import content
 from d2rpick.histories.content import Content, OnDisk, stored
+from d2rpick.histories.formats import csv_table
 from d2rpick.histories.opening import Selection, open_run
 from tests.hdf5_files import ENERGY, plain, written
 from tests.histories.test_source import CONTENTS, TIMES
@@ -28,10 +31,12 @@ from tests.reading import read_history
 from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 STATES = np.arange(400)
 ONE, OTHER = (glstat_text(STATES / 8, energy + STATES) for energy in (1000.0, 2000.0))
+TABLES = [csv_table.write({"time": STATES / 8, "IE": np.float64(energy) + STATES}) for energy in (1000.0, 2000.0)]
 
 
 @pytest.fixture
@@ -67,7 +72,32 @@ def test_bytes_on_a_disk_are_those_in_memory(
     assert there.view(0, len(data)).tobytes() == data
     assert there.find(data[-5:], len(data) // 3) == data.find(data[-5:], len(data) // 3)
     assert there.find(b"not there") == -1
+    assert there.rfind(data[:1], size) == held.rfind(data[:1], size)
+    assert there.rfind(data[:1], 0) == -1
     assert there.sha256() == hashlib.sha256(data).hexdigest()
+
+
+@pytest.mark.usefixtures("on_disk")
+def test_threads_that_read_one_file_together_get_each_what_it_asks_for(tmp_path: Path) -> None:
+    data = np.random.default_rng(5).bytes(2000)
+    (tmp_path / "bytes").write_bytes(data)
+    there = opened(tmp_path / "bytes")
+    places = np.arange(0, 1960, 40)
+
+    def wrong(step: int) -> int:
+        """How many readings of another length by each thread differ from the data."""
+        found = [there[at : at + 7 * step] == data[at : at + 7 * step] for at in range(0, 1900, 9)]
+        fields = there.fields(places, step).tobytes() == b"".join(data[at : at + step] for at in places.tolist())
+        return found.count(False) + (not fields)
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as threads:
+            assert not any(threads.map(wrong, range(1, 31)))
+    finally:
+        sys.setswitchinterval(before)
+    there.check()
 
 
 @pytest.mark.parametrize("kind", CONTENTS)
@@ -128,18 +158,24 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, 
         run.files[0].sha256()
 
 
+@pytest.mark.parametrize("contents", [(ONE, OTHER), TABLES], ids=["glstat", "csv"])
 @pytest.mark.parametrize("kept", [True, False], ids=["in memory", "on disk"])
 def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_an_error(
-    kept: bool, tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+    kept: bool,
+    contents: Sequence[bytes],
+    tmp_path: Path,
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     if not kept:
         request.getfixturevalue("on_disk")
-    monkeypatch.setattr(content, "_PAUSE", 0.005)  # ten times as long as between two of the writes
-    file, done = tmp_path / "glstat", Event()
-    file.write_bytes(ONE)
+    monkeypatch.setattr("d2rpick.file_state.PAUSE", 0.005)  # ten times as long as between two of the writes
+    file, done = tmp_path / "run", Event()
+    one, other = contents
+    file.write_bytes(one)
 
     def write() -> None:
-        for data in cycle((OTHER, ONE, b"", ONE)):
+        for data in cycle((other, one, b"", one)):
             mode = "r+b" if data else "wb"
             with file.open(mode, buffering=0) as target:
                 target.write(data)
@@ -176,7 +212,7 @@ def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_st
             target.seek(written)
             target.write(OTHER[written:])
 
-    monkeypatch.setattr("d2rpick.histories.content.time.sleep", write_the_rest)
+    monkeypatch.setattr("d2rpick.file_state.time.sleep", write_the_rest)
     try:
         energy = read_history([str(file)]).energy
     except FormatError as error:
@@ -245,8 +281,9 @@ def fixed_times(monkeypatch: pytest.MonkeyPatch, modified: int, changed: int) ->
     now, fstat = time.time_ns(), os.fstat
 
     def found(number: int) -> SimpleNamespace:
-        size, mode = fstat(number).st_size, fstat(number).st_mode
-        return SimpleNamespace(st_size=size, st_mode=mode, st_mtime_ns=now - modified, st_ctime_ns=now - changed)
+        really = fstat(number)
+        kept = {name: getattr(really, name) for name in ("st_dev", "st_ino", "st_size", "st_mode")}
+        return SimpleNamespace(**kept, st_mtime_ns=now - modified, st_ctime_ns=now - changed)
 
     monkeypatch.setattr(os, "fstat", found)
     monkeypatch.setattr(time, "sleep", pauses.append)
@@ -302,7 +339,8 @@ def test_times_in_whole_seconds_hide_the_changes_of_two(tmp_path: Path, monkeypa
     monkeypatch.setattr(time, "sleep", lambda _: None)
     here = time.time_ns() // 10**9 * 10**9 + 10**9 // 2
     monkeypatch.setattr(time, "time_ns", lambda: here)
-    times = SimpleNamespace(st_size=len(ONE), st_mode=file.stat().st_mode)
+    found = file.stat()
+    times = SimpleNamespace(st_dev=found.st_dev, st_ino=found.st_ino, st_size=found.st_size, st_mode=found.st_mode)
     times.st_mtime_ns = times.st_ctime_ns = here - 3 * 10**9 // 2
     monkeypatch.setattr(os, "fstat", lambda _: times)
     there = opened(file)

@@ -14,9 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import d2rpick as d2
-from d2rpick.choice.cost import Weights
 from d2rpick.library.answers import written
-from tests.command import BOX, DECK, ENERGY, ROLLOVER, answer
+from tests.command import BOX, DECK, ENERGY, ROLLOVER, answer, run
 from tests.sample_deck import DECK as SAMPLE_DECK
 
 if TYPE_CHECKING:
@@ -96,11 +95,22 @@ def test_a_deck_means_what_it_means_on_the_command_line(
 
 def test_weights_in_memory_count_as_those_of_a_file() -> None:
     cheap, dear = (
-        d2.suggest(d2.read(BOX), td=0.37, parts=1, deck=SAMPLE_DECK, weights=Weights({"BT": 1.0, "QBAT": other}))
+        d2.suggest(d2.read(BOX), td=0.37, parts=1, deck=SAMPLE_DECK, weights=d2.Weights({"BT": 1.0, "QBAT": other}))
         for other in (0.1, 10.0)
     )
     found = [one.to_frame()["run_time_share"].min() for one in (cheap, dear)]
     assert found[0] < found[1]  # the other part keeps what it costs
+
+
+def test_weights_of_a_site_are_those_of_the_command_line_and_of_the_file_they_are_saved_in(tmp_path: Path) -> None:
+    found = d2.calibrate("sample_data/flying_box")
+    assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
+    assert found.to_frame()["weight"].tolist() == [*found.weights.per_element.values()]
+    file = found.save(tmp_path / "site.toml")
+    assert file.read_text("utf-8") == run("calibrate", "-f", "toml", "sample_data/flying_box").stdout
+    read = d2.parts(d2.read(BOX), deck=SAMPLE_DECK, weights=file).to_dict()["weights"]
+    assert read["per_element"] == pytest.approx(found.weights.per_element, rel=1e-5)  # the file has six digits
+    assert read["element_share"] == pytest.approx(found.weights.element_share, rel=1e-5)
 
 
 def test_the_command_of_an_answer_asks_the_same() -> None:
@@ -187,6 +197,24 @@ def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(tmp_pa
     assert found.flight.source == "momentum"
     same(found.to_dict(), answer(*found.command))
     assert found.to_frame()["tr"].tolist() == d2.suggest(d2.from_frame(table), td=0.37).to_frame()["tr"].tolist()
+
+
+def test_the_format_that_was_named_is_in_the_command_that_repeats_it(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    file.write_text(f"*Time{Path(ENERGY).read_text()[4:]}")  # by its content this may be a deck
+    reading: Any = {"time": "*Time", "input_format": "csv"}
+    with pytest.raises(d2.D2RPickError, match="this is a deck"):
+        d2.read(file, time="*Time")
+    run, td = d2.read(file, **reading), float(TD)
+    answers: list[Any] = [d2.suggest(run, td), d2.verify(run, 0.0135867, td), d2.explore(run, steps=2), d2.plan(run)]
+    for found in (*answers, d2.study([file], td, **reading), d2.check(DECK, history=run)):
+        same(found.to_dict(), answer(*found.command))
+    assert "--input-format" not in d2.suggest(d2.read(ENERGY), td).command
+
+
+def test_numbers_of_numpy_stand_in_the_command_as_numbers() -> None:
+    found = d2.suggest(d2.read(ENERGY), np.float64(TD), margin=np.float64(0.001), tolerance=1)
+    same(found.to_dict(), answer(*found.command))
 
 
 @pytest.mark.parametrize("asked", [{"select": "D2R2", "tolerance": 0.1}, {"ignore": ["D2R203", "D2R1"]}, {}])

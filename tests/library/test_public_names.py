@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from inspect import isfunction, signature
 from typing import assert_type
 
 import pandas as pd
 import pytest
 
 import d2rpick as d2
+from d2rpick.library.arguments import Choosing
 from tests.command import ENERGY, ROOT
+from tests.examples import PAGES, text_of
 
 HEAVY = ("numpy", "pandas", "scipy", "matplotlib", "h5py", "click")
 
@@ -34,6 +38,24 @@ def test_every_public_name_is_there_and_says_what_it_is(name: str) -> None:
 
 def test_the_public_names_are_all_that_is_shown() -> None:
     assert dir(d2) == sorted(d2.__all__)
+
+
+def test_what_the_docs_call_public_is_there_and_every_function_is_in_the_docs() -> None:
+    named = {name for page in PAGES for name in re.findall(r"\bd2\.([A-Za-z_]\w*)", text_of(page))}
+    assert named <= {*d2.__all__}
+    assert {name for name in d2.__all__ if isfunction(getattr(d2, name))} <= named
+
+
+def test_what_a_function_takes_can_be_made_by_public_names() -> None:
+    """Every class of this package that an argument may be; the others are of python or stand for several."""
+    hints = [*Choosing.__annotations__.values()]
+    for function in filter(isfunction, (getattr(d2, name) for name in d2.__all__)):
+        hints += [one.annotation for one in signature(function).parameters.values()]
+    words = {
+        word for hint in hints for word in re.findall(r"(?<!\.)\b[A-Z]\w+", getattr(hint, "__forward_arg__", hint))
+    }
+    assert words - {"IO", "Choosing", "Iterable", "Mapping", "None", "Parts", "Path", "Unpack"} <= {*d2.__all__}
+    assert {"Weights", "Oscillator", "Run"} <= words
 
 
 def test_other_names_are_not() -> None:

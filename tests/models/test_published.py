@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from importlib.resources import files
+from functools import partial
 from typing import TYPE_CHECKING
 
-import jsonschema
 import numpy as np
 import pytest
 
 from d2rpick.models import published, published_box, published_figures, saving
 from d2rpick.models.published import MISPRINTS, table
 from d2rpick.models.rollover.model import Parameters
+from d2rpick.models.rollover.run import simulate
 from d2rpick.report.figures_models import draw_exhibit
 from d2rpick.vibration.integration import integrated
 from d2rpick.vibration.oscillator import Oscillator, State
 from d2rpick.vibration.replay import Replay
 from tests import paper
 from tests.command import ENERGY, ROOT, answer, run
+from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -130,6 +130,7 @@ def test_the_saving_is_predicted_beside_what_was_measured() -> None:
 
 def test_the_figures_of_the_box_say_what_a_coarse_box_does(monkeypatch: pytest.MonkeyPatch) -> None:
     coarse = Parameters(mesh=4)
+    monkeypatch.setattr(published_box, "simulate", partial(simulate, interval=5e-4))
     every = tuple(published_box.variants_of(coarse))
     some = (every[0], every[2], every[6], every[-1])  # two that act after td, two before
     assert [one.before for one in some] == [False, False, True, True]
@@ -172,7 +173,7 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
 def test_its_files_are_the_same_every_time_and_replaced_only_when_told(tmp_path: Path) -> None:
     whole = ("reproduce", "--output-dir", str(tmp_path), "--section", "5")
     first = answer(*whole)
-    jsonschema.validate(first, json.loads(files("d2rpick").joinpath("schemas/reproduce-2.json").read_text("utf-8")))
+    check_by_schema(first)
     assert first["better"]["residual"] < 1e-12
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     refused = run(*whole)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from importlib.resources import files
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -17,6 +16,7 @@ from d2rpick.report import findings as report
 from d2rpick.rules import RULES, Checked, Finding, Severity, check_deck
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, automatic
 from tests.decks import write
+from tests.json_schemas import check_by_schema
 
 SCHEMAS = Path(__file__).parents[1] / "schemas"
 BAD = HEAD + PARTS + automatic(1, "0.02", rigid=["1", "2"]) + automatic(2, "0.5", deformable=["1"]) + END
@@ -39,7 +39,7 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
 
 def test_json(results: list[Checked], tmp_path: Path) -> None:
     content = json.loads(report.as_json(report.Checks(results, tmp_path), ["check", "main.k"]))
-    jsonschema.validate(content, json.loads(files("d2rpick").joinpath("schemas/check-1.json").read_text()))
+    check_by_schema(content)
     assert content["decks"] == ["main.k", "good/main.k"]
     assert [window["td"] for window in content["windows"]] == [0.5, None, 0.09]
     assert {finding["rule"] for finding in content["findings"]} == {"D2R101", "D2R104"}

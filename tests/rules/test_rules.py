@@ -225,3 +225,17 @@ def test_contacts_are_listed_where_none_has_the_number(tmp_path: Path) -> None:
 def test_a_file_with_nothing_but_its_end_says_what_is_missing(tmp_path: Path) -> None:
     with pytest.raises(DeckError, match=r"only \*END was found.*\*KEYWORD and the cards were expected"):
         check_deck(write(tmp_path, "$ title\n*END\n"))
+
+
+def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(tmp_path: Path) -> None:
+    """Wherever it is cut, unless at the end of a line of a card that holds no mesh."""
+    whole = GOOD.removesuffix(END) + "*NODE\n       1             0.0\n*ELEMENT_SHELL\n       1       1       1\n"
+    mesh = whole.index("*NODE")
+    deck = tmp_path / "main.k"
+    for end in range(whole.rindex("*DEFORM") + 2, len(whole) + 1):
+        text = whole[:end]
+        deck.write_text(text)
+        found = {finding.rule for finding in check_deck(str(deck)).findings}
+        assert ("D2R011" in found) == (not text.endswith("\n") or end > mesh + len("*NODE"))
+    deck.write_text(f"{whole}*END")
+    assert not check_deck(str(deck)).findings

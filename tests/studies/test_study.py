@@ -134,7 +134,7 @@ def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_
     found = summarise(10.0, rows).common
     assert (found.tr, found.window) == (None, None)
     assert found.reason == "no tr is acceptable in all of 5 runs; tr = 1.6 is in 3, not in d, e"
-    assert summarise(10.0, [row("e")]).common.reason == "no tr is acceptable in any of 1 run"
+    assert summarise(10.0, [row("e")]).common.reason == "no tr is acceptable in the run that was judged"
     assert summarise(10.0, [failed("f", OSError())]).common.reason == "no run could be judged"
 
 

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
     Reals = NDArray[np.float64]
 
-_PIECE: Final = 4 << 20  # bytes that are looked at together
 _WIDEST: Final = 240  # columns that any line of a mesh uses
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
 _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")  # in lines that do not stand in columns
@@ -116,34 +115,11 @@ def lines_of(card: Card, comments: bytes = b"$") -> Iterator[Lines]:
             yield Lines(data, card.scope, comments)
 
 
-def is_cut(block: Block) -> bool:
-    """Whether the file ends with this block, and within a line."""
-    if block.end is not None:
-        return False
-    last = b"\n"
-    for data in _pieces_of(block):
-        last = data[-1:] or last
-    return last != b"\n"
-
-
 def _pieces_of(block: Block) -> Iterator[bytes]:
     """Bytes below the keyword line, in pieces that end with a line."""
-    position, rest, first = block.start, b"", True
-    while block.end is None or position < block.end:
-        end = position + _PIECE if block.end is None else min(block.end, position + _PIECE)
-        data = block.source.read(position, end)
-        if not data:
-            break
-        position += len(data)
-        if first:
-            _, found, data = data.partition(b"\n")
-            if not found:
-                return
-            first = False
-        whole, found, tail = (rest + data).rpartition(b"\n")
-        yield whole + found
-        rest = tail
-    yield rest
+    pieces = block.source.pieces(block.start, block.end)
+    yield next(pieces).partition(b"\n")[2]
+    yield from pieces
 
 
 def _table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:

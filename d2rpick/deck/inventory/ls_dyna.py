@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.deck.cut import cuts, holds_mesh
 from d2rpick.deck.inventory import formulations, joints
-from d2rpick.deck.inventory.columns import is_cut, layout, lines_of
+from d2rpick.deck.inventory.columns import layout, lines_of
 from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.rows import LONG
 from d2rpick.deck.sections import NOT_TURNED
-from d2rpick.errors import listing
+from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -94,7 +95,7 @@ def read(deck: Deck) -> Inventory:
     return Inventory(
         "ls-dyna", _parts(deck, parts, elements), elements, np.concatenate([coordinates, beyond]), notes,
         parts.all_known and not notes, joints=held.placed(table), ties=held.unknown,
-        watched=places_of(_watched(deck), table), moved=_moves_nodes(deck),
+        watched=places_of(_watched(deck), table), moved=_moves_nodes(deck), files=tuple(deck.sources),
     )  # fmt: skip
 
 
@@ -125,15 +126,10 @@ def _notes(deck: Deck, cards: Sequence[Card], elements: Sequence[Elements], part
         yield f"{unread.name.file}:{unread.name.line}: {unread.name.text} was not read: {unread.reason}"
     for block in deck.encrypted:
         yield f"{block.source.name}:{block.line}: elements may hide in an encrypted block"
-    meshes = [*cards, *deck.named("NODE")]
-    last = [card for card in meshes if card.block.end is None]
-    for name in dict.fromkeys(card.file for card in last if is_cut(card.block)):
-        yield f"{name}: the file ends within a line of its mesh; is it cut?"
-    if any(card.file == deck.path and not is_cut(card.block) for card in last):
-        yield f"{deck.path}: the main deck ends within its mesh, without *END; is it cut?"
+    yield from (f"{block.source.name}: {told}" for block, told in cuts(deck) if holds_mesh(block))
     unknown = sorted({int(part) for one in elements for part in np.unique(one.part)} - parts.materials.keys())
     if unknown:
-        yield f"elements of part {listing(unknown)}, which no *PART of the deck defines"
+        yield f"elements of {name_units(unknown)}, which no *PART of the deck defines"
     if lost:
         yield f"{lost} nodes of elements are not in any *NODE of the deck"
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from d2rpick.deck.source import SourceFile
+
     Places = NDArray[np.int64]
     Reals = NDArray[np.float64]
 
@@ -110,7 +112,7 @@ class Inventory:
     ``coordinates`` is (nodes, 3), NaN for a node that the deck does not place.  ``notes`` say what was not followed;
     ``complete`` is False where elements or parts may be missing because of it.  ``joints`` hold parts together that
     share no nodes; ``ties`` do too, but it is not known which.  ``watched`` are the places of nodes whose motion is
-    written.  ``moved``: something moves nodes away from the coordinates of the deck.
+    written.  ``moved``: something moves nodes away from the coordinates of the deck.  ``files`` are those of the deck.
     """
 
     solver: str
@@ -123,6 +125,7 @@ class Inventory:
     ties: tuple[str, ...] = ()
     watched: Places = field(default_factory=lambda: np.empty(0, np.int64))
     moved: bool = False
+    files: tuple[SourceFile, ...] = ()
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:

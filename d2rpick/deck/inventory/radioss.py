@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.deck.cut import cuts, holds_mesh
 from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.inventory import formulations, joints
-from d2rpick.deck.inventory.columns import is_cut, layout, lines_of
+from d2rpick.deck.inventory.columns import layout, lines_of
 from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of
 from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
 from d2rpick.deck.radioss.legs import find_run_windows
 from d2rpick.deck.radioss.starter import WITHOUT_FRAME
-from d2rpick.errors import listing
+from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -101,6 +102,7 @@ def read(run: Run) -> Inventory:
         "radioss", parts, elements, np.concatenate([coordinates, beyond]), notes, not notes,
         joints=held.placed(table), ties=held.unknown,
         watched=places_of(_watched(worded), table), moved=any(words[:1] == ("TRANSFORM",) for _, words in worded),
+        files=tuple(run.deck.sources),
     )  # fmt: skip
 
 
@@ -119,18 +121,14 @@ def _notes(
     for card, words in cards:
         if words and words[0] in _NOT_COUNTED:
             yield f"{card.file}:{card.line}: elements of /{'/'.join(words)} are not followed"
-        if words and words[0] in {*_KINDS, "NODE"} and card.block.end is None:
-            if is_cut(card.block):
-                yield f"{card.file}: the file ends within a line of its mesh; is it cut?"
-            elif card.file == starter.sources[0].name:
-                yield f"{card.file}: the starter deck ends within its mesh, without /END; is it cut?"
+    yield from (f"{block.source.name}: {told}" for block, told in cuts(run.deck) if holds_mesh(block))
     for unread in run.deck.unread:
         yield f"{unread.name.file}:{unread.name.line}: {unread.name.text} was not read: {unread.reason}"
     if starter.moved:
         yield "ids of a //SUBMODEL may be moved, which is not followed"
     unknown = sorted({int(part) for one in elements for part in np.unique(one.part)} - starter.parts.keys())
     if unknown:
-        yield f"elements of part {listing(unknown)}, which no /PART of the deck defines"
+        yield f"elements of {name_units(unknown)}, which no /PART of the deck defines"
     if lost:
         yield f"{lost} nodes of elements are not in any /NODE of the deck"
 

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 _INCLUDE = b"#include"
 _DIGITS = 10  # of an id
-_PIECE = 4 << 20  # bytes that are looked at together
 
 
 def blocks(source: SourceFile) -> Iterator[Block]:
@@ -33,13 +32,10 @@ def blocks(source: SourceFile) -> Iterator[Block]:
 
 def _marks(source: SourceFile) -> Iterator[tuple[int, bytes]]:
     """Lines that begin with ``/`` or ``#include``, and where; found without a look at each line of a mesh."""
-    position, rest = 0, b""
-    while data := source.read(position + len(rest), position + len(rest) + _PIECE):
-        whole, ended, tail = (rest + data).rpartition(b"\n")
-        lines = whole + ended
+    position = 0
+    for lines in source.pieces(0):
         yield from ((position + at, raw) for at, raw in _marked(lines))
-        position, rest = position + len(lines), tail
-    yield from ((position + at, raw) for at, raw in _marked(rest))
+        position += len(lines)
 
 
 def _marked(lines: bytes) -> list[tuple[int, bytes]]:

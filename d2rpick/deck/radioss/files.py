@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.includes import Unread
+from d2rpick.deck.radioss.blocks import blocks, card_of, keyword
 from d2rpick.deck.radioss.engine import Leg, read_legs
-from d2rpick.deck.radioss.starter import Starter, card_or_none
+from d2rpick.deck.radioss.starter import KEPT, Starter
 from d2rpick.deck.reader import Deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.errors import DeckError
@@ -49,15 +50,15 @@ def run_files(path: str) -> list[str]:
     together; a file of another name goes by the name of the run that it holds.
     """
     try:
-        if not Path(path).is_file():
+        if not os.path.isfile(path):  # noqa: PTH113  start-up
             return []  # a pipe gives its bytes once
-        with Path(path).open("rb") as stream:
+        with open(path, "rb", buffering=0) as stream:  # noqa: PTH123
             head = stream.read(_HEAD)
+        if not recognises(head):
+            return []
         beside = {one.name: str(Path(path).parent / one.name) for one in Path(path).parent.iterdir() if one.is_file()}
     except (OSError, ValueError):
         return []  # said by who reads it
-    if not recognises(head):
-        return []
     name = _run_name(path, head)
     mine = sorted(key for key in beside if (match := _NUMBERED.fullmatch(key)) and match[1] == name)
     files = [beside[key] for key in mine]
@@ -79,16 +80,19 @@ def read_run(path: str, content: bytes | None = None) -> Run:
     Raises
     ------
     DeckError
-        If a file cannot be read.
+        If a file cannot be read, or holds neither a starter deck nor an engine file.
     """
     run = Run(Deck(path))
-    for name in [path] if content is not None else run_files(path):
+    files = run_files(path) if content is None else []
+    for name in files or [path]:
         source = SourceFile(name, content)
         head = source.read(0, _HEAD)
-        run.deck.files.append(name)
+        if not recognises(head):
+            raise DeckError(f"{name}: no /BEGIN or /RUN was found, a file of a Radioss run was expected")
+        run.deck.sources.append(source)
         if _ENGINE.search(head):
             run.legs += read_legs(source)
-        if _STARTER.search(head) or not _ENGINE.search(head):
+        if _STARTER.search(head):
             run.starter = run.starter or Starter()
             _read_starter(source, run, ())
     run.legs.sort(key=lambda leg: leg.number)
@@ -101,13 +105,17 @@ def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
     if run.starter is None:
         return
     run.starter.sources.append(source)
-    for card, words in card_or_none(source):
-        if words:
+    for block in blocks(source):
+        words = keyword(block)
+        if block.end is None:
+            run.deck.ends.append((block, not chain))
+        if not words:
+            _include(card_of(block), source, run, chain)
+        elif words[0] in KEPT:
+            card = card_of(block)
             run.starter.take(card, words)
             if words[0] == "RBODY":
                 run.deck.cards.append(card)
-        else:
-            _include(card, source, run, chain)
 
 
 def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
@@ -126,9 +134,9 @@ def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -
         run.deck.unread.append(Unread(replace(card.here, text=name), "no such file"))
     elif real in chain or real == os.path.realpath(source.name) or len(chain) >= _DEEPEST:
         run.deck.unread.append(Unread(replace(card.here, text=name), "the file includes itself"))
+    elif not os.access(path, os.R_OK):
+        run.deck.unread.append(Unread(replace(card.here, text=name), "no permission to read it"))
     else:
-        run.deck.files.append(path)
-        try:
-            _read_starter(SourceFile(path), run, (*chain, os.path.realpath(source.name)))
-        except DeckError:
-            run.deck.unread.append(Unread(replace(card.here, text=name), "no permission to read it"))
+        included = SourceFile(path)
+        run.deck.sources.append(included)
+        _read_starter(included, run, (*chain, os.path.realpath(source.name)))

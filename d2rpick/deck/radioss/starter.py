@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.deck.expression import ExpressionError, number
-from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
+from d2rpick.deck.radioss.blocks import blocks, keyword, whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -150,15 +150,8 @@ class Starter:
 
 
 _ID_AT: Final = {"GRNOD": 2, "SENSOR": 2, "PROP": 2}  # where a keyword has its id; others behind their name
+# Keywords of the cards that say what a `Starter` keeps.
 KEPT: Final = {*WITHOUT_FRAME, _SUBMODEL, "BEGIN", "RBODY", "PART", "SUBSET", "GRNOD", "SENSOR", "PROP"}
-
-
-def card_or_none(source: SourceFile) -> Iterator[tuple[Card, tuple[str, ...]]]:
-    """Cards of a starter file that are kept, and its includes (without words)."""
-    for block in blocks(source):
-        words = keyword(block)
-        if not words or words[0] in KEPT:
-            yield card_of(block), words
 
 
 def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:

@@ -80,8 +80,8 @@ def _differing(rows: Bytes, example: Bytes) -> Bytes:
     """Bits in which any of the rows differs from the example, shape (size,)."""
     count, size = rows.shape
     if count % _FOLD == 0 and rows.flags.c_contiguous:
-        rows, example = rows.reshape(count // _FOLD, _FOLD * size), np.tile(example, _FOLD)
+        rows = rows.reshape(count // _FOLD, _FOLD * size)
     # a bit is the example's in all rows where it is so in their AND and in their OR
-    differing = np.bitwise_and.reduce(rows, axis=0) ^ example
-    differing |= np.bitwise_or.reduce(rows, axis=0) ^ example
-    return np.asarray(np.bitwise_or.reduce(differing.reshape(-1, size), axis=0))
+    differing = np.bitwise_and.reduce(rows, axis=0).reshape(-1, size) ^ example
+    differing |= np.bitwise_or.reduce(rows, axis=0).reshape(-1, size) ^ example
+    return np.asarray(np.bitwise_or.reduce(differing, axis=0))

@@ -36,7 +36,7 @@ _BATCH: Final = 1 << 14  # numbers converted at a time: they stay in the cache
 _RECENT: Final = 4  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
 _NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
-OVERLONG: Final = 512  # bytes of a line that no solver writes: states were blanked, and hide in it
+_OVERLONG: Final = 512  # bytes of a line that no solver writes
 _MANY: Final = 64  # of so many blocks it is remembered what differs between them, a small share of the file
 
 
@@ -107,7 +107,7 @@ class Blocks:
         self.source = source
         self._data = content_of(data)
         self._grammar = grammar
-        self._end = self._end_of_last_line()
+        self._end = self._data.rfind(b"\n", len(self._data)) + 1
         self._begin = begin
         self._runs = array("q")  # packed: a file whose blocks all differ must not fill the memory
         data, end = self._data, self._end  # not self: a circle would keep the file open
@@ -358,14 +358,6 @@ class Blocks:
                 return at + found + 1
         return None
 
-    def _end_of_last_line(self) -> int:
-        for stop in range(len(self._data), 0, -CHUNK):
-            first = max(0, stop - CHUNK)
-            found = self._data[first:stop].rfind(b"\n")
-            if found >= 0:
-                return first + found + 1
-        return 0
-
 
 def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: int, behind: int) -> None:
     """Let what ``changing`` matches in a piece of a block differ from block to block.
@@ -374,6 +366,11 @@ def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: in
     """
     for piece in changing.finditer(block, first, behind):
         literal[piece.start() : piece.end()] = 0
+
+
+def overlong(block: bytes) -> bool:
+    """Whether a line is longer than solvers write: states were blanked, and hide in it."""
+    return max(map(len, block.split(b"\n"))) >= _OVERLONG
 
 
 def _spoken(name: Hashable) -> str:

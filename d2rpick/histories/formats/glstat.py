@@ -15,7 +15,7 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
-from d2rpick.histories.formats.fixed_text import OVERLONG, UNSURE, BlockLayout, Blocks, Grammar, release
+from d2rpick.histories.formats.fixed_text import UNSURE, BlockLayout, Blocks, Grammar, overlong, release
 from d2rpick.histories.formats.text_head import head, written_head
 
 if TYPE_CHECKING:
@@ -34,8 +34,6 @@ _CONTROL: Final = b"\n dt of cycle"
 _LAST: Final = "time per zone cycle.(nanosec)"  # in every glstat seen; mass scaling may add lines behind it
 _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTILINE)
 _VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")  # there is a line for each wall
-
-_OVERLONG: Final = re.compile(rb"[^\n]{%d}" % OVERLONG)
 
 # In lines other than these: numbers, and what controls the time step.
 _CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*|(?<= is controlled by )[^\r\n]{1,40}")
@@ -144,7 +142,7 @@ def _describe(block: bytes) -> BlockLayout:
         mixed |= name in fields
         fields[name] = line.start(2)
     release(literal, block, _CHANGING, behind, len(block))
-    if mixed or _OVERLONG.search(block):  # with lines of another state: any of them may be
+    if mixed or overlong(block):  # with lines of another state: any of them may be
         fields = {name: place if name == _TIME else UNSURE for name, place in fields.items()}
     return BlockLayout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
 

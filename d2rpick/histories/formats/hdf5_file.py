@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 from contextlib import contextmanager
 from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
@@ -49,6 +50,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Database]
 
 
 def _opened_leg(source: Source, selection: Selection) -> Database:
+    _import_library(source.name)
     # In memory whatever its size: the library crashes on some mixtures of two states of a file.
     file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
@@ -311,13 +313,19 @@ def _listed(columns: Sequence[Column]) -> str:
     return listing([f"{column.path} ({column.size})" for column in columns], most=_MANY) or "there is none"
 
 
+def _import_library(source: str) -> None:
+    """Import h5py, before a process is forked that would import it too; FormatError where it is not installed."""
+    try:
+        import_module("h5py")
+    except ImportError:
+        raise FormatError(f"{source}: HDF5 files need h5py; pip install h5py, or export the columns as CSV") from None
+
+
 @contextmanager
 def _opened(file: BinaryIO, source: str) -> Iterator[h5py.File]:
     """Open the file; whatever h5py makes of a damaged one becomes a FormatError."""
-    try:
-        import h5py
-    except ImportError:
-        raise FormatError(f"{source}: HDF5 files need h5py; pip install h5py, or export the columns as CSV") from None
+    import h5py
+
     try:
         with h5py.File(file, "r") as opened:
             yield opened

@@ -17,7 +17,7 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
-from d2rpick.histories.formats.fixed_text import OVERLONG, UNSURE, BlockLayout, Blocks, Grammar, release
+from d2rpick.histories.formats.fixed_text import UNSURE, BlockLayout, Blocks, Grammar, overlong, release
 from d2rpick.histories.formats.text_head import head, written_head
 from d2rpick.histories.history import Part
 
@@ -61,7 +61,6 @@ _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
 # A part number has 5 or, from 100000 on, 8 columns; a longer one, where it is printed, pushes the line.
 _ID: Final = re.compile(rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten=")
 _CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")  # numbers in other lines
-_OVERLONG: Final = re.compile(rb"[^\n]{%d}" % OVERLONG)
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
 
@@ -239,7 +238,7 @@ def _describe(legend: Mapping[int, str], block: bytes) -> BlockLayout:
                 literal[field.start(2) : field.end(2)] = 0
                 fields[name] = field.start(2)
     release(literal, block, _CHANGING, behind, len(block))
-    if _OVERLONG.search(block):
+    if overlong(block):
         fields = {field: place if field == _TIME else UNSURE for field, place in fields.items()}
     return BlockLayout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
 

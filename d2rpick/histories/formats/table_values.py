@@ -39,8 +39,8 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
         if b"." in piece:
             return None
         piece = piece.replace(b",", b".")
-    if piece.isspace() or b'"' in piece:
-        return None  # numpy warns of the one, and a separator in quotes is none
+    if b'"' in piece:
+        return None  # a separator in quotes is none
     whole = piece.decode("latin-1")  # no other character than those of latin-1 belongs to a number
     taken, chosen = [*range(layout.columns)], None
     first = whole[: whole.index("\n")]
@@ -72,15 +72,15 @@ def _separators(piece: bytes, layout: Layout) -> tuple[NDArray[np.intp], NDArray
     """Places of the rows (n,) and of their separators (n, k); None unless all rows have their number of cells."""
     assert layout.separator
     signs = np.frombuffer(piece, np.uint8)
-    marks, ends = np.flatnonzero(signs == ord(layout.separator)), np.flatnonzero(signs == ord("\n"))
-    closed = piece.startswith(layout.separator.encode("latin-1"), int(ends[0]) - 1)  # rows end with a separator
-    each = layout.columns - 1 + closed
-    if marks.size != ends.size * each:
+    ends = signs == ord("\n")
+    closed = piece.startswith(layout.separator.encode("latin-1"), piece.index(b"\n") - 1)  # rows end with a separator
+    each, rows = layout.columns + closed, np.count_nonzero(ends)
+    marks = np.flatnonzero(ends | (signs == ord(layout.separator)))
+    if marks.size != rows * each:
         return None
-    table = marks.reshape(-1, each)
-    alike = np.all(table[:, -1] < ends) and np.all(table[1:, 0] > ends[:-1])
-    whole = alike and (not closed or np.all(table[:, -1] == ends - 1))
-    return (np.append(0, ends[:-1] + 1), table) if whole else None
+    table = marks.reshape(rows, each)
+    whole = np.all(ends[table[:, -1]]) and (not closed or np.all(np.diff(table[:, -2:]) == 1))
+    return (np.append(0, table[:-1, -1] + 1), table[:, :-1]) if whole else None
 
 
 def checked_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Samples:

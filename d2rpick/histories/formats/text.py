@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import FormatError
+from d2rpick.histories.content import Content
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,58 +33,53 @@ _SAMPLE: Final = 100
 class Text:
     """Lines of a file, line ends as line feeds; ``unended`` is the last one when it has no end, else empty.
 
-    FormatError for binary data.
+    A big file in plain ASCII stays on its disk.  FormatError for binary data.
     """
 
     def __init__(self, source: Source) -> None:
         self.name = source.name
-        data = bytes(source.data)
-        if data.startswith(UTF16):
-            data = data.decode("utf-16", errors="replace").encode()
-        elif b"\0" in data:
-            raise FormatError(f"{self.name}: binary data, a text table was expected; export the history as CSV")
-        data = data.removeprefix(_UTF8)
-        if b"\r" in data:
-            data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        self._data = data
-        self._end = data.rfind(b"\n") + 1  # behind the last line that counts
-        self._encoding = _encoding(data)
-        self.unended = self._text(data[self._end :])
+        self._data, self._encoding = _plain(source)
+        self._end = self._data.rfind(b"\n", len(self._data)) + 1  # behind the last line that counts
+        self.unended = self._text(self._data[self._end :])
 
-    @cached_property
+    @property
     def head(self) -> list[str]:
         """The first lines that have an end, at most `HEAD` of them."""
-        return self._text(self._data[: self._head_end]).split("\n")[:-1]
+        return self._first[:HEAD]
 
-    @cached_property
+    @property
     def is_short(self) -> bool:
         """Whether ``head`` holds all lines but the last one without end."""
-        return self._head_end == self._data.rfind(b"\n") + 1
+        return len(self._first) <= HEAD
 
     @cached_property
-    def _head_end(self) -> int:
-        return self.place(HEAD)
+    def _first(self) -> list[str]:
+        return list(islice(self.lines(0), HEAD + 1))
 
     def place(self, line: int) -> int:
         """Where a line begins, counted from 0 [byte]; the end of the lines where there are fewer."""
-        at = 0
-        for _ in range(line):
-            at = self._data.find(b"\n", at, self._end) + 1
-            if not at:
-                return self._end
-        return at
+        lengths = (len(one) for piece in self.pieces(0) for one in piece.splitlines(keepends=True))
+        return min(sum(islice(lengths, line)), self._end)
 
     def take_rest(self) -> None:
         """Count the last line, which has no end, as whole."""
         self._end = len(self._data)
 
     def pieces(self, begin: int) -> Iterator[bytes]:
-        """Whole lines from byte ``begin`` on, some at a time, each with its end."""
+        """Whole lines from byte ``begin`` on, some at a time, each with its end.
+
+        FormatError behind the last of them where the file was written anew meanwhile.
+        """
+        size = _PIECE
         while begin < self._end:
-            end = self._data.find(b"\n", begin + _PIECE, self._end) + 1 or self._end
-            piece = self._data[begin:end]
-            yield piece if piece.endswith(b"\n") else piece + b"\n"
-            begin = end
+            piece = self._data[begin : min(begin + size, self._end)]
+            end = piece.rfind(b"\n") + 1
+            if not end and begin + size < self._end:
+                size *= 2  # for the sake of a long line
+                continue
+            yield piece[:end] or piece + b"\n"
+            begin += end or len(piece)
+        self._data.check()
 
     def lines(self, begin: int) -> Iterator[str]:
         """Lines from byte ``begin`` on, without their ends."""
@@ -101,16 +98,37 @@ class Text:
         starts, first, last = [], begin, end
         for _ in range(_SAMPLE):
             starts.append(first)
-            first = data.find(b"\n", first, end) + 1 or end
-            last = data.rfind(b"\n", 0, last - 1) + 1
+            first = data.find(b"\n", first) + 1 or end
+        for _ in range(_SAMPLE):
+            last = data.rfind(b"\n", max(last - 1, 0)) + 1
             starts.append(last)
         between = ((first * (_SAMPLE - i) + last * i) // _SAMPLE for i in range(_SAMPLE))
-        starts += (data.find(b"\n", at, end) + 1 for at in between)
-        spans = ((at, data.find(b"\n", at, end)) for at in starts if begin <= at < end)
-        return [self._text(data[at : to if to >= 0 else end]) for at, to in spans]
+        starts += (data.find(b"\n", at) + 1 for at in between)
+        spans = [(at, data.find(b"\n", at)) for at in starts if begin <= at < end]
+        lines = [self._text(data[at : to if to >= 0 else end]) for at, to in spans]
+        data.check()
+        return lines
 
     def _text(self, data: bytes) -> str:
         return data.decode(self._encoding)
+
+
+def _plain(source: Source) -> tuple[Content, str]:
+    """Text with line feeds alone and no mark before it, and its encoding."""
+    data = source.data
+    if not isinstance(data, bytes):
+        pieces = (data[at : at + _PIECE] for at in range(0, len(data), _PIECE))
+        if all(piece.isascii() and b"\r" not in piece and b"\0" not in piece for piece in pieces):
+            return data, "latin-1"  # of which ASCII is a part
+    data = bytes(data)
+    if data.startswith(UTF16):
+        data = data.decode("utf-16", errors="replace").encode()
+    elif b"\0" in data:
+        raise FormatError(f"{source.name}: binary data, a text table was expected; export the history as CSV")
+    data = data.removeprefix(_UTF8)
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return Content(data), _encoding(data)
 
 
 def _encoding(data: bytes) -> str:

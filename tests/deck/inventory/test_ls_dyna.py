@@ -119,7 +119,7 @@ def test_other_kinds(tmp_path: Path, elements: str, expected: dict[int, dict[str
 def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("d2rpick.deck.inventory.columns._PIECE", 40)
+    monkeypatch.setattr("d2rpick.deck.source._PIECE", 40)
     text = "".join(row(n, 7) + row(*range(n, n + 8)) for n in range(1, 10))
     found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}*ELEMENT_SOLID\n{text}*END\n")
     assert counted(found) == {7: {"solid": 9}}

@@ -8,6 +8,7 @@ import pytest
 
 from d2rpick.deck.inventory import radioss, read_inventory
 from d2rpick.deck.radioss import read_run
+from d2rpick.rules import check_deck
 from tests.deck.inventory.test_ls_dyna import counted, row
 from tests.shared import shared, shared_bytes
 
@@ -111,6 +112,7 @@ def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> 
         deck.write_text(text[:end])
         found = radioss.read(read_run(str(deck)))
         assert (sum("is it cut" in note for note in found.notes), found.complete) == (1, False)
+        assert [finding.rule for finding in check_deck(str(deck)).findings] == ["D2R011"]
     deck.write_text(f"{text}/END\n")
     assert radioss.read(read_run(str(deck))).complete
 

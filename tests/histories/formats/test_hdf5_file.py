@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import signal
+import sys
 from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
@@ -251,3 +252,10 @@ def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:
     with pytest.raises(FormatError, match="by its name not an internal energy"):
         read(written(other))
     assert read(written(other), "kinetic_energy").energy.tolist() == KINETIC.tolist()
+
+
+def test_without_its_library_a_file_is_refused_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    content = written(plain)
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(FormatError, match=r"run\.h5: HDF5 files need h5py; pip install h5py"):
+        read(content)

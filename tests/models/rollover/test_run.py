@@ -18,7 +18,7 @@ from d2rpick.models.rollover.run import RigidWindow, proceed, run_to, simulate
 from d2rpick.models.rollover.scan import compare, comparison_end, scan, scan_times
 
 COARSE = Parameters(mesh=4, damping=1.0)
-INTERVAL = 2e-4
+INTERVAL = 5e-4
 ANGLES = st.floats(-np.pi, np.pi)
 TIMES = st.floats(0.0, 0.12)
 

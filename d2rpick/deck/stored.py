@@ -1,0 +1,118 @@
+"""The bytes of one deck file, all of one state of it, whatever becomes of the file meanwhile.
+
+A deck is saved by an editor, or written anew by a pre-processor, while its rows are still to be read.  A small file is
+held in memory.  A big one is opened whenever some of it is wanted, so that no number of includes uses up the open files
+of a process; a file that is not as it was then is an error.  Files are not mapped into memory: where a mapped page is
+cut off, the system ends the process.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.errors import DeckError
+from d2rpick.file_state import FileState, is_endless, is_regular, settled_state
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from io import FileIO
+
+    Reading = Callable[[int, int], bytes]  # gives the bytes from one place to another
+
+_HELD: Final = 1 << 18  # a file up to this size is held in memory: a deck may have thousands of them
+_WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, close to them
+
+
+class Held:
+    """Bytes in memory."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data, self.size = data, len(data)
+
+    def read(self, begin: int, end: int) -> bytes:
+        """Bytes from ``begin`` to ``end``, less where the file ends before."""
+        return self._data[begin:end]
+
+    @contextmanager
+    def opened(self) -> Iterator[Reading]:
+        """Give what `read` is."""
+        yield self.read
+
+
+class OnDisk:
+    """Bytes of a file that are read when they are asked for; DeckError when it is not as it was at first."""
+
+    def __init__(self, name: str, state: FileState) -> None:
+        self.size = state.size
+        self._name, self._state = name, state
+        self._window, self._begin = b"", 0
+
+    def read(self, begin: int, end: int) -> bytes:
+        """Bytes from ``begin`` to ``end``, less where the file ends before."""
+        end = min(end, self.size)
+        if begin >= end:
+            return b""
+        if end - begin > _WINDOW:
+            return self._read(begin, end)
+        if begin < self._begin or end > self._begin + len(self._window):
+            low = begin // _WINDOW * _WINDOW
+            self._window, self._begin = self._read(low, min(-(-end // _WINDOW) * _WINDOW, self.size)), low
+        return self._window[begin - self._begin : end - self._begin]
+
+    @contextmanager
+    def opened(self) -> Iterator[Reading]:
+        """Give a function that reads much without remembering any; what it gave is sure when the context is left."""
+        with _opened(self._name) as file:
+            yield lambda begin, end: self._filled(file, begin, end)
+            if not FileState.of(file).is_as(self._state):
+                raise self._changed()
+
+    def _read(self, begin: int, end: int) -> bytes:
+        with self.opened() as read:
+            return read(begin, end)
+
+    def _filled(self, file: FileIO, begin: int, end: int) -> bytes:
+        file.seek(begin)
+        data = file.read(end - begin)
+        while len(data) < end - begin:  # a single call may give less
+            more = file.read(end - begin - len(data))
+            if not more:
+                raise self._changed()
+            data += more
+        return data
+
+    def _changed(self) -> DeckError:
+        return DeckError(
+            f"{self._name}: the file was rewritten or replaced while it was read; read it again when it is complete"
+        )
+
+
+def stored(name: str) -> Held | OnDisk:
+    """Bytes of a file: held in memory where it is small or no regular file.
+
+    Raises
+    ------
+    DeckError
+        If it cannot be opened, is a device, or changes all the time.
+    """
+    with _opened(name) as file:
+        if is_endless(file):
+            raise DeckError(f"{name}: this is a device, a readable deck was expected")
+        if not is_regular(file):
+            return Held(file.read())
+        state = settled_state(file)
+    if state is None:
+        raise DeckError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+    on_disk = OnDisk(name, state)
+    return Held(on_disk.read(0, state.size)) if state.size <= _HELD else on_disk
+
+
+def _opened(name: str) -> FileIO:
+    try:
+        return open(name, "rb", buffering=0)  # noqa: PTH123  start-up; it is given back
+    except FileNotFoundError:
+        raise DeckError(f"{name}: no such file; check the name and the folder") from None
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        reason = getattr(error, "strerror", None) or error
+        raise DeckError(f"{name}: cannot be read ({reason}); check the name and the permissions") from None

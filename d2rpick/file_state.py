@@ -1,0 +1,87 @@
+"""Files that others may be writing: what tells that one has changed, and what one held at a single moment."""
+
+from __future__ import annotations
+
+import os
+import stat
+import time
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+if TYPE_CHECKING:
+    from io import FileIO
+
+_TRIES: Final = 5  # looks at a file that changes all the time
+_TICK: Final = 50_000_000  # [ns] above the resolution of most files' times: later changes show in them
+COARSE: Final = 2_000_000_000  # [ns] the resolution of the others, which give whole seconds
+_SLOWEST: Final = 5  # [ns] for a byte that is written: the times of a file are those when its last write began
+PAUSE: Final = 0.05  # [s] for a write that may be under way: until it ends, half of it stands in the file
+
+
+class FileState(NamedTuple):
+    """What tells whether a file has changed; ``settled`` when no write is under way and one after it would show."""
+
+    device: int
+    inode: int
+    size: int
+    modified: int
+    changed: int
+    settled: bool
+
+    @classmethod
+    def of(cls, file: FileIO) -> FileState:
+        """Look at a file as it is now."""
+        found, now = os.fstat(file.fileno()), time.time_ns()
+        # Of the two times the modification can be set, to one in the future too, which would never be past.
+        latest = max(found.st_ctime_ns, found.st_mtime_ns if found.st_mtime_ns <= now else 0)
+        settled = now - latest > _TICK + _slowness(latest, found.st_size)
+        return cls(found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns, settled)
+
+    def is_as(self, other: FileState) -> bool:
+        """Whether this is the same file, and nothing that shows has changed."""
+        return self[:-1] == other[:-1]
+
+
+def _slowness(changed: int, size: int) -> int:
+    """How much longer than usual a write may last, or a change not show in the times [ns]."""
+    return _SLOWEST * size + (0 if changed % 1_000_000_000 else COARSE)
+
+
+def pause(more: int = 0) -> None:
+    """Wait for the end of a write that may be under way, and so much longer [ns]."""
+    time.sleep(PAUSE + more * 1e-9)
+
+
+def is_endless(file: FileIO) -> bool:
+    """Whether a file is a device other than a terminal: /dev/zero and /dev/full never end."""
+    return stat.S_ISCHR(os.fstat(file.fileno()).st_mode) and not file.isatty()
+
+
+def is_regular(file: FileIO) -> bool:
+    """Whether a file can be read again, unlike a pipe or a terminal."""
+    return stat.S_ISREG(os.fstat(file.fileno()).st_mode)
+
+
+def settled_state(file: FileIO) -> FileState | None:
+    """State of a file when no write is under way and a later one will show; None where it changes all the time."""
+    for _ in range(_TRIES):
+        found = FileState.of(file)
+        if found.settled:
+            return found
+        pause(_slowness(found.changed, found.size))
+        if FileState.of(file).is_as(found):
+            return found
+    return None
+
+
+def snapshot(file: FileIO) -> bytes | None:
+    """Bytes that a file held at one moment, or its first ones then; None where it changes all the time."""
+    for _ in range(_TRIES):
+        file.seek(0)
+        before, data = FileState.of(file), file.read()
+        if before.settled and before == FileState.of(file):
+            return data
+        pause()
+        file.seek(0)
+        if file.read(len(data)) == data:
+            return data
+    return None

@@ -1,0 +1,116 @@
+"""Where keywords stand: found alike in memory and on a disk, in pieces of any size, by any number of threads."""
+
+from __future__ import annotations
+
+import errno
+import io
+import re
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.deck import marks, source, stored
+from d2rpick.deck.marks import find_marks
+from d2rpick.deck.source import SourceFile
+from d2rpick.deck.stored import Held, OnDisk
+from d2rpick.errors import DeckError
+from d2rpick.file_state import FileState
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from io import FileIO
+    from pathlib import Path
+
+HEAD = b"-----BEGIN PGP MESSAGE"
+MARK = b"\xef\xbb\xbf"
+FRAGMENTS = [
+    *(b"*", b" *", b"*END", b"*NODE\n", b"\n", b"\r\n", b"\n*", b" " * 20, b" " * 31 + b"*", b" " * 32 + b"*"),
+    *(HEAD, b"\n" + HEAD, HEAD[:9], HEAD[9:], b"G", b"$", MARK, b"1.5", b"-", b"x" * 70),
+]
+FILES = st.lists(st.sampled_from(FRAGMENTS), max_size=40).map(b"".join)
+
+
+def line_by_line(data: bytes) -> Iterator[int]:
+    """Offsets as a look at every line finds them."""
+    start = len(MARK) if data.startswith(MARK) else 0
+    for line in data[start:].splitlines(keepends=True) if b"\r" not in data else re.split(rb"(?<=\n)", data[start:]):
+        if found := re.match(rb" {0,31}\*|" + HEAD, line):
+            yield start + (found.end() - 1 if found[0].endswith(b"*") else 0)
+        start += len(line)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("marks") / "deck.k"
+
+
+@given(FILES, st.integers(1, 90), st.integers(1, 300), st.integers(0, 3), st.integers(1, 80))
+def test_pieces_and_threads_find_what_a_look_at_every_line_finds(
+    file: Path, data: bytes, piece: int, share: int, helpers: int, window: int
+) -> None:
+    file.write_bytes(data)
+    expected = [*line_by_line(data)]
+    assert [*find_marks(Held(data))] == expected
+    blocks = [(one.start, one.end, one.head, one.line, [*one.lines()]) for one in SourceFile("held", data).blocks()]
+    with pytest.MonkeyPatch.context() as small:
+        small.setattr(marks, "_PIECE", piece)
+        for module, name, value in (
+            *(
+                (marks, "_SHARE", share),
+                (marks, "_HELPERS", helpers),
+                (stored, "_HELD", -1),
+                (stored, "_WINDOW", window),
+            ),
+            *((source, "_PIECE", piece), (source, "_COUNTED", piece), (source, "_FIRST", 0)),
+        ):
+            small.setattr(module, name, value)
+        on_disk = SourceFile(str(file))
+        assert isinstance(on_disk._file, OnDisk)
+        assert [*on_disk.marks] == [*find_marks(Held(data))] == expected
+        assert [(one.start, one.end, one.head, one.line, [*one.lines()]) for one in on_disk.blocks()] == blocks
+
+
+@given(FILES, st.integers(1, 40), st.integers(0, 90), st.none() | st.integers(0, 120))
+def test_pieces_are_whole_lines(file: Path, data: bytes, size: int, start: int, end: int | None) -> None:
+    file.write_bytes(data)
+    with pytest.MonkeyPatch.context() as small:
+        small.setattr(stored, "_HELD", -1)
+        small.setattr(stored, "_WINDOW", 2 * size)
+        small.setattr(source, "_PIECE", size)
+        pieces = [*SourceFile(str(file)).pieces(start, end)]
+    assert b"".join(pieces) == data[start:end]
+    assert all(piece.endswith(b"\n") for piece in pieces[:-1])
+    assert all(pieces)
+
+
+def test_a_call_of_the_system_that_gives_less_is_repeated() -> None:
+    class Sparing(io.BytesIO):
+        """Gives three bytes at a time."""
+
+        def read(self, size: int | None = -1, /) -> bytes:
+            return super().read(min(3, size or 0))
+
+    on_disk = OnDisk("deck.k", FileState(0, 0, 10, 0, 0, settled=True))
+    file: Any = Sparing(b"0123456789")
+    assert on_disk._filled(file, 1, 9) == b"12345678"
+    with pytest.raises(DeckError, match="rewritten"):
+        on_disk._filled(file, 5, 12)
+
+
+def test_what_goes_wrong_in_a_thread_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "deck.k"
+    path.write_bytes(b"*NODE\n" * 100)
+    for module, name, value in ((marks, "_SHARE", 100), (marks, "_PIECE", 64), (stored, "_HELD", 0)):
+        monkeypatch.setattr(module, name, value)
+    filled = OnDisk._filled
+
+    def failing(self: OnDisk, opened: FileIO, begin: int, end: int) -> bytes:
+        if begin > 300:
+            raise OSError(errno.EIO, "Input/output error")
+        return filled(self, opened, begin, end)
+
+    monkeypatch.setattr(OnDisk, "_filled", failing)
+    with pytest.raises(OSError, match="Input/output"):
+        find_marks(stored.stored(str(path)))

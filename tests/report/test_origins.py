@@ -1,0 +1,86 @@
+"""JSON documents and pages name every file that an answer rests on, with its SHA-256."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+
+import d2rpick as d2
+from tests.command import ROOT, answer, run
+from tests.json_schemas import check_by_schema
+from tests.sample_deck import DECK
+
+BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
+WEIGHTS = 'source = "our cluster"\n[per_element]\nBT = 1\nQBAT = 2\n'
+ASKED = {
+    "suggest": ("--td", "0.37", "--part", "all"),
+    "verify": ("--tr", "0.1", "--td", "0.37", "--part", "all"),
+    "explore": ("--steps", "3", "--part", "all"),
+    "plan": ("--part", "all"),
+    "parts": (),
+}
+
+
+def digest(file: Path | str) -> str:
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+@pytest.fixture(autouse=True)
+def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A deck of two files, of which one is included twice, and weights."""
+    monkeypatch.chdir(tmp_path)
+    main = DECK.read_text("utf-8").replace("*END", "*INCLUDE\nnote.k\n*INCLUDE\nnote.k\n*END")
+    Path("main.k").write_text(main, "utf-8")
+    Path("note.k").write_text("*TITLE\nnothing\n", "utf-8")
+    Path("site.toml").write_text(WEIGHTS, "utf-8")
+
+
+@pytest.mark.parametrize("command", ASKED)
+def test_a_deck_and_weights_that_took_part_are_named(command: str) -> None:
+    args = (command, *ASKED[command], "--deck", "main.k", BOX)
+    named = {"source": ["main.k", "note.k"], "sha256": [digest("main.k"), digest("note.k")]}
+    by_file = {"source": "our cluster", "file": "site.toml", "sha256": digest("site.toml")}
+    for more, weights in ((("--weights", "site.toml"), by_file), ((), {"file": None, "sha256": None})):
+        found = answer(*args, *more)
+        check_by_schema(found)
+        assert {key: found["deck"][key] for key in named} == named
+        assert {key: found["weights"][key] for key in weights} == weights
+    run(*args, "--weights", "site.toml", "--report", "page.html")
+    page = Path("page.html").read_text("utf-8")
+    for file in (BOX, "main.k", "note.k", "site.toml"):
+        assert page.count(f"{file}: {digest(file)}") == 1
+
+
+@pytest.mark.parametrize("command", ASKED)
+def test_without_a_deck_none_is_named(command: str) -> None:
+    found = answer(command, *ASKED[command], BOX)
+    assert (found["deck"], found["weights"]) == (None, None)
+
+
+def test_what_took_no_part_is_not_named() -> None:
+    asked = ("suggest", "--td", "0.37", "--deck", "main.k", BOX)
+    assert answer(*asked)["deck"] is None  # without parts a deck tells nothing
+    given = answer(*asked, "--part", "all", "--weights", "site.toml", "--cost-share", "0.5")
+    assert given["deck"]["source"] == ["main.k", "note.k"]
+    assert given["weights"] is None
+
+
+def test_the_library_names_them_too() -> None:
+    found = d2.suggest(d2.read(BOX), td=0.37, parts="all", deck="main.k", weights="site.toml")
+    assert found.to_dict()["weights"]["sha256"] == digest("site.toml")
+    assert digest("note.k") in found.report("page.html").read_text("utf-8")
+
+
+def test_of_a_deck_of_many_files_a_page_names_the_first() -> None:
+    names = [f"part{number}.k" for number in range(30)]
+    for name in names:
+        Path(name).write_text("*TITLE\nnothing\n", "utf-8")
+    includes = "".join(f"*INCLUDE\n{name}\n" for name in names)
+    Path("main.k").write_text(DECK.read_text("utf-8").replace("*END", f"{includes}*END"), "utf-8")
+    asked = ("suggest", "--td", "0.37", "--part", "all", "--deck", "main.k", BOX)
+    assert answer(*asked, "--report", "page.html")["deck"]["source"] == ["main.k", *names]
+    page = Path("page.html").read_text("utf-8")
+    assert ("part18.k: " in page, "part19.k: " in page) == (True, False)
+    assert "of 11 more files of the deck: in the JSON result" in page
