@@ -15,7 +15,7 @@ from d2rpick.histories.companions import check_companions, check_legs
 from d2rpick.histories.database import Legs
 from d2rpick.histories.run import Run
 from d2rpick.histories.selection import Selection
-from d2rpick.histories.source import Source, expand, open_source
+from d2rpick.histories.source import Source, open_files
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -80,9 +80,10 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
     Raises
     ------
     FormatError
-        If a file cannot be read as an energy history, or companions have no time in common.
+        If a file cannot be read as an energy history, companions have no time in common, or one of several files was
+        replaced while they were opened.
     """
-    return open_sources([open_source(name) for name in expand(names)], selection, input_format)
+    return open_sources(open_files(names), selection, input_format)
 
 
 def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:

@@ -64,6 +64,35 @@ def expand(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(file for name in names for file in _files(name)))
 
 
+def open_files(names: Sequence[str]) -> list[Source]:
+    """Read the files of one run, as `expand` gives them and `open_source` reads them.
+
+    Raises
+    ------
+    FormatError
+        If one cannot be read, or one of several was replaced or cut meanwhile: they may be of two runs.
+    """
+    files = expand(names)
+    before = {name: _kept(name) for name in files}
+    sources = [open_source(name) for name in files]
+    for name, (number, size) in before.items():
+        if len(files) > 1 and ((found := _kept(name))[0] != number or found[1] < size):
+            raise FormatError(
+                f"{name}: this file was replaced or written anew while the others of its run were opened; read them "
+                "again when they are complete"
+            )
+    return sources
+
+
+def _kept(name: str) -> tuple[tuple[int, int], int]:
+    """What stays of a file while a solver appends to it, and its size; the same of all that is no file."""
+    try:
+        found = os.stat(name)  # noqa: PTH116  start-up
+    except (OSError, ValueError):
+        return (0, 0), 0
+    return ((found.st_dev, found.st_ino), found.st_size) if name != STDIN else ((0, 0), 0)
+
+
 def open_source(name: str) -> Source:
     """Read a file, or standard input for ``-``; what is gzipped is unpacked.
 

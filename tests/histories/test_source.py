@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,8 @@ import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
+from d2rpick.histories import source
+from d2rpick.histories.content import stored
 from d2rpick.histories.opening import READERS, Selection, open_run
 from d2rpick.histories.source import expand
 from tests.hdf5_files import plain, written
@@ -21,6 +24,8 @@ from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from d2rpick.histories.content import OnDisk
 
 TIMES = [0.125, 0.25, 0.375]
 CONTENTS = {
@@ -74,6 +79,31 @@ def test_a_folder_holds_the_databases_of_one_run() -> None:
     legs = names("rad/box_T01", "rad/box_T02.gz", "rad/box_T03")
     names("rad/box_0001.out", "rad/box_T01.csv")
     assert expand(["rad", "run/GLSTAT", "rad/box_T01"]) == (*legs, "run/GLSTAT")
+
+
+@pytest.mark.parametrize("change", ["replaced", "cut", "appended", "taken away"])
+def test_files_of_one_run_are_not_mixed_with_those_of_the_next(
+    change: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, kind in (("run.glstat", "glstat"), ("run.matsum", "matsum"), ("next", "glstat")):
+        Path(name).write_bytes(CONTENTS[kind])
+
+    def stored_while_it_changes(name: str) -> bytes | OnDisk:
+        found = stored(name)
+        if name.endswith("matsum"):
+            first = folder / "run.glstat"
+            if change == "replaced":
+                Path("next").replace(first)
+            elif change == "taken away":
+                first.unlink()
+            else:
+                first.write_bytes(CONTENTS["glstat"][:-900] if change == "cut" else 2 * CONTENTS["glstat"])
+        return found
+
+    monkeypatch.setattr(source, "stored", stored_while_it_changes)
+    reason = r"run\.glstat: this file was replaced or written anew"
+    with nullcontext() if change == "appended" else pytest.raises(FormatError, match=reason):
+        assert len(source.open_files(["run.glstat", "run.matsum"])) == 2
 
 
 @pytest.mark.usefixtures("folder")

@@ -1,6 +1,6 @@
 """Damage of an HDF5 file that its library does not report: a crash, bytes too many, chunks that are not there.
 
-What cannot be seen: a changed byte in data that is stored without a checksum (`fletcher32`) and without compression.
+What cannot be seen: a changed byte in data that is stored without a checksum: `fletcher32`, or that of gzip.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from d2rpick.errors import FormatError, listing, printable
 from d2rpick.histories.database import DIGITS, SolverFile
 from d2rpick.histories.formats.hdf5_columns import Column, columns_of, finite
 from d2rpick.histories.formats.hdf5_damage import check_file, check_size
+from d2rpick.histories.formats.order import not_a_restart
 from d2rpick.histories.history import Part, Precision
 from d2rpick.histories.names import near_miss, refuse_other_quantity
 
@@ -97,8 +98,15 @@ class Columns(SolverFile):
 
     @cached_property
     def time(self) -> Samples:
-        """Values of the time column, shape (n,)."""
-        return self._load(self._time_column)
+        """Values of the time column, shape (n,) [time]; FormatError where they are not those of one run."""
+        time = self._load(self._time_column)
+        state = not_a_restart(time)
+        if state is None:
+            return time
+        raise FormatError(
+            f"{self.source}: {self._time_column.path} steps back from {time[state - 1]:g} to {time[state]:g} at value "
+            f"{state + 1}, increasing times or one restart were expected; sort the columns, or copy the file again"
+        )
 
     @property
     def part_time(self) -> Samples:

@@ -58,7 +58,7 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
     else:
         lines = whole.split("\n")[:-1]
     if not any(map(str.strip, lines)):
-        return None  # numpy warns
+        return None  # numpy passes over empty lines, and warns where there is no other
     try:
         table = np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=chosen)
     except ValueError:

@@ -6,6 +6,7 @@ import io
 import os
 import signal
 import sys
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 import h5py
@@ -116,6 +117,17 @@ def test_what_makes_no_history_is_refused(energy: object, message: str) -> None:
         file["time"], file["internal_energy"] = TIME, energy
 
     with pytest.raises(FormatError, match=message):
+        read(written(write))
+
+
+@pytest.mark.parametrize(("time", "refused"), [([0, 2, 1, 3], False), ([0, 3, 2, 1], True), ([0, 1, 0, 1], True)])
+def test_times_that_step_back_are_those_of_one_restart(time: list[float], refused: bool) -> None:
+    def write(file: h5py.File) -> None:
+        file["time"], file["internal_energy"] = np.array(time, float), ENERGY
+
+    with (
+        pytest.raises(FormatError, match=r"steps back from .* one restart were expected") if refused else nullcontext()
+    ):
         read(written(write))
 
 

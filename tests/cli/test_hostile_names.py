@@ -1,0 +1,189 @@
+"""Names that hold control codes, markup, and what shells, spreadsheets and terminals act on, in every output."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import unicodedata
+import xml.etree.ElementTree as ET
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.errors import UNSEEN, printable
+from d2rpick.report.figures import with_unit
+from d2rpick.report.shell import positional, shell_line
+from d2rpick.report.tables import as_json, as_line, as_markdown, in_markdown
+from tests.command import DECK, ENERGY, run
+
+NAME = (
+    "-rf\r\nred\t\x1b[31m\x07\x7f\x9b1m\x85\u2028\u202e\u2066\u200b\ufeff\u00ad<script>alert('1')<!--\" onload=\""
+    "\\|b|*c*_d_[e](f)$^{_$=1+1,;%0A::error::$(touch a);`touch b`&&!e ä部\\"
+)
+NO_TEXT = "run\udcff\udc80"
+FORMS = {
+    ("suggest", "--td", "0.064"): ("table", "json", "ndjson", "csv", "markdown", "value"),
+    ("verify", "--tr", "0.0135867", "--td", "0.0687534"): ("table", "json", "csv", "markdown"),
+    ("study", "--jobs", "1", "--td", "0.064"): ("table", "json", "ndjson", "csv", "markdown"),
+    ("info",): ("table", "json", "csv", "markdown"),
+    ("plan", "--exit-zero"): ("table", "json", "markdown"),
+}
+CHECKS = ("table", "json", "ndjson", "github", "junit", "sarif")
+
+
+def unseen(text: str) -> set[str]:
+    """What of a text is not seen on a terminal, or commands it."""
+    return {letter for letter in text if unicodedata.category(letter) in UNSEEN} - {"\n"}
+
+
+def given_back(line: str) -> list[bytes]:
+    """Words of a command line as a shell takes them."""
+    found = subprocess.run(["bash", "-c", f"printf '%s\\0' {line}"], capture_output=True, check=True).stdout
+    return found.split(b"\0")[:-1]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_shell_gives_back_the_words_of_a_command() -> None:
+    words = [NAME, NO_TEXT, "plain", "", *(os.fsdecode(bytes([byte, 48])) for byte in range(1, 256))]
+    line = shell_line(words)
+    assert line.isprintable()
+    assert given_back(line) == [os.fsencode(word) for word in words]
+
+
+def test_files_that_begin_with_a_dash_are_typed_behind_two() -> None:
+    assert positional(["-", "run.csv"]) == ("-", "run.csv")
+    assert positional(["run.csv", "--td"]) == ("--", "run.csv", "--td")
+
+
+@given(st.text(max_size=60))
+def test_json_gives_a_name_back_in_signs_that_are_seen(name: str) -> None:
+    for write in (as_json, as_line):
+        text = write({name: [name]})
+        assert json.loads(text) == {name: [name]}
+        assert not unseen(text)
+
+
+@given(st.text(max_size=40), st.text(max_size=40))
+def test_a_name_stays_in_its_cell_of_a_markdown_table(one: str, other: str) -> None:
+    rows = as_markdown(["a", "b"], [[one, other]]).split("\n")[2:]
+    assert len(rows) == 1
+    assert re.sub(r"\\.", "", rows[0]).count("|") == 3
+    assert re.sub(r"\\([\\|<*\[~&_])", r"\1", in_markdown(one)) == printable(one)
+
+
+@pytest.mark.parametrize("command", FORMS, ids=lambda command: command[0])
+def test_answers_name_a_file_without_control_codes(command: tuple[str, ...], folder: Path) -> None:
+    shutil.copy(ENERGY, folder / NAME)
+    for form in FORMS[command]:
+        result = run(*command, "-f", form, "--", NAME)
+        assert result.exit_code == 0, result.stderr
+        assert not unseen(result.stdout + result.stderr)
+        if "json" in form:
+            documents = [
+                json.loads(line)
+                for line in (result.stdout.split("\n") if form == "ndjson" else [result.stdout])
+                if line
+            ]
+            assert documents[-1]["command"][-1] == NAME
+        if form == "csv":
+            assert len({len(row) for row in csv.reader(io.StringIO(result.stdout), strict=True)}) == 1
+        if form == "markdown":
+            assert not re.search(r"(?<!\\)<script", result.stdout)
+
+
+@pytest.mark.parametrize("form", CHECKS)
+def test_findings_name_a_deck_and_a_history_without_control_codes(form: str, folder: Path) -> None:
+    deck = f"{NAME}.k"
+    shutil.copy(ENERGY, folder / NAME)
+    shutil.copy(DECK, folder / deck)
+    result = run("check", "-f", form, "--history", NAME, "--", deck, f"no{NAME}")
+    assert result.exit_code == 1
+    assert not unseen(result.stdout + result.stderr)
+    assert result.stderr.count("\n") == result.stderr.count("d2rpick: ")
+    if form in ("json", "sarif"):
+        json.loads(result.stdout)
+    if form == "json":
+        assert json.loads(result.stdout)["decks"] == [deck]
+    if form == "junit":
+        assert ET.fromstring(result.stdout).find("testsuite") is not None
+    if form == "github":
+        assert all(re.match(r"::(error|warning|notice) file=[^,:]*[,:]", line) for line in result.stdout.splitlines())
+
+
+@pytest.mark.parametrize("name", [NAME, NO_TEXT], ids=["hostile", "no text"])
+def test_cards_settings_and_messages_are_text(name: str, folder: Path) -> None:
+    shutil.copy(ENERGY, folder / os.fsencode(name).decode(errors="surrogateescape"))
+    times = ("--tr", "0.0135867", "--td", "0.0687534")
+    card = run("card", *times, "--part", "1", "--history", name)
+    assert card.exit_code == 0
+    comments, _, cards = card.stdout.partition("*DEFORMABLE_TO_RIGID_AUTOMATIC")
+    assert cards
+    assert all(line.startswith("$") for line in comments.splitlines())
+    for result in (
+        card, run("suggest", "--td", "0.064", "--show-settings", "--", name), run("info", "-v", "--", name),
+        run("study", "--td", "1", "--", f"no{name}"), run("study", "--td", "9", "--jobs", "1", "--", name),
+    ):  # fmt: skip
+        assert "internal error" not in result.stderr
+        assert not unseen(result.stdout + result.stderr)
+
+
+@pytest.mark.parametrize("command", [command for command in FORMS if command[0] != "info"], ids=lambda one: one[0])
+def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(command: tuple[str, ...], folder: Path) -> None:
+    names = {"hostile": NAME, "plain": "-plain.csv"}
+    pages = {}
+    for kind, name in names.items():
+        shutil.copy(ENERGY, folder / name)
+        assert run(*command, "--report", f"{kind}.html", "--", name).exit_code == 0
+        pages[kind] = Path(f"{kind}.html").read_text("utf-8")
+        lines = [html.unescape(line) for line in re.findall(r'<pre class="wrap">(.*?)</pre>', pages[kind], re.DOTALL)]
+        repeated = [line for line in lines if line.startswith(f"d2rpick {command[0]}")]
+        assert given_back(repeated[-1])[-1] == os.fsencode(name)
+    counts = [Tags.of(page) for page in pages.values()]
+    assert counts[0] == counts[1]
+    assert not unseen(pages["hostile"]) & {*"\x1b\x9b\x85\u202e\u2066"}
+
+
+class Tags(HTMLParser):
+    """Counts elements and handlers."""
+
+    @classmethod
+    def of(cls, page: str) -> dict[str, int]:
+        found = cls()
+        found.counts = {}
+        found.feed(page)
+        return {name: found.counts.get(name, 0) for name in ("script", "img", "iframe", "style", "onload")}
+
+    counts: dict[str, int]
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for name in (tag, *(key for key, _ in attrs)):
+            self.counts[name] = self.counts.get(name, 0) + 1
+
+
+def test_a_list_of_runs_may_name_files_with_any_sign_but_a_line_feed(folder: Path) -> None:
+    name = "run\u2028\x85\x0b\x1c.csv"
+    shutil.copy(ENERGY, folder / name)
+    found = run("study", "--jobs", "1", "--td", "0.064", "-f", "json", "--from", "-", stdin=f"{name}\r\n".encode())
+    assert [one["source"] for one in json.loads(found.stdout)["runs"]] == [name]
+
+
+def test_a_unit_is_no_formula_of_a_figure(folder: Path) -> None:
+    head, rows = Path(ENERGY).read_text("utf-8").split("\n", 1)
+    Path("run.csv").write_text(head.replace("time", '"Time ($^{_$)"') + "\n" + rows, "utf-8")
+    assert run("suggest", "--td", "0.064", "--plot", "plot.svg", "run.csv").exit_code == 0
+    assert ET.parse(folder / "plot.svg") is not None
+    assert with_unit("time", "$x$") == r"time [\$x\$]"
