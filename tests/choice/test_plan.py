@@ -282,15 +282,15 @@ def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(c
 
 
 def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_where_that_waits(tmp_path: Path) -> None:
-    """Flight 3 is left out for flight 4, which waits for flight 2: without flight 3 it waits for one run less."""
-    box = read(written(drop(height=0.2, tilt=60.0), tmp_path), BOX)
+    """Flight 2 is left out for flight 4, which waits for flight 3: with flight 2 it would wait for one run more."""
+    box = read(written(drop(height=0.15, tilt=80.0), tmp_path), BOX)
     found = plan_of(box, PLAIN)
-    assert statuses(found) == ["supported", "supported", "left-out", "re-plan"]
-    reason = found.rows[2].reason or ""
-    assert "flight 4 behind it for 0.291: this window locks in energy" in reason
+    assert statuses(found)[:4] == ["supported", "left-out", "supported", "re-plan"]
+    reason = found.rows[1].reason or ""
+    assert "flight 4 behind it for 0.192: this window locks in energy" in reason
     assert "that flight would wait for one run more" in reason
     every = plan_of(box, PLAIN, min_rigid=0.07)
-    assert statuses(every) == ["supported", "supported", "re-plan", "re-plan"]
+    assert statuses(every)[:4] == ["supported", "supported", "re-plan", "re-plan"]
 
 
 def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(car: Reference) -> None:

@@ -6,6 +6,7 @@ What cannot be seen: a changed byte in data that is stored without a checksum: `
 from __future__ import annotations
 
 import os
+import signal
 import struct
 from typing import TYPE_CHECKING, BinaryIO, Final
 
@@ -18,13 +19,16 @@ _DENSEST: Final = 1100  # HDF5's best compression; a larger array than that is a
 # Place of the end-of-file address in superblocks of version 0 to 3, of addresses of eight bytes, as all writers use.
 _END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
 _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
+# A reading that takes longer than these seconds and one for so many bytes goes round in a circle [s], [bytes].
+_SECONDS: Final = 60
+_SLOWEST: Final = 100_000
 _USER_BLOCK: Final = 512  # MATLAB puts it before the file
 
 
 def check_file(file: BinaryIO, source: str) -> None:
     """FormatError where a file has not the size it says, or the library would crash on it.
 
-    It is read once in a child process: what ends that one would end this one.
+    It is read once in a child process, of limited time: what ends that one would end this one, or never end.
     """
     _check_size_of_file(file, source)
     if not hasattr(os, "fork"):
@@ -34,10 +38,9 @@ def check_file(file: BinaryIO, source: str) -> None:
         _read_and_exit(file)
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
-        raise FormatError(
-            f"{source}: the HDF5 library crashed on it (signal {os.WTERMSIG(status)}); the file is damaged, "
-            "copy it again"
-        )
+        number = os.WTERMSIG(status)
+        what = "came to no end" if number == signal.SIGXCPU else f"crashed on it (signal {number})"
+        raise FormatError(f"{source}: the HDF5 library {what}; the file is damaged, copy it again")
 
 
 def check_size(dataset: h5py.Dataset, source: str) -> None:
@@ -90,6 +93,9 @@ def _read_and_exit(file: BinaryIO) -> None:
 
         faulthandler.disable()
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        limit = _SECONDS + _head_and_size(file)[1] // _SLOWEST
+        _, most = resource.getrlimit(resource.RLIMIT_CPU)
+        resource.setrlimit(resource.RLIMIT_CPU, (limit if most < 0 else min(limit, most), most))
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
         _read(file)
     finally:

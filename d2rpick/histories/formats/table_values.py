@@ -57,8 +57,8 @@ def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples |
         lines = [whole[start:cut] for start, cut in zip(starts.tolist(), marks[:, taken[-1]].tolist(), strict=True)]
     else:
         lines = whole.split("\n")[:-1]
-    if not any(map(str.strip, lines)):
-        return None  # numpy passes over empty lines, and warns where there is no other
+    if not lines[0].strip():
+        return None  # numpy passes over it, and warns where there is no other
     try:
         table = np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=chosen)
     except ValueError:

@@ -223,6 +223,17 @@ def test_a_crash_of_the_library_is_survived(monkeypatch: pytest.MonkeyPatch) -> 
         read(written(plain))
 
 
+def test_a_library_that_comes_to_no_end_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    def endless(_: object) -> None:
+        while True:
+            pass
+
+    monkeypatch.setattr(hdf5_damage, "_read", endless)
+    monkeypatch.setattr(hdf5_damage, "_SECONDS", 1)
+    with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library came to no end; the file is damaged"):
+        read(written(plain))
+
+
 @pytest.mark.parametrize("name", ["segfault", "bitflip_silent", "lost_chunk_zeros"])
 def test_damaged_files_that_were_found_are_refused(name: str) -> None:
     with pytest.raises(FormatError, match="damaged"):
