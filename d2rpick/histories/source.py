@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 import sys
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -73,10 +74,10 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If one cannot be read, or one of several was replaced or cut meanwhile: they may be of two runs.
     """
     files = expand(names)
-    before = {name: _kept(name) for name in files}
+    before = {name: _Stamp.of(name) for name in files}
     sources = [open_source(name) for name in files]
-    for name, (number, size) in before.items():
-        if len(files) > 1 and ((found := _kept(name))[0] != number or found[1] < size):
+    for name, stamp in before.items():
+        if len(files) > 1 and not _Stamp.of(name).continues(stamp):
             raise FormatError(
                 f"{name}: this file was replaced or written anew while the others of its run were opened; read them "
                 "again when they are complete"
@@ -84,13 +85,25 @@ def open_files(names: Sequence[str]) -> list[Source]:
     return sources
 
 
-def _kept(name: str) -> tuple[tuple[int, int], int]:
-    """What stays of a file while a solver appends to it, and its size; the same of all that is no file."""
-    try:
-        found = os.stat(name)  # noqa: PTH116  start-up
-    except (OSError, ValueError):
-        return (0, 0), 0
-    return ((found.st_dev, found.st_ino), found.st_size) if name != STDIN else ((0, 0), 0)
+class _Stamp(NamedTuple):
+    """What a file is, how big, and when it was changed last; nothing of what is no file."""
+
+    file: tuple[int, int] = (0, 0)
+    size: int = 0
+    changed: int = 0
+
+    @classmethod
+    def of(cls, name: str) -> _Stamp:
+        try:
+            found = os.stat(name)  # noqa: PTH116  start-up
+        except (OSError, ValueError):
+            return cls()
+        regular = stat.S_ISREG(found.st_mode) and name != STDIN
+        return cls((found.st_dev, found.st_ino), found.st_size, found.st_ctime_ns) if regular else cls()
+
+    def continues(self, earlier: _Stamp) -> bool:
+        """Whether it is the earlier one, or that with something appended; a new file may take an old one's number."""
+        return self == earlier or (self.file == earlier.file and self.size > earlier.size)
 
 
 def open_source(name: str) -> Source:

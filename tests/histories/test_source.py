@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import time
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -81,12 +82,13 @@ def test_a_folder_holds_the_databases_of_one_run() -> None:
     assert expand(["rad", "run/GLSTAT", "rad/box_T01"]) == (*legs, "run/GLSTAT")
 
 
-@pytest.mark.parametrize("change", ["replaced", "cut", "appended", "taken away"])
+@pytest.mark.parametrize("change", ["replaced", "cut", "written anew", "appended", "taken away"])
 def test_files_of_one_run_are_not_mixed_with_those_of_the_next(
     change: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, kind in (("run.glstat", "glstat"), ("run.matsum", "matsum"), ("next", "glstat")):
         Path(name).write_bytes(CONTENTS[kind])
+    time.sleep(0.02)  # above the resolution of the file's times
 
     def stored_while_it_changes(name: str) -> bytes | OnDisk:
         found = stored(name)
@@ -97,7 +99,8 @@ def test_files_of_one_run_are_not_mixed_with_those_of_the_next(
             elif change == "taken away":
                 first.unlink()
             else:
-                first.write_bytes(CONTENTS["glstat"][:-900] if change == "cut" else 2 * CONTENTS["glstat"])
+                whole = CONTENTS["glstat"]
+                first.write_bytes({"cut": whole[:-900], "written anew": whole, "appended": 2 * whole}[change])
         return found
 
     monkeypatch.setattr(source, "stored", stored_while_it_changes)
