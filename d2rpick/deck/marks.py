@@ -31,6 +31,7 @@ def find_marks(file: Held | OnDisk) -> Sequence[int]:
     try:
         search.go_on()
     finally:
+        search.stop()
         for helper in helpers:
             helper.join()
     return search.result()
@@ -44,13 +45,17 @@ class _Search:
         self._first = len(BYTE_ORDER_MARK) if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK else 0
         self.shares = range(self._first, file.size, _SHARE)
         self._room: Callable[[], MutableSequence[int]] = list if len(self.shares) == 1 else _compact
-        self._waiting = iter(self.shares)
+        self._waiting: Iterator[int] = iter(self.shares)
         self._found: dict[int, Sequence[int]] = {}
 
     def go_on(self) -> None:
         """Search what waits."""
-        for begin in self._waiting:
+        while (begin := next(self._waiting, None)) is not None:
             self._found[begin] = self._between(begin, min(begin + _SHARE, self._file.size))
+
+    def stop(self) -> None:
+        """Let nothing wait: where this thread was interrupted, no other one goes on."""
+        self._waiting = iter(())
 
     def help(self) -> None:
         """Search beside others; the share with which something goes wrong is left to `result`."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import io
 import re
+import time
+from threading import Event, current_thread, main_thread
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -114,3 +116,24 @@ def test_what_goes_wrong_in_a_thread_is_said(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(OnDisk, "_filled", failing)
     with pytest.raises(OSError, match="Input/output"):
         find_marks(stored.stored(str(path)))
+
+
+def test_no_thread_goes_on_where_a_search_is_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, interrupted, searched = tmp_path / "deck.k", Event(), []
+    path.write_bytes(b"*NODE\n" * 200)
+    for module, name, value in ((marks, "_SHARE", 1), (stored, "_HELD", 0)):
+        monkeypatch.setattr(module, name, value)
+
+    def between(_: object, begin: int, __: int) -> list[int]:
+        if current_thread() is main_thread():
+            interrupted.set()
+            raise KeyboardInterrupt
+        interrupted.wait()
+        time.sleep(0.001)
+        searched.append(begin)
+        return []
+
+    monkeypatch.setattr(marks._Search, "_between", between)
+    with pytest.raises(KeyboardInterrupt):
+        find_marks(stored.stored(str(path)))
+    assert len(searched) < 600
