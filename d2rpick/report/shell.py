@@ -15,7 +15,7 @@ def shell_line(words: Iterable[str]) -> str:
     Examples
     --------
     >>> print(shell_line(["d2rpick", "info", "my run.csv", "it's\n\udcff"]))
-    d2rpick info 'my run.csv' $'it\'s\x0a\xff'
+    d2rpick info 'my run.csv' $'it\'s\012\377'
     """
     return " ".join(shlex.quote(word) if word.isprintable() else f"$'{''.join(map(_escaped, word))}'" for word in words)
 
@@ -36,4 +36,5 @@ def _escaped(letter: str) -> str:
         return f"\\{letter}" if letter in "\\'" else letter
     # Bytes of a file name that are no text come as lone surrogates.
     errors = "surrogateescape" if "\udc80" <= letter <= "\udcff" else "surrogatepass"
-    return "".join(f"\\x{byte:02x}" for byte in letter.encode(errors=errors))
+    # Three octal digits: of hexadecimal ones some shells take more than two, those of the name behind them.
+    return "".join(f"\\{byte:03o}" for byte in letter.encode(errors=errors))
