@@ -35,6 +35,7 @@ class Run:
     deck: Deck
     starter: Starter | None = None
     legs: list[Leg] = field(default_factory=list)
+    included: dict[str, SourceFile] = field(default_factory=dict)  # by path: one that is included twice is read once
 
 
 def recognises(head: bytes) -> bool:
@@ -137,6 +138,7 @@ def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -
     elif not os.access(path, os.R_OK):
         run.deck.unread.append(Unread(replace(card.here, text=name), "no permission to read it"))
     else:
-        included = SourceFile(path)
-        run.deck.sources.append(included)
-        _read_starter(included, run, (*chain, os.path.realpath(source.name)))
+        if path not in run.included:
+            run.included[path] = SourceFile(path)
+        run.deck.sources.append(run.included[path])
+        _read_starter(run.included[path], run, (*chain, os.path.realpath(source.name)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -12,9 +12,6 @@ from d2rpick.deck.radioss import find_run_windows, read_run, recognises, run_fil
 from d2rpick.errors import DeckError
 from d2rpick.rules import RULES, check_deck
 from tests.decks import write
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 EXAMPLE = RULES["D2R401"].passing[0]
 GROUP = "/GRNOD/PART/7\nbox\n         1\n"
@@ -129,6 +126,14 @@ def test_files_of_a_run_are_found_by_name_or_by_what_they_hold(tmp_path: Path) -
     (tmp_path / "box_0000.rad").unlink()
     assert run_files(str(other)) == [str(other), *files[1:]]
     assert run_files(str(tmp_path)) == run_files("absent") == run_files("\0") == []
+
+
+def test_an_include_that_is_asked_for_twice_is_read_once(tmp_path: Path) -> None:
+    head = EXAMPLE.deck.split("/PART")[0]
+    (tmp_path / "inner.inc").write_text("#\n")
+    _, *inner = read_run(place(tmp_path, f"{head}#include inner.inc\n#include inner.inc\n/END\n")).deck.sources[:3]
+    assert [Path(one.name).name for one in inner] == ["inner.inc", "inner.inc"]
+    assert inner[0] is inner[1]  # both are of one state
 
 
 def test_an_include_of_the_starter_deck_is_read(tmp_path: Path) -> None:
