@@ -57,12 +57,13 @@ def run_files(path: str) -> list[str]:
             head = stream.read(_HEAD)
         if not recognises(head):
             return []
-        beside = {one.name: str(Path(path).parent / one.name) for one in Path(path).parent.iterdir() if one.is_file()}
+        folder = Path(path).parent
+        beside = sorted(os.listdir(folder))  # noqa: PTH208  nothing is asked of each file: there may be many runs
     except (OSError, ValueError):
         return []  # said by who reads it
     name = _run_name(path, head)
-    mine = sorted(key for key in beside if (match := _NUMBERED.fullmatch(key)) and match[1] == name)
-    files = [beside[key] for key in mine]
+    alike = (one for one in beside if one.startswith(name) and (match := _NUMBERED.fullmatch(one)) and match[1] == name)
+    files = [str(folder / one) for one in alike if (folder / one).is_file()]
     return files if any(Path(path).samefile(one) for one in files) else [path, *files]
 
 
