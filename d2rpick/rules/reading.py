@@ -109,8 +109,8 @@ def _encrypted(case: Case) -> Iterator[Objection]:
 
 def _cut(case: Case) -> Iterator[Objection]:
     for block, told in cuts(case.deck):
-        cure = "what is missing was not checked: take the whole file, or end its last line"
-        yield Field("", block, 0, 1), f"{told} {cure}"
+        cure = "add that line" if block.source.ends_with_line() else "end its last line"
+        yield Field("", block, 0, 1), f"{told} What is missing was not checked: take the whole file, or {cure}"
 
 
 _INNER = THERE + BACK + END
@@ -189,7 +189,7 @@ RULES: Final = (
         "a file of the deck seems to be cut",
         "A file without *END (Radioss: /END) whose last line has no line end may have lost the end of a number, and "
         "all that came after it; so may a main deck without *END whose last lines are nodes or elements. Switching "
-        "cards, parts or parameters may be missing. d2rpick parts takes the cost of parts from no such mesh.",
+        "cards, parts or parameters may be missing. d2rpick parts computes no cost from a mesh that is cut.",
         _cut,
         (Example(GOOD.removesuffix(END)),),
         (Example(GOOD.removesuffix("      PART\n" + END)), Example(GOOD.removesuffix(END) + "*NODE\n       1\n")),
