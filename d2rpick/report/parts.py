@@ -57,7 +57,7 @@ def as_table(found: Parts) -> str:
     if found.sets:
         body = columns(SET_HEAD, SETS, set_rows(found))
         lines += ["", _starred(SETS, body, [row[0] for row in set_rows(found)])]
-    lines += ["", *(f"{name.ljust(11)}  {text}" for name, text in outlook(found))]
+    lines += ["", *(f"{name.ljust(11)}  {printable(text)}" for name, text in outlook(found))]
     return "\n".join(lines)
 
 
@@ -79,7 +79,7 @@ def as_markdown(found: Parts) -> str:
     blocks = [tables.as_markdown(HEAD, rows(found))]
     if found.sets:
         blocks.append(tables.as_markdown(SET_HEAD, set_rows(found)))
-    return "\n\n".join([*blocks, *(f"{name}: {text}" for name, text in outlook(found))])
+    return "\n\n".join([*blocks, *(f"{name}: {tables.in_markdown(text)}" for name, text in outlook(found))])
 
 
 def as_csv(found: Parts) -> str:

@@ -23,12 +23,14 @@ from d2rpick.errors import UNSEEN, printable
 from d2rpick.report.figures import with_unit
 from d2rpick.report.shell import positional, shell_line
 from d2rpick.report.tables import as_json, as_line, as_markdown, in_markdown
-from tests.command import DECK, ENERGY, run
+from tests.command import DECK, ENERGY, ROOT, run
+from tests.sample_deck import DECK as SAMPLE_DECK
 
 NAME = (
     "-rf\r\nred\t\x1b[31m\x07\x7f\x9b1m\x85\u2028\u202e\u2066\u200b\ufeff\u00ad<script>alert('1')<!--\" onload=\""
     "\\|b|*c*_d_[e](f)$^{_$=1+1,;%0A::error::$(touch a);`touch b`&&!e ä部\\"
 )
+MATSUM = ROOT / "sample_data" / "rollover_box.matsum"
 NO_TEXT = "run\udcff\udc80"
 FORMS = {
     ("suggest", "--td", "0.064"): ("table", "json", "ndjson", "csv", "markdown", "value"),
@@ -104,6 +106,15 @@ def test_answers_name_a_file_without_control_codes(command: tuple[str, ...], fol
             assert len({len(row) for row in csv.reader(io.StringIO(result.stdout), strict=True)}) == 1
         if form == "markdown":
             assert not re.search(r"(?<!\\)<script", result.stdout)
+
+
+@pytest.mark.parametrize("form", ["table", "json", "csv", "markdown"])
+def test_why_a_set_of_parts_has_no_window_is_told_without_control_codes(form: str, folder: Path) -> None:
+    shutil.copy(MATSUM, folder / NAME)
+    result = run("parts", "--td", "9", "--deck", str(SAMPLE_DECK), "-f", form, "--", NAME)
+    assert (result.exit_code, "outside the record" in result.stdout) == (1, form != "csv")
+    assert not unseen(result.stdout + result.stderr)
+    assert form != "markdown" or not re.search(r"(?<!\\)<script", result.stdout)
 
 
 @pytest.mark.parametrize("form", CHECKS)
