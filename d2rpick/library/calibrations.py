@@ -9,6 +9,7 @@ from d2rpick.library import arguments
 from d2rpick.library.answers import written
 from d2rpick.library.document import Document
 from d2rpick.library.frames import frame_of
+from d2rpick.report.shell import positional
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -98,6 +99,5 @@ def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
     names = arguments.paths("runs", runs)
     observations, cautions = observations_of_runs(names)
     core = replace(fitted(observations), cautions=cautions)
-    return Calibration(
-        core.weights, core.told, core.misfit, core.observations, core.cautions, ("calibrate", *names), core
-    )
+    command = ("calibrate", *positional(names))
+    return Calibration(core.weights, core.told, core.misfit, core.observations, core.cautions, command, core)

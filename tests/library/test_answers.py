@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -111,6 +112,17 @@ def test_weights_of_a_site_are_those_of_the_command_line_and_of_the_file_they_ar
     read = d2.parts(d2.read(BOX), deck=SAMPLE_DECK, weights=file).to_dict()["weights"]
     assert read["per_element"] == pytest.approx(found.weights.per_element, rel=1e-5)  # the file has six digits
     assert read["element_share"] == pytest.approx(found.weights.element_share, rel=1e-5)
+
+
+def test_a_folder_that_begins_with_a_dash_is_calibrated_by_the_command_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree("sample_data/flying_box", tmp_path / "-box")
+    monkeypatch.chdir(tmp_path)
+    found = d2.calibrate("-box")
+    name, *words = found.command
+    repeated = json.loads(run(name, "-f", "json", *words).stdout)
+    assert repeated["per_element"] == found.to_dict()["per_element"]
 
 
 def test_the_command_of_an_answer_asks_the_same() -> None:
