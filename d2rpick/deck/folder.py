@@ -53,9 +53,20 @@ def _files(folder: str) -> Iterator[str]:
 def _begins(path: str) -> bool:
     """Whether a file says near its beginning that it is a main deck."""
     try:
-        head = SourceFile(path).read(0, _HEAD) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe gives it once
-    except DeckError:
+        head = _head(path) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe gives it once
+    except (DeckError, OSError):
         return False
     lines = (line.strip().upper() for line in head.removeprefix(b"\xef\xbb\xbf").splitlines())
     first = next((line for line in lines if line[:1] in {b"*", b"/"}), b"")
     return first.startswith((b"*KEYWORD", b"/BEGIN")) and b"\0" not in head
+
+
+def _head(path: str) -> bytes:
+    """Read the beginning of a file.
+
+    A small file may just be saved, and is waited for.  That of a large one is there, however long a solver goes on
+    writing to it.
+    """
+    with Path(path).open("rb", buffering=0) as file:
+        head = file.read(_HEAD)
+    return head if len(head) == _HEAD else SourceFile(path).read(0, _HEAD)

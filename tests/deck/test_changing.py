@@ -222,3 +222,12 @@ def test_a_pipe_gives_its_bytes_once_and_hangs_no_folder(tmp_path: Path) -> None
     writer.start()
     assert spans(read_deck(str(pipe))) == WINDOW
     writer.join()
+
+
+def test_no_folder_of_decks_waits_for_what_a_solver_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    main, waited = write(tmp_path, GOOD), list[float]()
+    with (tmp_path / "d3plot").open("wb") as results:
+        results.truncate(20 << 30)
+    monkeypatch.setattr("d2rpick.file_state.time.sleep", waited.append)
+    assert main_decks(str(tmp_path)) == [main]
+    assert sum(waited) < 1
