@@ -39,7 +39,7 @@ def check_file(file: BinaryIO, source: str) -> None:
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
-        what = "came to no end" if number == signal.SIGXCPU else f"crashed on it (signal {number})"
+        what = "did not finish reading it" if number == signal.SIGXCPU else f"crashed on it (signal {number})"
         raise FormatError(f"{source}: the HDF5 library {what}; the file is damaged, copy it again")
 
 

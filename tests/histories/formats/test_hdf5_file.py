@@ -230,7 +230,7 @@ def test_a_library_that_comes_to_no_end_is_ended(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(hdf5_damage, "_read", endless)
     monkeypatch.setattr(hdf5_damage, "_SECONDS", 1)
-    with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library came to no end; the file is damaged"):
+    with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library did not finish reading it; the file is damaged"):
         read(written(plain))
 
 
