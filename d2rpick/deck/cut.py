@@ -32,6 +32,11 @@ def cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
             yield block, f"{told}; is it cut?"
 
 
+def cure(block: Block) -> str:
+    """What to do about a file that ends with this block, of which `cuts` speaks."""
+    return f"take the whole file, or {'add that line' if block.source.ends_with_line() else 'end its last line'}"
+
+
 def holds_mesh(block: Block) -> bool:
     """Whether a block holds nodes or elements."""
     return _MESH.match(block.head) is not None

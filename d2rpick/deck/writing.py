@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from d2rpick.deck import radioss
+from d2rpick.deck.cut import cure, cuts
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.radioss.blocks import blocks, keyword
 from d2rpick.deck.radioss.engine import read_legs
@@ -53,8 +54,9 @@ def write_deck(main: str, card: PrintedCard, folder: str, *, overwrite: bool = F
     Raises
     ------
     DeckError
-        If the deck switches one of these parts already, uses the id of a switch set, or includes what would not be
-        found from ``folder``; if a file exists; if the card is one for another solver.
+        If the deck switches one of these parts already, uses the id of a switch set, includes what would not be found
+        from ``folder``, or has a main file that seems to be cut; if a file exists; if the card is one for another
+        solver.
     """
     files = dict(_radioss(main, card) if radioss.run_files(main) else _ls_dyna(main, card))
     place = Path(folder)
@@ -87,6 +89,7 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     deck, printed = read_deck(main), read_deck("the card", card.text.encode())
     if len(card.files) != 1 or not read_switching(printed):
         raise DeckError(f"{main}: an LS-DYNA deck, but the cards are for another solver")
+    _refuse_cut(deck)
     _refuse_switched(deck, printed)
     ((name, text),) = card.files.items()
     if deck.long:
@@ -94,6 +97,13 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     yield Path(main).name, _with_include(deck.sources[0], name)
     yield name, text.encode()
     yield from _copies(deck.sources[1:], main, {name, Path(main).name})
+
+
+def _refuse_cut(deck: Deck) -> None:
+    """Raise DeckError where the main file seems to be cut: what is added would hide it, and end a number that is."""
+    for block, told in cuts(deck):
+        if block.source is deck.sources[0]:
+            raise DeckError(f"{deck.path}: {told} The cards behind it would hide that: {cure(block)}")
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:
@@ -119,10 +129,7 @@ def _with_include(main: SourceFile, name: str) -> bytes:
     newline = b"\r\n" if b"\r\n" in content else b"\n"
     *_, last = main.blocks()
     at = len(content) if last.end is None else content.rfind(b"\n", 0, last.end) + 1
-    before = content[:at]
-    if before and not before.endswith(b"\n"):
-        before += newline
-    return before + newline.join([b"*INCLUDE", name.encode(), b""]) + content[at:]
+    return content[:at] + newline.join([b"*INCLUDE", name.encode(), b""]) + content[at:]
 
 
 def _copies(files: Sequence[SourceFile], main: str, taken: set[str]) -> Iterator[tuple[str, bytes]]:

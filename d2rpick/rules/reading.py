@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck.cut import cuts
+from d2rpick.deck.cut import cure, cuts
 from d2rpick.deck.includes import UNKNOWN_KIND
 from d2rpick.deck.rows import Field
 from d2rpick.deck.switching import misspelt
@@ -109,8 +109,7 @@ def _encrypted(case: Case) -> Iterator[Objection]:
 
 def _cut(case: Case) -> Iterator[Objection]:
     for block, told in cuts(case.deck):
-        cure = "add that line" if block.source.ends_with_line() else "end its last line"
-        yield Field("", block, 0, 1), f"{told} What is missing was not checked: take the whole file, or {cure}"
+        yield Field("", block, 0, 1), f"{told} What is missing was not checked: {cure(block)}"
 
 
 _INNER = THERE + BACK + END

@@ -37,9 +37,12 @@ def test_the_deck_is_the_same_but_for_one_include(tmp_path: Path, end: str, newl
     assert windows(written) == [(1, tr, td) for tr, td in WINDOWS]
 
 
-def test_a_last_line_without_end_is_ended(tmp_path: Path) -> None:
-    written, _ = write_deck(write(tmp_path, (HEAD + PARTS).rstrip("\n")), CARD, str(tmp_path / "next"))
-    assert Path(written).read_text() == HEAD + PARTS + INCLUDE
+@pytest.mark.parametrize(
+    ("deck", "cure"),
+    [((HEAD + PARTS).rstrip("\n"), "end its last line"), (f"{HEAD}{PARTS}*NODE\n       1\n", "add that line")],
+)
+def test_a_deck_that_seems_to_be_cut_is_not_completed(tmp_path: Path, deck: str, cure: str) -> None:
+    refused(tmp_path, deck, rf"main\.k: the .* is it cut\? The cards behind it would hide that: .*{cure}")
 
 
 def test_a_deck_in_long_format_gets_cards_that_are_not(tmp_path: Path) -> None:
