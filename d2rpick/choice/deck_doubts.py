@@ -28,7 +28,8 @@ def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
     titled = [one for one in run.parts if one.id in inventory.parts and one.title and _title(one, inventory)]
     other = [one for one in titled if _differ(one.title, _title(one, inventory))]
     found = _named(other, inventory) if 2 * len(other) > len(titled) else ""
-    absent = [one for one in run.parts if one.id not in inventory.parts]
+    known = inventory.parts.keys() | inventory.history_groups
+    absent = [one for one in run.parts if one.id not in known]
     if not found and inventory.complete and _has_energy(run, absent):
         found = f"{name_units(one.id for one in absent)} of the history {are(absent)} not in the deck"
     told = f"{found}: nothing of the deck is used; name that of the run"

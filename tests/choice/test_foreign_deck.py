@@ -79,6 +79,17 @@ def test_one_part_with_another_title_is_a_warning_only() -> None:
     assert found["candidates"][0]["run_time_share"] < 1
 
 
+@pytest.mark.parametrize(("group", "foreign"), [("/THPART/GRSHEL/2\nstep\n         7\n", False), ("", True)])
+def test_a_group_of_elements_that_the_history_lists_is_no_missing_part(
+    group: str, foreign: bool, tmp_path: Path
+) -> None:
+    (tmp_path / "TEST_0000.rad").write_text(
+        f"#RADIOSS STARTER\n/BEGIN\nTEST\n/PART/1\nbox\n         1         1\n{group}/END\n"
+    )
+    asked = ("suggest", "--td", "0.37", "--part", "box", "--deck", str(tmp_path / "TEST_0000.rad"))
+    assert ("deck-of-another-model" in codes(answer(*asked, BOX.replace(".matsum", "T01")))) == foreign
+
+
 def test_titles_are_compared_without_letters_that_files_encode_in_different_ways(tmp_path: Path) -> None:
     text = DECK.read_text("utf-8").replace("\nbox\n", "\nbox \u7bb1\n")
     (tmp_path / "main.k").write_bytes(text.encode("gbk"))

@@ -113,6 +113,7 @@ class Inventory:
     ``complete`` is False where elements or parts may be missing because of it.  ``joints`` hold parts together that
     share no nodes; ``ties`` do too, but it is not known which.  ``watched`` are the places of nodes whose motion is
     written.  ``moved``: something moves nodes away from the coordinates of the deck.  ``files`` are those of the deck.
+    ``history_groups`` are the ids of /THPART: groups of elements that a time history lists among its parts.
     """
 
     solver: str
@@ -126,6 +127,7 @@ class Inventory:
     watched: Places = field(default_factory=lambda: np.empty(0, np.int64))
     moved: bool = False
     files: tuple[SourceFile, ...] = ()
+    history_groups: frozenset[int] = frozenset()
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:

@@ -103,6 +103,7 @@ def read(run: Run) -> Inventory:
         joints=held.placed(table), ties=held.unknown,
         watched=places_of(_watched(worded), table), moved=any(words[:1] == ("TRANSFORM",) for _, words in worded),
         files=tuple(run.deck.sources),
+        history_groups=frozenset(whole(words[-1]) for _, words in worded if words[:1] == ("THPART",)),
     )  # fmt: skip
 
 
