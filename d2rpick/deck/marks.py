@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.stored import Held, OnDisk
 
-_PIECE: Final = 1 << 18  # bytes looked at together: they stay in the cache
+_PIECE: Final = 1 << 17  # bytes looked at together: they stay in the cache
 _SHARE: Final = 1 << 22  # bytes of a big file that one thread searches before it asks for more
 _HELPERS: Final = 1  # threads beside the first: the system copies bytes for all at once, but one at a time searches
 _LOOKBACK: Final = 32  # bytes in front of a piece, where blanks before its first mark stand, or a head that it cuts

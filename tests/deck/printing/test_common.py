@@ -64,7 +64,7 @@ def test_every_solver_prints_what_it_is_given(solver: str) -> None:
     windows = [(0.0, 0.09), (0.2, 0.3), (0.5, 0.75)]
     card = cards(windows, ALL, solver, ["a\nremark"])
     assert card.windows == tuple(windows)
-    assert " a remark\n" in card.text
+    assert " a\\nremark\n" in card.text
     assert card.notes == ()
     assert all(content in card.text for content in card.files.values())
     assert hasattr(ALL, SOLVERS[solver].SWITCHES)
