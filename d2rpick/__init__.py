@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from d2rpick.choice.cost import Weights as Weights
+    from d2rpick.errors import ChangedError as ChangedError
     from d2rpick.errors import ConfigurationError as ConfigurationError
     from d2rpick.errors import D2RPickError as D2RPickError
     from d2rpick.errors import DeckError as DeckError
@@ -47,7 +48,16 @@ if TYPE_CHECKING:
 
 _HOME = {
     **dict.fromkeys(
-        ("ConfigurationError", "D2RPickError", "DeckError", "FormatError", "HistoryError", "RangeError"), "errors"
+        (
+            "ChangedError",
+            "ConfigurationError",
+            "D2RPickError",
+            "DeckError",
+            "FormatError",
+            "HistoryError",
+            "RangeError",
+        ),
+        "errors",
     ),
     **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "library.answers"),
     **dict.fromkeys(("Calibration", "calibrate"), "library.calibrations"),

@@ -19,6 +19,10 @@ class FormatError(D2RPickError):
     """A file cannot be read as an energy history."""
 
 
+class ChangedError(D2RPickError):
+    """A file was written anew while it was read: what it holds is of two of its states, and nothing of it counts."""
+
+
 class HistoryError(D2RPickError):
     """Numbers were read, but they do not make an energy history."""
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.stored import Held, OnDisk
 
-_PIECE: Final = 1 << 17  # bytes looked at together: they stay in the cache
-_SHARE: Final = 1 << 22  # bytes of a big file that one thread searches before it asks for more
+_PIECE: Final = 1 << 20  # bytes looked at together: they stay in the cache, always in the same place
+_SHARE: Final = 1 << 23  # bytes of a big file that one thread searches before it asks for more
 _HELPERS: Final = 1  # threads beside the first: the system copies bytes for all at once, but one at a time searches
 _LOOKBACK: Final = 32  # bytes in front of a piece, where blanks before its first mark stand, or a head that it cuts
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
@@ -72,12 +72,12 @@ class _Search:
         return marks
 
     def _between(self, begin: int, end: int) -> Sequence[int]:
-        found = self._room()
-        with self._file.opened() as read:
+        found, piece = self._room(), bytearray(_LOOKBACK + min(_PIECE, end - begin))
+        with self._file.opened() as fill:
             for at in range(begin, end, _PIECE):
                 low = max(self._first, at - _LOOKBACK)
-                piece = read(low, min(at + _PIECE, end))
-                places = sorted([*_starred(piece, at - low), *_encrypted(piece, at - low)])
+                size = fill(piece, low, min(at + _PIECE, end))
+                places = sorted([*_starred(piece, at - low, size), *_encrypted(piece, at - low, size)])
                 found.extend(low + place for place in places)
         return found
 
@@ -88,20 +88,21 @@ def _compact() -> MutableSequence[int]:
     return array("q")
 
 
-def _starred(piece: bytes, first: int) -> Iterator[int]:
-    at = piece.find(b"*", first)
+def _starred(piece: bytearray, first: int, end: int) -> Iterator[int]:
+    at = piece.find(b"*", first, end)
     while at >= 0:
         before = piece[max(0, at - _LOOKBACK) : at].rstrip(b" ")
         if before.endswith(b"\n") or (not before and at < _LOOKBACK):
             yield at
-        at = piece.find(b"*", at + 1)
+        at = piece.find(b"*", at + 1, end)
 
 
-def _encrypted(piece: bytes, first: int) -> Iterator[int]:
+def _encrypted(piece: bytearray, first: int, end: int) -> Iterator[int]:
     # a head cut by the end of this piece is found in the next one, where all of it stands before the first byte
-    at = piece.find(b"G", max(0, first - len(_PGP) + _ANCHOR + 1))
+    at = piece.find(b"G", max(0, first - len(_PGP) + _ANCHOR + 1), end)
     while at >= 0:
         start = at - _ANCHOR
-        if start >= 0 and piece.startswith(_PGP, start) and piece[max(0, start - 1) : start] in (b"", b"\n"):
+        before = bytes(piece[max(0, start - 1) : max(0, start)])
+        if start >= 0 and piece.startswith(_PGP, start, end) and before in (b"", b"\n"):
             yield start
-        at = piece.find(b"G", at + 1)
+        at = piece.find(b"G", at + 1, end)

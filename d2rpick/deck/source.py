@@ -84,9 +84,11 @@ class SourceFile:
         import hashlib
 
         digest = hashlib.sha256()
-        with self._file.opened() as read:
+        room = bytearray(min(_PIECE, self._file.size))
+        with self._file.opened() as fill:
             for at in range(0, self._file.size, _PIECE):
-                digest.update(read(at, min(at + _PIECE, self._file.size)))
+                size = fill(room, at, min(at + _PIECE, self._file.size))
+                digest.update(memoryview(room)[:size])
         return digest.hexdigest()
 
     def ends_with_line(self) -> bool:
@@ -97,9 +99,10 @@ class SourceFile:
         """Return the number of the line, from 1, that holds the byte at ``offset``."""
         known = bisect_right(self._counted, (offset, 1 << 62)) - 1
         position, line = self._counted[known]
-        with self._file.opened() as read:
+        room = bytearray(min(_COUNTED, max(0, offset - position)))
+        with self._file.opened() as fill:
             for at in range(position, offset, _COUNTED):
-                line += read(at, min(at + _COUNTED, offset)).count(b"\n")
+                line += room.count(b"\n", 0, fill(room, at, min(at + _COUNTED, offset)))
         if known == len(self._counted) - 1 and offset > position:
             self._counted.append((offset, line))
         return line

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from io import FileIO
 
-    Reading = Callable[[int, int], bytes]  # gives the bytes from one place to another
+    Filling = Callable[[bytearray, int, int], int]  # puts the bytes from one place to another first, and counts them
 
 _HELD: Final = 1 << 18  # a file up to this size is held in memory: a deck may have thousands of them
 _WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, close to them
@@ -35,9 +35,14 @@ class Held:
         return self._data[begin:end]
 
     @contextmanager
-    def opened(self) -> Iterator[Reading]:
-        """Give what `read` is."""
-        yield self.read
+    def opened(self) -> Iterator[Filling]:
+        """Give a function that puts bytes into a buffer."""
+        yield self._fill
+
+    def _fill(self, room: bytearray, begin: int, end: int) -> int:
+        data = self._data[begin:end]
+        room[: len(data)] = data
+        return len(data)
 
 
 class OnDisk:
@@ -61,26 +66,28 @@ class OnDisk:
         return self._window[begin - self._begin : end - self._begin]
 
     @contextmanager
-    def opened(self) -> Iterator[Reading]:
-        """Give a function that reads much without remembering any; what it gave is sure when the context is left."""
+    def opened(self) -> Iterator[Filling]:
+        """Give a function that puts bytes into a buffer; what it gave is sure when the context is left."""
         with _opened(self._name) as file:
-            yield lambda begin, end: self._filled(file, begin, end)
+            yield lambda room, begin, end: self._fill(file, room, begin, end)
             if not FileState.of(file).is_as(self._state):
                 raise self._changed()
 
     def _read(self, begin: int, end: int) -> bytes:
-        with self.opened() as read:
-            return read(begin, end)
+        room = bytearray(end - begin)
+        with self.opened() as fill:
+            fill(room, begin, end)
+        return bytes(room)
 
-    def _filled(self, file: FileIO, begin: int, end: int) -> bytes:
+    def _fill(self, file: FileIO, room: bytearray, begin: int, end: int) -> int:
         file.seek(begin)
-        data = file.read(end - begin)
-        while len(data) < end - begin:  # a single call may give less
-            more = file.read(end - begin - len(data))
-            if not more:
+        done, wanted = 0, memoryview(room)[: end - begin]
+        while done < len(wanted):  # a single call may give less
+            count = file.readinto(wanted[done:])
+            if not count:
                 raise self._changed()
-            data += more
-        return data
+            done += count
+        return done
 
     def _changed(self) -> DeckError:
         return DeckError(

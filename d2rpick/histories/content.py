@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import ChangedError, FormatError
 from d2rpick.file_state import COARSE, FileState, is_endless, is_regular, pause, snapshot
 
 if TYPE_CHECKING:
@@ -191,7 +191,7 @@ class OnDisk(Content):
         return found
 
     def sha256(self) -> str:
-        """SHA-256 of the bytes, of which those that were used are the same as then; FormatError where they are not."""
+        """SHA-256 of the bytes, of which those that were used are the same as then; ChangedError where they are not."""
         if not self._digest:
             import hashlib
 
@@ -213,14 +213,14 @@ class OnDisk(Content):
                     raise self._shortened()
                 done += more
 
-    def _shortened(self) -> FormatError:
-        return FormatError(
+    def _shortened(self) -> ChangedError:
+        return ChangedError(
             f"{self._name}: the file was {self._size} bytes long and became shorter while it was read; "
             "is a solver writing it anew? Read it again when it has"
         )
 
     def check(self, at_rest_for: int = 0) -> None:
-        """Make sure that what was read so far is all of one state of the file; FormatError where it is not.
+        """Make sure that what was read so far is all of one state of the file; ChangedError where it is not.
 
         ``at_rest_for``: read it again if the last change is more recent, whether or not one was seen [ns].
         """
@@ -232,7 +232,7 @@ class OnDisk(Content):
             self._awaited = now[:-1]
             now = FileState.of(self._file)
         if now.size < self._size or not self._is_as_before():
-            raise FormatError(
+            raise ChangedError(
                 f"{self._name}: the file was rewritten while it was read; read it again when it is complete"
             )
         self._seen = now

@@ -42,7 +42,7 @@ class Source(NamedTuple):
     def sha256(self) -> str:
         """SHA-256 of the bytes that were read, as they lay on the disk or came in by standard input.
 
-        FormatError where a big file was written anew since.
+        ChangedError where a big file was written anew since.
         """
         read = self.data if self.packed is None else self.packed
         if not isinstance(read, bytes):

@@ -123,7 +123,7 @@ def as_markdown(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     | 0.5 | crossing |
     """
     lines = [
-        [in_markdown(short(name)) for name in head],
+        [short(name) for name in head],
         ["---"] * len(head),
         *([in_markdown(short(c)) for c in row] for row in rows),
     ]

@@ -66,7 +66,7 @@ class OfModes:
         time, energy = self.history.between(start, end)
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
         vibration = float(self.mode.vibration_energy(self.td))
-        if scatter <= _DROWNED * vibration:
+        if vibration > 0 and scatter <= _DROWNED * vibration:  # both may be too small for a number
             return None
         return (
             f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}: "

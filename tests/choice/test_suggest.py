@@ -73,3 +73,10 @@ def test_units_do_not_matter(shift: float, unit: float, joule: float) -> None:
     assert found.recommended is not None
     assert found.recommended.tr / unit - shift == pytest.approx(expected.recommended.tr, abs=1e-7)
     assert found.recommended.residual == pytest.approx(expected.recommended.residual, abs=1e-6)
+
+
+def test_a_vibration_that_has_died_down_to_nothing_at_td_has_no_sign_there() -> None:
+    time = np.linspace(0.0, 0.01, 400)
+    answer = suggest(of(np.exp(-8e4 * time) * np.sin(3000.0 * time) ** 2, time), 0.01, Settings())
+    assert answer.situation.basis == "energy"
+    assert answer.recommended is None

@@ -133,7 +133,7 @@ def test_a_change_at_any_moment_gives_one_of_the_states_or_an_error(
         return called
 
     monkeypatch.setattr(stored, "_opened", at_the_turn(stored._opened))
-    monkeypatch.setattr(stored.OnDisk, "_filled", at_the_turn(stored.OnDisk._filled))
+    monkeypatch.setattr(stored.OnDisk, "_fill", at_the_turn(stored.OnDisk._fill))
     found = set()
     step = 7 if ask is parts else 1
     for turn in itertools.count():

@@ -91,14 +91,16 @@ def test_a_call_of_the_system_that_gives_less_is_repeated() -> None:
     class Sparing(io.BytesIO):
         """Gives three bytes at a time."""
 
-        def read(self, size: int | None = -1, /) -> bytes:
-            return super().read(min(3, size or 0))
+        def readinto(self, room: memoryview, /) -> int:  # type: ignore[override]
+            return super().readinto(room[:3])
 
     on_disk = OnDisk("deck.k", FileState(0, 0, 10, 0, 0, settled=True))
     file: Any = Sparing(b"0123456789")
-    assert on_disk._filled(file, 1, 9) == b"12345678"
+    room = bytearray(8)
+    assert on_disk._fill(file, room, 1, 9) == 8
+    assert bytes(room) == b"12345678"
     with pytest.raises(DeckError, match="rewritten"):
-        on_disk._filled(file, 5, 12)
+        on_disk._fill(file, room, 5, 12)
 
 
 def test_what_goes_wrong_in_a_thread_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,14 +108,14 @@ def test_what_goes_wrong_in_a_thread_is_said(tmp_path: Path, monkeypatch: pytest
     path.write_bytes(b"*NODE\n" * 100)
     for module, name, value in ((marks, "_SHARE", 100), (marks, "_PIECE", 64), (stored, "_HELD", 0)):
         monkeypatch.setattr(module, name, value)
-    filled = OnDisk._filled
+    fill = OnDisk._fill
 
-    def failing(self: OnDisk, opened: FileIO, begin: int, end: int) -> bytes:
+    def failing(self: OnDisk, opened: FileIO, room: bytearray, begin: int, end: int) -> int:
         if begin > 300:
             raise OSError(errno.EIO, "Input/output error")
-        return filled(self, opened, begin, end)
+        return fill(self, opened, room, begin, end)
 
-    monkeypatch.setattr(OnDisk, "_filled", failing)
+    monkeypatch.setattr(OnDisk, "_fill", failing)
     with pytest.raises(OSError, match="Input/output"):
         find_marks(stored.stored(str(path)))
 

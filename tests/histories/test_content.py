@@ -18,7 +18,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.errors import FormatError
+from d2rpick.choice.overview import survey
+from d2rpick.errors import ChangedError, D2RPickError
 from d2rpick.histories import content
 from d2rpick.histories.content import Content, OnDisk, stored
 from d2rpick.histories.formats import csv_table
@@ -152,9 +153,9 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, 
     file.write_bytes(ONE)
     run = open_run([str(file)])
     file.write_bytes(rest)
-    with pytest.raises(FormatError, match=reason):
+    with pytest.raises(D2RPickError, match=reason):
         run.databases[0].channel("kinetic energy")
-    with pytest.raises(FormatError, match=reason):
+    with pytest.raises(D2RPickError, match=reason):
         run.files[0].sha256()
 
 
@@ -188,7 +189,7 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
         for _ in range(60):
             try:
                 energy = read_history([str(file)]).energy
-            except FormatError as error:
+            except D2RPickError as error:
                 assert "\n" not in str(error)  # noqa: PT017
             else:
                 assert energy.tolist() in [(offset + STATES[: energy.size]).tolist() for offset in (1000.0, 2000.0)]
@@ -215,7 +216,7 @@ def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_st
     monkeypatch.setattr("d2rpick.file_state.time.sleep", write_the_rest)
     try:
         energy = read_history([str(file)]).energy
-    except FormatError as error:
+    except D2RPickError as error:
         assert "rewritten" in str(error)  # noqa: PT017
     else:
         assert energy.tolist() == (2000.0 + STATES).tolist()
@@ -244,10 +245,22 @@ def test_a_file_of_any_format_that_is_written_anew_between_two_readings_gives_wh
     database = run.databases[0]
     assert (database.time if database.channels else database.part_time).size
     file.write_bytes(ANEW[kind])
-    with suppress(FormatError):
+    with suppress(D2RPickError):
         assert run.history(Selection()).energy.tolist() == whole
-    with suppress(FormatError):
+    with suppress(D2RPickError):
         assert run.files[0].sha256() == hashlib.sha256(CONTENTS[kind]).hexdigest()
+
+
+@pytest.mark.usefixtures("on_disk")
+@pytest.mark.parametrize("kind", ["binout", "radioss-th", "matsum"])
+def test_what_is_not_there_since_a_file_was_written_anew_is_not_passed_over(kind: str, tmp_path: Path) -> None:
+    file = tmp_path / "run"
+    file.write_bytes(CONTENTS[kind])
+    run = open_run([str(file)])
+    assert run.databases[0].span
+    file.write_bytes(ANEW[kind])
+    with pytest.raises(ChangedError, match="rewritten"):
+        survey(run, Selection())
 
 
 @pytest.mark.usefixtures("on_disk")
@@ -271,7 +284,7 @@ def test_bytes_that_change_places_or_make_up_for_each_other_are_seen(
         words[[one, other]] += np.array([more, -more]).astype(np.uint64)
     changed = words.tobytes() + data[words.nbytes :]
     file.write_bytes(changed)
-    with nullcontext() if changed == data else pytest.raises(FormatError, match="rewritten"):
+    with nullcontext() if changed == data else pytest.raises(D2RPickError, match="rewritten"):
         there.check()
 
 
@@ -312,7 +325,7 @@ def test_a_change_that_the_times_may_not_show_is_looked_for(
         there.check()
     assert len(pauses) == 1  # not at each look
     file.write_bytes(OTHER)
-    with pytest.raises(FormatError, match="rewritten"):
+    with pytest.raises(D2RPickError, match="rewritten"):
         there.check()
 
 
@@ -346,7 +359,7 @@ def test_times_in_whole_seconds_hide_the_changes_of_two(tmp_path: Path, monkeypa
     there = opened(file)
     there.view(0, len(ONE))
     file.write_bytes(OTHER)
-    with pytest.raises(FormatError, match="rewritten"):
+    with pytest.raises(D2RPickError, match="rewritten"):
         there.check()
 
 
@@ -360,7 +373,7 @@ def test_a_write_that_began_long_ago_and_went_on_since_is_seen_by_the_signature(
     there = opened(file)
     there.view(0, len(ONE))
     file.write_bytes(OTHER)
-    with pytest.raises(FormatError, match="rewritten"):
+    with pytest.raises(D2RPickError, match="rewritten"):
         there.sha256()
 
 

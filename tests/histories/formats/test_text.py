@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import ChangedError
 from d2rpick.histories import content
 from d2rpick.histories.content import OnDisk, stored
 from d2rpick.histories.formats import text
@@ -87,5 +87,5 @@ def test_a_text_written_anew_since_it_was_opened_is_an_error(read: Callable[[Tex
     file.write_bytes(b"0.125,17\n" * 50)
     found = Text(Source("text", stored(str(file))))
     file.write_bytes(b"0.125,18\n" * 50)
-    with pytest.raises(FormatError, match="rewritten"):
+    with pytest.raises(ChangedError, match="rewritten"):
         read(found)
