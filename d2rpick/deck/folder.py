@@ -54,7 +54,7 @@ def _begins(path: str) -> bool:
     """Whether a file says near its beginning that it is a main deck."""
     try:
         head = _head(path) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe gives it once
-    except (DeckError, OSError):
+    except OSError:
         return False
     lines = (line.strip().upper() for line in head.removeprefix(b"\xef\xbb\xbf").splitlines())
     first = next((line for line in lines if line[:1] in {b"*", b"/"}), b"")
@@ -69,4 +69,7 @@ def _head(path: str) -> bytes:
     """
     with Path(path).open("rb", buffering=0) as file:
         head = file.read(_HEAD)
-    return head if len(head) == _HEAD else SourceFile(path).read(0, _HEAD)
+    try:
+        return head if len(head) == _HEAD else SourceFile(path).read(0, _HEAD)
+    except DeckError:
+        return head  # what is wrong is said when it is checked

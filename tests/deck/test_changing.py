@@ -211,6 +211,7 @@ def test_a_deck_that_changes_all_the_time_is_an_error(tmp_path: Path, monkeypatc
     monkeypatch.setattr("d2rpick.file_state.time.sleep", lambda _: write(tmp_path, f"${'x' * next(number)}\n{GOOD}"))
     with pytest.raises(DeckError, match=r"main\.k: the file keeps changing while it is read; read it again"):
         read_deck(path)
+    assert main_decks(str(tmp_path)) == [path]  # it is not passed over
 
 
 @pytest.mark.usefixtures("size")
