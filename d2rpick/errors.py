@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -9,6 +10,7 @@ if TYPE_CHECKING:
 
 # Control and format characters (escape codes, text direction), line and paragraph separators.
 UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
+_MOST_NAMED: Final = 20  # things in one line
 
 
 class D2RPickError(Exception):
@@ -77,15 +79,19 @@ def in_rows(ids: Iterable[int]) -> list[str]:
 
 
 def name_units(ids: Iterable[int], kind: str = "part") -> str:
-    """Name parts briefly.
+    """Name parts briefly, of many the first ones.
 
     Examples
     --------
     >>> name_units([7]), name_units([3, 1, 2, 9])
     ('part 7', 'parts 1-3, 9')
+    >>> name_units([*range(1, 41, 2), *range(100, 150)])
+    'parts 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31, 33, 35, 37, 39 and 50 more'
     """
-    every = set(ids)
-    return f"{kind}{'s' if len(every) > 1 else ''} {listing(in_rows(every))}"
+    every = sorted(set(ids))
+    named = in_rows(every)[:_MOST_NAMED]
+    left = len(every) - bisect_right(every, int(named[-1].rpartition("-")[2])) if named else 0
+    return f"{kind}{'s' * (len(every) > 1)} {', '.join(named)}{f' and {left} more' * (left > 0)}"
 
 
 def are(things: Collection[object]) -> str:
@@ -93,7 +99,7 @@ def are(things: Collection[object]) -> str:
     return "is" if len(things) == 1 else "are"
 
 
-def listing(names: Sequence[object], most: int = 20, between: str = ", ") -> str:
+def listing(names: Sequence[object], most: int = _MOST_NAMED, between: str = ", ") -> str:
     """Name things in one line, printable, cut where they would fill the screen.
 
     Examples
