@@ -97,6 +97,8 @@ def read_run(path: str, content: bytes | None = None) -> Run:
         if _STARTER.search(head):
             run.starter = run.starter or Starter()
             _read_starter(source, run, ())
+        else:
+            run.deck.ends += [(block, False) for block in blocks(source) if block.end is None]
     run.legs.sort(key=lambda leg: leg.number)
     run.deck.cards += [leg.run for leg in run.legs]
     run.deck.cards += [card for leg in run.legs for card, _, _ in leg.switched]

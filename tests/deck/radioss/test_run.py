@@ -128,6 +128,17 @@ def test_files_of_a_run_are_found_by_name_or_by_what_they_hold(tmp_path: Path) -
     assert run_files(str(tmp_path)) == run_files("absent") == run_files("\0") == []
 
 
+@pytest.mark.parametrize("cut", range(1, 30))
+def test_an_engine_file_that_ends_within_a_line_seems_to_be_cut(tmp_path: Path, cut: int) -> None:
+    path, engine = place(tmp_path), tmp_path / "box_0002.rad"
+    text = engine.read_text()[:-cut]
+    engine.write_text(text)
+    found = [finding.file for finding in check_deck(path).findings if finding.rule == "D2R011"]
+    assert found == ([] if text.endswith("\n") else [str(engine)])
+    engine.write_text(f"{text}\n/END")
+    assert "D2R011" not in {finding.rule for finding in check_deck(path).findings}
+
+
 def test_an_include_that_is_asked_for_twice_is_read_once(tmp_path: Path) -> None:
     head = EXAMPLE.deck.split("/PART")[0]
     (tmp_path / "inner.inc").write_text("#\n")
