@@ -193,7 +193,7 @@ class Candidates(Sequence[Candidate]):
             i = range(len(self))[place]
             return self[i : i + 1][0]
         # how far the true time may lie away is asked of these only: of all it takes longer than the choice
-        reach = self.situation.vibration.reach(self.moments[place])
+        reach = self.situation.vibration.reach(_as_found(self.situation, self.moments[place]))
         return tuple(map(self._made, range(len(self))[place], reach.tolist()))
 
     def __iter__(self) -> Iterator[Candidate]:
@@ -259,9 +259,7 @@ def _found_together(situations: Sequence[Situation], *, in_flight: bool) -> list
     vibrations = [one.vibration for one in situations]
     starts = [one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf for one in situations]
     found = moments_of(vibrations, situations[0].settings.tolerance, starts)
-    kept = [
-        _at_start(one) or _distinct(one, Moments.of(moments)) for one, moments in zip(situations, found, strict=True)
-    ]
+    kept = [_at_start(one) or _distinct(one, moments) for one, moments in zip(situations, found, strict=True)]
     known = measured_of(vibrations, [moments.tr for moments in kept])
     return [Candidates.of(*row) for row in zip(situations, kept, known, strict=True)]
 
@@ -280,8 +278,23 @@ def _at_start(situation: Situation) -> Moments | None:
     return Moments.of([Moment(max(start, float(situation.history.time[0])), "start", None)])
 
 
-def _distinct(situation: Situation, found: Moments) -> Moments:
+def _as_found(situation: Situation, moments: Moments) -> Moments:
+    """Call each given tr a match where one would be found: it is known as well as that one, whoever names it."""
+    given = moments.are("given")
+    if situation.at_rest or not given.any():
+        return moments
+    vibration = situation.vibration
+    found = _distinct(situation, vibration.moments(situation.settings.tolerance))
+    if not found.are("match").any():
+        return moments
+    nearest = found.at(np.array([np.abs(found.tr - tr).argmin() for tr in moments.tr]))
+    same = given & (np.abs(nearest.tr - moments.tr) <= vibration.reach(nearest))
+    return Moments(moments.tr, np.where(same, nearest.kind, moments.kind), moments.rising)
+
+
+def _distinct(situation: Situation, moments: Sequence[Moment]) -> Moments:
     """Give the moments in time order, without the matches that lie next to a crossing or an extremum."""
+    found = Moments.of(moments)
     kept, matches = np.ones(len(found), dtype=bool), found.are("match")
     of_level = found.tr[~matches]
     for place in np.flatnonzero(matches).tolist():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+import numpy as np
 import pytest
 
 from d2rpick.choice.settings import Settings
@@ -10,6 +13,9 @@ from d2rpick.choice.verify import verify
 from d2rpick.errors import RangeError
 from tests import paper
 from tests.energies import codes, of, rollover
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import History
 
 PLAIN = Settings()
 
@@ -47,6 +53,24 @@ def test_verify_measures_what_suggest_measures() -> None:
         assert getattr(judged.candidate, name) == pytest.approx(getattr(best, name), rel=1e-9, abs=1e-9)
     assert judged.verified
     assert judged.td_ok is False  # a kinetic share of 0.92
+
+
+def ringing() -> History:
+    """Three modes and noise, finely sampled: of several modes a tr may be a closest match, which is off the level."""
+    time = np.linspace(0, 0.5, 10_001)
+    modes = [(5, 4, 300, 0.3), (2, 6, 777, 1), (1, 9, 1500, 2)]
+    energy = sum(a * np.exp(-alpha * time) * np.sin(omega * time + phase) ** 2 for a, alpha, omega, phase in modes)
+    return of(energy + 0.01 * np.abs(np.random.default_rng(5).standard_normal(time.size)), time)
+
+
+def test_verify_remarks_what_suggest_remarks_on_every_tr() -> None:
+    history, asked = ringing(), Settings(after=0.05)
+    found = suggest(history, 0.4, asked).candidates
+    assert {"crossing", "match"} <= {one.kind for one in found}
+    for one in found:
+        judged = verify(history, one.tr, 0.4, asked).candidate
+        assert judged.notes == one.notes
+        assert (judged.tr_low, judged.tr_high) == pytest.approx((one.tr_low, one.tr_high), rel=1e-9)
 
 
 @pytest.mark.parametrize(("tr", "td"), [(0.064, 0.064), (0.07, 0.064), (-0.1, 0.064), (0.01, 0.2)])
