@@ -57,7 +57,7 @@ def names_in(text: str) -> tuple[str, ...]:
     >>> names_in("-&tEnd/6.0+&dt")
     ('tend', 'dt')
     """
-    return tuple(name.lower() for name in _NAME.findall(text))
+    return tuple(name.lower() for name in _NAME.findall(text)) if "&" in text else ()
 
 
 def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:

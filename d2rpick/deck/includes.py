@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -58,7 +58,7 @@ def _names(card: Card) -> Iterator[tuple[Field, list[Row]]]:
         text = first.text.rstrip()
         while text.endswith(_CONTINUED) and waiting:
             text = text.removesuffix(_CONTINUED).rstrip() + waiting.pop(0).text.strip()
-        yield replace(first.field(0), text=card.scope.text(text.strip().strip('"'))), waiting
+        yield first.field(0)._replace(text=card.scope.text(text.strip().strip('"'))), waiting
 
 
 def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, ...]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 import re
 from dataclasses import dataclass, field
@@ -62,8 +61,8 @@ class Scope:
 
     def as_of_now(self) -> Scope:
         """Return the same scope as a card sees it that stands here: later definitions do not count for its values."""
-        seen = copy.copy(self)
-        seen._known = self._whole.count
+        seen = Scope(self._outer)
+        seen._local, seen._whole, seen._known = self._local, self._whole, self._whole.count
         return seen
 
     def definitions(self, name: str) -> tuple[Definition, ...]:

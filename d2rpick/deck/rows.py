@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,8 +16,7 @@ STANDARD, LONG = 10, 20  # columns of a field
 T = TypeVar("T", int, float, str)
 
 
-@dataclass(frozen=True)
-class Field:
+class Field(NamedTuple):
     """The text of one field, without the blanks around it, and where it stands (counted from 1)."""
 
     text: str
@@ -40,8 +39,7 @@ Problem = tuple[Field, str]
 """A field that says nothing usable, and why."""
 
 
-@dataclass(frozen=True)
-class Value(Generic[T]):
+class Value(NamedTuple, Generic[T]):
     """What a field says: ``problem`` is empty, or tells why ``value`` is only the default."""
 
     value: T
@@ -67,9 +65,9 @@ class Row:
     def field(self, position: int) -> Field:
         """Field ``position`` from 0, between commas or in fixed columns; empty beyond the end of the line."""
         start, text = self._pieces[position] if position < len(self._pieces) else (len(self.text), "")
-        indent = len(text) - len(text.lstrip())
-        column = start + indent + 1 if text.strip() else start + 1
-        return Field(text.strip(), self.block, self.distance, column)
+        found = text.strip()
+        indent = text.index(found[0]) if found else 0
+        return Field(found, self.block, self.distance, start + indent + 1)
 
     @cached_property
     def _pieces(self) -> list[tuple[int, str]]:

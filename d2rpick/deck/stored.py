@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _HELD: Final = 1 << 18  # a file up to this size is held in memory: a deck may have thousands of them
 _WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, close to them
+_KEPT: Final = 8  # windows held: the ends of a deck's large blocks are looked at again and again
 
 
 class Held:
@@ -51,7 +52,7 @@ class OnDisk:
     def __init__(self, name: str, state: FileState) -> None:
         self.size = state.size
         self._name, self._state = name, state
-        self._window, self._begin = b"", 0
+        self._windows: dict[int, bytes] = {}  # by where they begin, the oldest first
 
     def read(self, begin: int, end: int) -> bytes:
         """Bytes from ``begin`` to ``end``, less where the file ends before."""
@@ -60,10 +61,13 @@ class OnDisk:
             return b""
         if end - begin > _WINDOW:
             return self._read(begin, end)
-        if begin < self._begin or end > self._begin + len(self._window):
-            low = begin // _WINDOW * _WINDOW
-            self._window, self._begin = self._read(low, min(-(-end // _WINDOW) * _WINDOW, self.size)), low
-        return self._window[begin - self._begin : end - self._begin]
+        low = begin // _WINDOW * _WINDOW
+        if end > low + len(window := self._windows.get(low, b"")):
+            window = self._read(low, min(-(-end // _WINDOW) * _WINDOW, self.size))
+            self._windows[low] = window
+            if len(self._windows) > _KEPT:
+                del self._windows[next(iter(self._windows))]
+        return window[begin - low : end - low]
 
     @contextmanager
     def opened(self) -> Iterator[Filling]:

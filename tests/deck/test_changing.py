@@ -40,7 +40,7 @@ def size(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str
             monkeypatch.setattr(module, name, value)
         monkeypatch.setattr(marks, "_PIECE", 200)
     if request.param.endswith("threads"):
-        monkeypatch.setattr(marks, "_SHARE", 300)
+        monkeypatch.setattr(marks, "_ALONE", 0)
         monkeypatch.setattr(marks, "_HELPERS", 2)
     return str(request.param)
 

@@ -48,23 +48,18 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("marks") / "deck.k"
 
 
-@given(FILES, st.integers(1, 90), st.integers(1, 300), st.integers(0, 3), st.integers(1, 80))
+@given(FILES, st.integers(1, 90), st.integers(0, 3), st.integers(1, 80))
 def test_pieces_and_threads_find_what_a_look_at_every_line_finds(
-    file: Path, data: bytes, piece: int, share: int, helpers: int, window: int
+    file: Path, data: bytes, piece: int, helpers: int, window: int
 ) -> None:
     file.write_bytes(data)
     expected = [*line_by_line(data)]
     assert [*find_marks(Held(data))] == expected
     blocks = [(one.start, one.end, one.head, one.line, [*one.lines()]) for one in SourceFile("held", data).blocks()]
     with pytest.MonkeyPatch.context() as small:
-        small.setattr(marks, "_PIECE", piece)
         for module, name, value in (
-            *(
-                (marks, "_SHARE", share),
-                (marks, "_HELPERS", helpers),
-                (stored, "_HELD", -1),
-                (stored, "_WINDOW", window),
-            ),
+            *((marks, "_PIECE", piece), (marks, "_ALONE", 0), (marks, "_HELPERS", helpers)),
+            *((stored, "_HELD", -1), (stored, "_WINDOW", window)),
             *((source, "_PIECE", piece), (source, "_COUNTED", piece), (source, "_FIRST", 0)),
         ):
             small.setattr(module, name, value)
@@ -106,7 +101,7 @@ def test_a_call_of_the_system_that_gives_less_is_repeated() -> None:
 def test_what_goes_wrong_in_a_thread_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "deck.k"
     path.write_bytes(b"*NODE\n" * 100)
-    for module, name, value in ((marks, "_SHARE", 100), (marks, "_PIECE", 64), (stored, "_HELD", 0)):
+    for module, name, value in ((marks, "_ALONE", 0), (marks, "_PIECE", 64), (stored, "_HELD", 0)):
         monkeypatch.setattr(module, name, value)
     fill = OnDisk._fill
 
@@ -123,19 +118,19 @@ def test_what_goes_wrong_in_a_thread_is_said(tmp_path: Path, monkeypatch: pytest
 def test_no_thread_goes_on_where_a_search_is_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, interrupted, searched = tmp_path / "deck.k", Event(), []
     path.write_bytes(b"*NODE\n" * 200)
-    for module, name, value in ((marks, "_SHARE", 1), (stored, "_HELD", 0)):
+    for module, name, value in ((marks, "_PIECE", 1), (stored, "_HELD", 0)):
         monkeypatch.setattr(module, name, value)
 
-    def between(_: object, begin: int, __: int) -> list[int]:
+    def starred(_: bytearray, __: int, end: int) -> list[int]:
         if current_thread() is main_thread():
             interrupted.set()
             raise KeyboardInterrupt
         interrupted.wait()
         time.sleep(0.001)
-        searched.append(begin)
+        searched.append(end)
         return []
 
-    monkeypatch.setattr(marks._Search, "_between", between)
+    monkeypatch.setattr(marks, "_starred", starred)
     with pytest.raises(KeyboardInterrupt):
         find_marks(stored.stored(str(path)))
     assert len(searched) < 600

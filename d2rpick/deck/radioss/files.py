@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -135,11 +135,11 @@ def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -
     )
     real = os.path.realpath(path) if path else ""
     if path is None:
-        run.deck.unread.append(Unread(replace(card.here, text=name), "no such file"))
+        run.deck.unread.append(Unread(card.here._replace(text=name), "no such file"))
     elif real in chain or real == os.path.realpath(source.name) or len(chain) >= _DEEPEST:
-        run.deck.unread.append(Unread(replace(card.here, text=name), "the file includes itself"))
+        run.deck.unread.append(Unread(card.here._replace(text=name), "the file includes itself"))
     elif not os.access(path, os.R_OK):
-        run.deck.unread.append(Unread(replace(card.here, text=name), "no permission to read it"))
+        run.deck.unread.append(Unread(card.here._replace(text=name), "no permission to read it"))
     else:
         if path not in run.included:
             run.included[path] = SourceFile(path)
