@@ -71,8 +71,9 @@ class _Search:
 
     def result(self) -> Sequence[int]:
         """All that was found; what a helper left is searched here, where an error is heard."""
-        self._waiting = iter([begin for begin in self.pieces if begin not in self._found])
-        self.go_on()
+        if left := [begin for begin in self.pieces if begin not in self._found]:
+            self._waiting = iter(left)
+            self.go_on()
         marks = self._room(())
         for begin in self.pieces:
             marks.extend(self._found.pop(begin))
