@@ -204,11 +204,12 @@ def _rows(
     """Give every flight with its window, as if each were the first."""
     last = max((one.td for one in known), default=None)
     landed: float | None = None  # of the flight before
-    for number, flight in enumerate(flights, start=1):
+    for number, seen in enumerate(flights, start=1):
+        flight = _given(reference.history, seen, settings.after)
         start, end = bounds(reference.history, flight)
         margin = margin_before_contact(reference.history, flight, settings.margin)
         row = Planned(number, flight, start, end, margin, "left-out")
-        within = [one for one in known if one.flight == flight]
+        within = [one for one in known if one.flight == seen]
         if within:
             for one in within:
                 yield replace(row, status="done", reason=one.told, done=one)
@@ -223,6 +224,12 @@ def _rows(
         landed = flight.end
 
 
+def _given(history: History, flight: Flight, after: float | None) -> Flight:
+    """Let a flight in which the load is said to end begin there, as ``suggest`` does."""
+    start, end = bounds(history, flight)
+    return flight if after is None or not start <= after < end else flight._replace(start=after, source="given")
+
+
 def _asked(
     reference: Reference, row: Planned, settings: Settings, shortest: float, landed: float | None, fits: Fits
 ) -> Planned:
@@ -235,7 +242,7 @@ def _asked(
     answer = suggest_of(reference, (row.start, row.end), asked, since=landed, fits=fits)
     begins = answer.situation.flight.start
     row = replace(row, answer=answer)
-    if begins is not None and begins < row.start:
+    if begins is not None and (begins < row.start or answer.recommended):
         row = replace(row, flight=row.flight._replace(start=begins), start=begins)
     if answer.recommended is None:
         why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]

@@ -1,0 +1,123 @@
+"""One question has one answer: pairs, windows and flights that are named are those that another command finds there."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.acceptable_windows import acceptable_windows
+from d2rpick.choice.of_run import read
+from d2rpick.choice.plan import plan_of
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.choice.verify import Verdict, verify
+from d2rpick.histories.digits import as_read
+from d2rpick.histories.opening import Selection
+from d2rpick.report.suggestion import acceptable
+from d2rpick.rules.judgement import faults_of
+from tests.choice.test_same_answers import made
+from tests.drops import drop, written
+from tests.energies import codes, of
+
+if TYPE_CHECKING:
+    from d2rpick.choice.of_run import Reference
+    from d2rpick.histories.history import History
+
+PLAIN = Settings()
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory: pytest.TempPathFactory) -> Reference:
+    return read(written(drop(), tmp_path_factory.mktemp("run")), Selection(parts=("box",)))
+
+
+def resting() -> History:
+    """Constant energy over times of many digits."""
+    time = 0.10005206614732742 + np.linspace(0, 1, 101)
+    return of(np.ones(time.size), time)
+
+
+def read_again(history: History, tr: float, td: float, asked: Settings) -> Verdict:
+    """Judge a pair as it is read."""
+    return verify(history, as_read(tr), as_read(td), asked)
+
+
+@pytest.mark.parametrize("td", [0.7, 0.8])
+def test_the_better_pair_is_what_is_said_of_its_td(td: float) -> None:
+    history = made("five modes")
+    pair = suggest(history, td, PLAIN).better_pair
+    assert pair
+    assert suggest(history, pair.td, PLAIN).recommended == pair
+
+
+@pytest.mark.parametrize("asked", [{"max_residual": 0.9}, {"max_kinetic_share": 0.9}])
+def test_where_nothing_vibrates_no_tr_is_acceptable_that_does_not_verify(asked: dict[str, Any]) -> None:
+    history, settings = resting(), Settings(after=0.3, **asked)
+    answer = suggest(history, 0.8, settings)
+    assert answer.situation.at_rest
+    assert not verify(history, 0.5, 0.8, settings).verified
+    assert not answer.windows
+    assert not acceptable_windows(answer.situation, answer.candidates, None).size
+
+
+def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:
+    history = resting()
+    asked = Settings(after=float(history.time[0]))
+    answer = suggest(history, 0.8, asked)
+    assert "at-rest" in codes(answer)
+    assert answer.recommended
+    assert read_again(history, *answer.recommended[:2], asked).verified
+
+
+def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
+    for margin in (0.0123456789, 0.02):
+        asked = Settings(margin=margin)
+        for row in plan_of(box, asked).rows:
+            if row.window:
+                assert read_again(box.history, *row.window, asked).verified
+
+
+def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
+    history, asked = made("five modes"), Settings(after=0.1)
+    answer = suggest(history, 0.8, asked)
+    line = acceptable(answer.windows or (), None)
+    windows = re.findall(r"(\S+) to (\S+) \(", line)
+    assert len(windows) > 2
+    for start, end in windows:
+        assert verify(history, float(start), 0.8, asked).verified
+        assert verify(history, float(end), 0.8, asked).verified
+
+
+def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) -> None:
+    second = plan_of(box, PLAIN).rows[1]
+    after = (second.start + second.end) / 2
+    (row,) = (one for one in plan_of(box, Settings(after=after)).rows if one.number == second.number)
+    assert row.window
+    flight = verify(box.history, *row.window, Settings(after=after)).situation.flight
+    assert (row.flight.start, row.flight.end, row.flight.source) == (after, flight.end, flight.source)
+    assert row.margin.time == pytest.approx(0.03 * (second.end - after))
+    assert row.window[1] <= row.end - row.margin.time
+
+
+def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None:
+    asked = Settings(margin=0.01)
+    flight = plan_of(box, PLAIN).rows[1]
+    verdict = verify(box.history, flight.start + 0.005, flight.end - 0.005, asked)
+    reasons = [reason for reason in verdict.reasons if "with the margin" in reason]
+    told = [fault.message for fault in faults_of(verdict) if fault.rule == "D2R204"]
+    assert len(reasons) == len(told) == 2
+    for reason, message in zip(reasons, told, strict=True):
+        assert reason.removeprefix("td ") in message
+
+
+@pytest.mark.parametrize("margin", [None, 0.01])
+def test_the_last_td_that_is_named_lies_in_the_flight(box: Reference, margin: float | None) -> None:
+    asked, flights = Settings(margin=margin), plan_of(box, PLAIN).rows
+    answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, asked)
+    (message,) = (one.message for one in answer.cautions if one.code == "no-free-flight")
+    found = re.search(r"its last td is (\S+)$" if margin else r"to (\S+), the last td in it$", message)
+    assert found
+    assert suggest(box.history, float(found[1]), asked).recommended
