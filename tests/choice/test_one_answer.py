@@ -14,6 +14,7 @@ from d2rpick.choice.plan import plan_of
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import Verdict, verify
+from d2rpick.flight.flight import all_seen, seen_flight
 from d2rpick.histories.digits import as_read
 from d2rpick.histories.opening import Selection
 from d2rpick.report.suggestion import acceptable
@@ -21,6 +22,7 @@ from d2rpick.rules.judgement import faults_of
 from tests.choice.test_same_answers import made
 from tests.drops import drop, written
 from tests.energies import codes, of
+from tests.shared import shared
 
 if TYPE_CHECKING:
     from d2rpick.choice.of_run import Reference
@@ -121,3 +123,13 @@ def test_the_last_td_that_is_named_lies_in_the_flight(box: Reference, margin: fl
     found = re.search(r"its last td is (\S+)$" if margin else r"to (\S+), the last td in it$", message)
     assert found
     assert suggest(box.history, float(found[1]), asked).recommended
+
+
+@pytest.mark.parametrize("file", ["rollover_r100_T01.gz", "rollover_referenceT01.gz", "car_drop/drop2T01.gz"])
+def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
+    history = read([str(shared(f"openradioss/{file}"))]).history
+    listed = all_seen(history)
+    assert listed
+    for source, flight in listed:
+        used = seen_flight(history, (flight.start + flight.end) / 2)
+        assert (source, flight) == (used.source, used.flight)
