@@ -1,4 +1,4 @@
-"""Times in the digits that people read, and type again: six of them."""
+"""Numbers in the digits that people read: times in six, which are typed again, and errors in three."""
 
 from __future__ import annotations
 
@@ -67,6 +67,18 @@ def window_as_read(start: float, end: float) -> str:
     """
     low, high = not_before(start), not_after(end)
     return f"{low:.{_DIGITS}g} to {high:.{_DIGITS}g}" if low <= high else f"{float(start)!r} to {float(end)!r}"
+
+
+def above(value: float, limit: float) -> str:
+    """Write a value that is above a limit in three digits, or in as many as show that it is.
+
+    Examples
+    --------
+    >>> above(0.31416, 0.2), above(0.20004, 0.2)
+    ('0.314', '0.20004')
+    """
+    texts = (f"{value:.{digits}g}" for digits in range(3, 17))
+    return next((text for text in texts if float(text) > limit), repr(float(value)))
 
 
 def _stepped(read: float, steps: int) -> float:

@@ -13,6 +13,7 @@ from d2rpick.choice.of_run import Reference, verify_of
 from d2rpick.choice.suggest import find_better_pair, suggest_at
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, end_of_flight, end_of_load
 from d2rpick.errors import name_units
+from d2rpick.histories.digits import above
 from d2rpick.rules.base import Fault
 
 if TYPE_CHECKING:
@@ -195,7 +196,7 @@ def _of_error(verdict: Verdict) -> Iterator[Fault]:
         return
     if error > tolerance:
         levels = f"the energy is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
-        expected = f"{what} {error:.3g}, at most {tolerance:g} was expected"
+        expected = f"{what} {above(error, tolerance)}, at most {tolerance:g} was expected"
         yield Fault("D2R201", False, f"{levels}: {expected}; {_way_out(verdict)}")
 
 

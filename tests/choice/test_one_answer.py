@@ -133,3 +133,14 @@ def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
     for source, flight in listed:
         used = seen_flight(history, (flight.start + flight.end) / 2)
         assert (source, flight) == (used.source, used.flight)
+
+
+def test_an_error_that_is_refused_reads_as_too_large() -> None:
+    history, td = made("one mode"), 0.8
+    best = suggest(history, td, PLAIN).chosen
+    assert best
+    assert best.residual
+    barely = Settings(max_residual=best.residual * (1 - 1e-6))
+    (reason,) = (one for one in verify(history, best.tr, td, barely).reasons if "above the limit" in one)
+    value, limit = map(float, re.findall(r"[\d.]+", reason))
+    assert value > limit
