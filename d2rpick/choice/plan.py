@@ -235,15 +235,17 @@ def _asked(
 ) -> Planned:
     """Ask ``suggest`` for the window of a flight, which does not reach back beyond the landing of the one before.
 
-    The energy alone shows another beginning to each td: the flight begins where the td that is chosen has it.
+    The energy alone shows another beginning to each td, or an oscillator where another td has none: the flight is known
+    as the td that is chosen knows it.
     """
     own = settings.after is not None and row.start <= settings.after <= row.end
     asked = settings if own else replace(settings, after=None)
     answer = suggest_of(reference, (row.start, row.end), asked, since=landed, fits=fits)
-    begins = answer.situation.flight.start
+    known = answer.situation.flight
     row = replace(row, answer=answer)
-    if begins is not None and (begins < row.start or answer.recommended):
-        row = replace(row, flight=row.flight._replace(start=begins), start=begins)
+    if known.start is not None and (known.start < row.start or answer.recommended):
+        flight = row.flight._replace(start=known.start, source=known.source)
+        row = replace(row, flight=flight, start=known.start)
     if answer.recommended is None:
         why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
         return replace(row, reason="; ".join(why))

@@ -25,6 +25,8 @@ from tests.energies import codes, of
 from tests.shared import shared
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from d2rpick.choice.of_run import Reference
     from d2rpick.histories.history import History
 
@@ -144,3 +146,22 @@ def test_an_error_that_is_refused_reads_as_too_large() -> None:
     (reason,) = (one for one in verify(history, best.tr, td, barely).reasons if "above the limit" in one)
     value, limit = map(float, re.findall(r"[\d.]+", reason))
     assert value > limit
+
+
+def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it(tmp_path: Path) -> None:
+    """An oscillator is seen around some td of the flight, but not around the one that is chosen."""
+    rng, time = np.random.default_rng(0), np.linspace(0, 1, 1500)
+    load, contact, omega, alpha = rng.uniform(0.05, 0.3), rng.uniform(0.6, 0.9), rng.uniform(20, 60), rng.uniform(0, 3)
+    energy = np.exp(-alpha * time) * np.sin(omega * time + omega) ** 2
+    energy += np.where(time < load, 6 * np.sin(np.pi * time / load) ** 2, 0)
+    energy += np.where(time > contact, 20 * ((time - contact) / (1 - contact)) ** 2, 0)
+    file = tmp_path / "energy.csv"
+    table = np.stack([time, energy], axis=1)
+    np.savetxt(file, table, delimiter=",", header="time,internal_energy", comments="", fmt="%.17g")
+    reference = read([str(file)])
+    rows = [row for row in plan_of(reference, PLAIN).rows if row.window]
+    assert rows
+    for row in rows:
+        assert row.window
+        flight = verify(reference.history, *row.window, PLAIN).situation.flight
+        assert (row.flight.source, row.flight.certain, row.start) == (flight.source, flight.certain, flight.start)
