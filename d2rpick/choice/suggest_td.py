@@ -72,8 +72,10 @@ def flights_of(history: History, settings: Settings, fits: Fits | None = None) -
     """Find all flights; where the energy is all there is, one oscillator for the whole record, else none is sought."""
     if any(True for _ in witnesses(history)) or not settings.replay:
         return find_flights(history, settings, fits)
-    middle = examine(history, float(history.time[0] + history.time[-1]) / 2, settings, fits)
-    if middle.flight.source == "oscillator":
+    first = float(history.time[0]) if settings.after is None else settings.after
+    middle = examine(history, (first + float(history.time[-1])) / 2, settings, fits)
+    start, end = bounds(history, middle.flight)
+    if middle.evidence.span and start < end:  # it ends with the oscillator, also where its start is given
         return (middle.flight,)
     return find_flights(history, replace(settings, replay=False))
 

@@ -13,6 +13,7 @@ from d2rpick.choice.of_run import read
 from d2rpick.choice.plan import plan_of
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
+from d2rpick.choice.suggest_td import suggest_in_longest_flight
 from d2rpick.choice.verify import Verdict, verify
 from d2rpick.flight.flight import all_seen, seen_flight
 from d2rpick.histories.digits import as_read
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from d2rpick.choice.of_run import Reference
-    from d2rpick.histories.history import History
+    from d2rpick.histories.history import History, Samples
 
 PLAIN = Settings()
 
@@ -42,6 +43,11 @@ def resting() -> History:
     """Constant energy over times of many digits."""
     time = 0.10005206614732742 + np.linspace(0, 1, 101)
     return of(np.ones(time.size), time)
+
+
+def save(file: Path, time: Samples, energy: Samples) -> None:
+    table = np.stack([time, energy], axis=1)
+    np.savetxt(file, table, delimiter=",", header="time,internal_energy", comments="", fmt="%.17g")
 
 
 def read_again(history: History, tr: float, td: float, asked: Settings) -> Verdict:
@@ -156,8 +162,7 @@ def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it(tmp_path: Path) -> None
     energy += np.where(time < load, 6 * np.sin(np.pi * time / load) ** 2, 0)
     energy += np.where(time > contact, 20 * ((time - contact) / (1 - contact)) ** 2, 0)
     file = tmp_path / "energy.csv"
-    table = np.stack([time, energy], axis=1)
-    np.savetxt(file, table, delimiter=",", header="time,internal_energy", comments="", fmt="%.17g")
+    save(file, time, energy)
     reference = read([str(file)])
     rows = [row for row in plan_of(reference, PLAIN).rows if row.window]
     assert rows
@@ -165,3 +170,18 @@ def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it(tmp_path: Path) -> None
         assert row.window
         flight = verify(reference.history, *row.window, PLAIN).situation.flight
         assert (row.flight.source, row.flight.certain, row.start) == (flight.source, flight.certain, flight.start)
+
+
+def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does(tmp_path: Path) -> None:
+    time = np.linspace(0, 1, 1500)
+    energy = np.exp(-time) * np.sin(40 * time) ** 2 + np.where(time > 0.8, 30 * (time - 0.8), 0)
+    file, asked = tmp_path / "energy.csv", Settings(after=0.1)
+    save(file, time, energy)
+    reference = read([str(file)])
+    (row,) = plan_of(reference, asked).rows
+    assert row.window
+    flight = verify(reference.history, *row.window, asked).situation.flight
+    assert row.flight == flight
+    assert row.end == pytest.approx(0.8, abs=0.01)
+    assert row.margin.source == "flight"
+    assert suggest_in_longest_flight(reference.history, asked).td_window == (0.1, row.end)
