@@ -206,3 +206,17 @@ def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> Non
     assert of_suggest[of_suggest.index("Judged by") :] == judged
     assert judged.splitlines()[0] in unescape(page.read_text("utf-8"))
     assert "hourglass: " in unescape(page.read_text("utf-8")).partition("*DEFORMABLE")[0].rpartition("Judged by")[2]
+
+
+def test_a_plan_keeps_the_margin_that_it_lists(tmp_path: Path) -> None:
+    """To a td in it the energy alone shows no end of that flight."""
+    rng, time = np.random.default_rng(277), np.linspace(0, 1, 200)
+    omega, phase = rng.uniform(20, 80, 2), rng.uniform(0, 6, 2)
+    energy = np.sin(omega[0] * time + phase[0]) ** 2 + 0.5 * np.sin(omega[1] * time + phase[1]) ** 2 + 0.6
+    file = tmp_path / "energy.csv"
+    save(file, time, energy)
+    rows = [row for row in plan_of(read([str(file)]), Settings(replay=False)).rows if row.window and row.flight.end]
+    assert rows
+    for row in rows:
+        assert row.window
+        assert row.window[1] <= row.end - row.margin.time
