@@ -297,8 +297,12 @@ class History:
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def _in_another_unit(self, times: Sequence[float], argument: str) -> str:
-        """Ask whether an argument was given in another unit, in which it lies in the record as it does not now."""
-        if any(self.time[0] <= time <= self.time[-1] for time in times if time):
+        """Ask whether an argument was given in another unit, in which it lies in the record as it does not now.
+
+        One that misses the record by less than its length does so in the record's own unit.
+        """
+        span = self.time[-1] - self.time[0]
+        if any(self.time[0] <= time <= self.time[-1] for time in times if time) or times[-1] < self.time[-1] + span:
             return ""
         for unit, size in (("ms", 1e-3), ("us", 1e-6)):
             values = [float(f"{time * size:.12g}") for time in times]
