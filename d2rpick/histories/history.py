@@ -362,14 +362,13 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     keep = np.append(time[:-1] < later[1:], np.ones(min(1, time.size), dtype=bool))
     notes = []
     if equal:
-        notes.append(f"{equal} states have the same printed time as the next one; the last of equal times counts")
+        same = "1 state has" if equal == 1 else f"{equal} states have"
+        notes.append(f"{same} the same printed time as the next one; the last of equal times counts")
     if back:
         steps = "once" if back == 1 else f"{back} times"
         lost = int(np.count_nonzero(~keep)) - equal
-        notes.append(
-            f"time steps back {steps} (restart); where legs overlap the newer one counts, "
-            f"{lost} older states were dropped"
-        )
+        dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
+        notes.append(f"time steps back {steps} (restart); where legs overlap the newer one counts, {dropped} dropped")
     return keep, tuple(notes)
 
 
