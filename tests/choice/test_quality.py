@@ -123,6 +123,16 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     assert quality_of(guessed, found.chosen, None) == Quality("fair", ("the flight is not certain",))
 
 
+def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
+    """A structure that rings in many modes is quiet for moments; free flight excites nothing anew."""
+    time = np.linspace(0, 1, 201)
+    energy = np.where(time < 0.2, 50 * time, 10.0) + 1.5 * (time > 0.5) * np.sin(200 * time) ** 2
+    quiet = suggest(History(time, energy, ("made",), "made", "E"), 0.4, Settings(after=0.25)).situation
+    assert quiet.at_rest  # of what comes after td nothing is known
+    assert not replace(quiet, flight=quiet.flight._replace(end=0.9)).at_rest
+    assert replace(quiet, flight=quiet.flight._replace(end=0.5)).at_rest
+
+
 def test_between_few_states_nothing_is_called_at_rest() -> None:
     """One state and td in the same output interval say nothing of what happens between them."""
     energy = np.tile([1.5, 2.5, 1.0, 2.5], 10)
