@@ -77,7 +77,9 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
     if earliest is None:
         yield Caution("no-flight", "nothing in the record shows when the load is over; give that time as `after`")
     elif td <= earliest:
-        yield Caution("td-in-load", f"td = {td:.6g} lies before {end_of_load(situation)}")
+        yield Caution(
+            "td-in-load", f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {end_of_load(situation)}"
+        )
     if td > situation.latest_td:
         yield Caution("td-after-contact", f"td = {td:.6g} lies after {end_of_flight(situation)}")
 
