@@ -187,8 +187,10 @@ def given_up(longer: Pair, chosen: Pair) -> str:
 
 def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
     """The windows of acceptable tr: the one with the recommended tr, the longest others, and what they share."""
-    named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[:_NAMED]
     share = sum(one.share for one in windows)
+    if len(windows) == 1:
+        return f"every tr from {windows[0].start:.6g} to {windows[0].end:.6g}, {share:.0%} of the flight up to td"
+    named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[:_NAMED]
     shown = [f"{w.start:.6g} to {w.end:.6g} ({w.share:.1%}{', recommended' * holds(w, tr)})" for w in named]
     more = f" and {len(windows) - len(named)} shorter windows" if len(windows) > len(named) else ""
     return f"every tr from {'; '.join(shown)}{more}; in all {share:.0%} of the flight up to td"
