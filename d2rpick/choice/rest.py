@@ -15,18 +15,22 @@ if TYPE_CHECKING:
 
 # Level errors up to here count as equal: no tr is better than another one.
 _ONE_LEVEL: Final = 0.02
+# Share of a flight before the contact that ends it: the margin that td keeps, in which the contact may have begun.
+_BEFORE_CONTACT: Final = 0.03
 
 
 def nothing_vibrates(
-    history: History, flight: tuple[float, float], td: float, tolerance: float, *, deformed: bool
+    history: History, flight: tuple[float, float | None], td: float, tolerance: float, *, deformed: bool
 ) -> bool:
     """Whether the energy is round-off all through ``flight`` [time] or, by the level error, stays on that of ``td``.
 
     Free flight excites nothing: what vibrates in any part of it has done so from its start.  So all of it is asked,
-    and not only the time up to td.  ``tolerance`` is that on the level error [-].  Where a vibration is known
-    (``deformed``), a constant level does not mean rest.
+    where its end is known, and not only the time up to td.  ``tolerance`` is that on the level error [-].  Where a
+    vibration is known (``deformed``), a constant level does not mean rest.
     """
-    _, inside = history.between(*flight)
+    start, end = flight
+    last = td if end is None else max(td, end - _BEFORE_CONTACT * (end - start))
+    _, inside = history.between(start, last)
     if not inside.size:
         return False
     least = round_off(history)  # 0 where no energy is written at all: that tells nothing

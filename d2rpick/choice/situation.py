@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.choice.margin import SHARE
 from d2rpick.choice.rest import nothing_vibrates
 from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.model import Evidence, describing, model_at
@@ -69,13 +68,12 @@ class Situation:
 
     @cached_property
     def at_rest(self) -> bool:
-        """Whether nothing vibrates in the flight, up to td at least; close to its end a contact may have begun."""
-        start, end = self.earliest_tr, self.flight.end
+        """Whether nothing vibrates in the flight."""
+        start = self.earliest_tr
         if start is None or not self.in_flight:
             return False
-        last = self.td if end is None else max(self.td, end - SHARE * (end - start))
-        deformed = self.vibration.unknown is None
-        return nothing_vibrates(self.history, (start, last), self.td, self.settings.tolerance, deformed=deformed)
+        window, deformed = (start, self.flight.end), self.vibration.unknown is None
+        return nothing_vibrates(self.history, window, self.td, self.settings.tolerance, deformed=deformed)
 
     @cached_property
     def bodies(self) -> Bodies | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from d2rpick.choice.candidates import MUCH_HIGHER
 from d2rpick.errors import name_units, printable
 from d2rpick.report import keys, tables
 from d2rpick.report.situation import frame, heading, mechanics
@@ -130,7 +131,10 @@ def _kept(answer: Suggestion, best: Candidate) -> str:
     if answer.situation.at_rest:
         return "everything: nothing vibrates in the flight up to td"
     if share is not None and best.residual is not None:
-        return f"{1 - share:.0%} of the vibration energy; the vibration after td is off by {best.residual:.1%}"
+        high = best.residual_high
+        hidden = high is not None and high > best.residual + MUCH_HIGHER
+        more = f", up to {high:.0%} if the record hides a further mode" if hidden else ""
+        return f"{1 - share:.0%} of the vibration energy; the vibration after td is off by {best.residual:.1%}{more}"
     if expected and expected.ratio is not None:
         least = f", {expected.ratio_low:.0%} at worst" if expected.ratio_low is not None else ""
         return f"about {expected.ratio:.0%} of the energy that the reference has after td{least}"
