@@ -126,9 +126,9 @@ def _margin(situation: Situation) -> str:
 
 
 def _nearest_flight(flight: Flight) -> str:
-    """Name the flight that is nearest to td, and the last td in it."""
+    """Name the flight that is nearest to td."""
     if flight.start is None or flight.source == "given":
         return ""
     if flight.end is None:
         return f"; the next flight begins at {flight.start:.6g}"
-    return f"; the nearest flight lasts from {flight.start:.6g} to {flight.end:.6g}, the last td in it"
+    return f"; the nearest flight lasts from {flight.start:.6g} to {flight.end:.6g}; td must lie in it"

@@ -91,6 +91,7 @@ def test_a_run_that_was_never_rigid_is_an_objection() -> None:
     reference = str(shared("openradioss/rollover_referenceT01.gz"))
     found = answer(*ROLLOVER, reference, "--switched", reference)
     assert found["verified"] is False
+    assert any("does not stand still" in reason for reason in found["reasons"])
 
 
 def test_the_energy_that_was_locked_in_is_judged() -> None:
