@@ -316,8 +316,7 @@ def _judged(
 def _loose(name: str, misfit: float, structure: float, local_structure: float) -> str | None:
     """Say how the fit fails to follow the samples."""
     if misfit > MAX_MISFIT:
-        fitted = max(0.0, 1 - misfit)
-        return f"{name} fits only {fitted:.0%} of the variation of the energy, less than {1 - MAX_MISFIT:.0%}"
+        return f"{name} misses the energy by {misfit:.0%} of its standard deviation, more than {MAX_MISFIT:.0%}"
     if structure > MAX_STRUCTURE:
         return (
             f"{name} deviates systematically by {structure:.2g} of the standard deviation of the energy, "
