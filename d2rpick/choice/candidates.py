@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # Candidates that are looked at together, at most: arrays of more are no faster, and noise makes tens of thousands a td.
 _MOST: Final = 20_000
 # A residual that may be so much higher is worth a note.
-_MUCH_HIGHER = 0.1
+MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
 
@@ -315,7 +315,7 @@ def _remarks(situation: Situation, reach: float, known: Measured | None, parts: 
         from d2rpick.vibration.part_shares import main_contributors  # not above: a table has no parts
 
         yield f"mismatch of {main_contributors(parts)}"
-    if known and known.residual_high > known.residual + _MUCH_HIGHER:
+    if known and known.residual_high > known.residual + MUCH_HIGHER:
         yield f"residual up to {known.residual_high:.2g} if what the oscillator leaves over is a further mode"
     if known and reach > known.timing_tolerance:
         yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known.timing_tolerance:.2g}"

@@ -71,12 +71,12 @@ class Situation:
 
     @cached_property
     def at_rest(self) -> bool:
-        """Whether nothing vibrates from the start of the flight to td."""
+        """Whether nothing vibrates in the flight."""
         start = self.earliest_tr
         if start is None or not self.in_flight:
             return False
-        deformed = self.vibration.unknown is None
-        return nothing_vibrates(self.history, start, self.td, self.settings.tolerance, deformed=deformed)
+        window, deformed = (start, self.flight.end), self.vibration.unknown is None
+        return nothing_vibrates(self.history, window, self.td, self.settings.tolerance, deformed=deformed)
 
     @cached_property
     def bodies(self) -> Bodies | None:

@@ -206,6 +206,7 @@ def _why_none(situation: Situation, ranked: Candidates) -> str:
     if not ranked:
         level = situation.energy_td
         return f"before td = {situation.td:.6g} the energy neither passes its level {level:.6g} nor peaks near it"
-    nearest = ranked[0]
-    reasons = "; ".join((*nearest.notes, *over_limits(situation, nearest)))
+    nearest, unknown = ranked[0], situation.vibration.unknown
+    notes = [note for note in nearest.notes if not unknown or unknown not in note]  # that is a warning of its own
+    reasons = "; ".join((*notes, *over_limits(situation, nearest)))
     return f"none of {len(ranked)} candidates is acceptable; the nearest, tr = {nearest.tr:.6g}: {reasons}"

@@ -63,8 +63,8 @@ def longest_flight(
     if not flights and otherwise:
         return otherwise
     if not flights:
-        found = f"{', '.join(history.source)}: nothing in the record shows a flight"
-        raise RangeError(f"{found}; name td, or a window for it")
+        found = f"{', '.join(history.source)}: nothing in the record shows a flight, in which td could be chosen"
+        raise RangeError(f"{found}; give `td`, and the end of the load as `after` where it is known")
     return max((bounds(history, flight) for flight in flights), key=lambda one: one[1] - one[0])
 
 

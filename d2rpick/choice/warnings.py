@@ -77,7 +77,9 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
     if earliest is None:
         yield Caution("no-flight", "nothing in the record shows when the load is over; give that time as `after`")
     elif td <= earliest:
-        yield Caution("td-in-load", f"td = {td:.6g} lies before {end_of_load(situation)}")
+        yield Caution(
+            "td-in-load", f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {end_of_load(situation)}"
+        )
     if td > situation.latest_td:
         yield Caution("td-after-contact", f"td = {td:.6g} lies after {end_of_flight(situation)}")
 
@@ -124,12 +126,12 @@ def _margin(situation: Situation) -> str:
 
 
 def _nearest_flight(situation: Situation) -> str:
-    """Name the flight that is nearest to td, and the last td in it."""
+    """Name the flight that is nearest to td, and the last td in it where a margin is kept."""
     flight = situation.flight
     if flight.start is None or flight.source == "given":
         return ""
     if flight.end is None:
         return f"; the next flight begins at {flight.start:.6g}"
     margin = _margin(situation)
-    last = f"{margin} its last td is {not_after(situation.latest_td):.6g}" if margin else " the last td in it"
-    return f"; the nearest flight lasts from {window_as_read(flight.start, flight.end)},{last}"
+    last = f",{margin} its last td is {not_after(situation.latest_td):.6g}" if margin else "; td must lie in it"
+    return f"; the nearest flight lasts from {window_as_read(flight.start, flight.end)}{last}"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from d2rpick.errors import printable
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import tables
+from d2rpick.report.keys import of_warnings
 from d2rpick.studies.common import runs_of
 from d2rpick.studies.resume_file import PLAIN, plain
 from d2rpick.version import __version__
@@ -113,7 +114,7 @@ def _front(answer: Study, command: Sequence[str]) -> dict[str, Any]:
         "schema": SCHEMA,
         "tool_version": __version__,
         "command": list(command),
-        "warnings": [{"code": caution.code, "message": caution.message} for caution in answer.cautions],
+        "warnings": of_warnings(answer.cautions),
         "td": answer.td,
         "td_window": answer.td_window,
     }

@@ -35,13 +35,17 @@ def as_markdown(answer: Verdict) -> str:
     return "\n".join([table, *(f"\n* {tables.in_markdown(reason)}" for reason in answer.reasons)])
 
 
-def as_csv(answer: Verdict) -> str:
-    """One row, a column for each measure, those of a switched run with ``switched_`` before them, and the reasons."""
+def row(answer: Verdict) -> dict[str, Any]:
+    """Each measure by its key, those of a switched run with ``switched_`` before them, and the reasons as one text."""
     situation = answer.situation
-    row = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **keys.of_verdict(answer)}
-    row |= _of_switched(answer)
-    row["reasons"] = "; ".join(answer.reasons)
-    return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
+    measured = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **keys.of_verdict(answer)}
+    return {**measured, **_of_switched(answer), "reasons": "; ".join(answer.reasons)}
+
+
+def as_csv(answer: Verdict) -> str:
+    """One row, a column for each key of `row`."""
+    found = row(answer)
+    return tables.as_csv(list(found), [list(found.values())]).rstrip("\n")
 
 
 def as_json(answer: Verdict, command: Sequence[str]) -> str:
@@ -72,9 +76,9 @@ def _told(answer: Verdict) -> str:
 def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
     """Rows of numbers that both runs have, below ``COMPARED``."""
     return [
-        ("energy locked in, at td", switched.energy_frozen, switched.energy_td),
-        ("mean after td", switched.mean_after, switched.mean_after_reference),
-        ("spread after td", switched.spread_after, switched.spread_after_reference),
+        ("energy right after td", switched.energy_frozen, switched.energy_td),
+        ("mean energy after td", switched.mean_after, switched.mean_after_reference),
+        ("standard deviation after td", switched.spread_after, switched.spread_after_reference),
     ]
 
 
@@ -89,7 +93,7 @@ def deviations(switched: Comparison) -> list[tuple[str, str]]:
 def _comparison(switched: Comparison) -> list[str]:
     """Lines that hold the switched run against the reference."""
     return [
-        f"switched run  {printable(', '.join(switched.source))}; after td means to {switched.end:.6g}",
+        f"switched run  {printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
         tables.as_text(COMPARED, comparison(switched)),
         *(f"{name.ljust(38)}  {text}" for name, text in deviations(switched)),
         *(f"note: {printable(note)}" for note in switched.notes),

@@ -195,7 +195,9 @@ def _of_error(verdict: Verdict) -> Iterator[Fault]:
     else:
         return
     if error > tolerance:
-        levels = f"the energy is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
+        parts = situation.history.parts or ()
+        of = f" of the {len(parts)} parts that are switched together" if len(parts) > 1 else ""
+        levels = f"the energy{of} is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
         expected = f"{what} {above(error, tolerance)}, at most {tolerance:g} was expected"
         yield Fault("D2R201", False, f"{levels}: {expected}; {_way_out(verdict)}")
 

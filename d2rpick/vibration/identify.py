@@ -248,7 +248,8 @@ class _Record(NamedTuple):
 def _lacking(time: Samples, energy: Samples) -> str | None:
     """Say what a record lacks for any judgement."""
     if time.size < MIN_SAMPLES:
-        return f"the record has {time.size} samples, fewer than the {MIN_SAMPLES} a fit needs"
+        found = "1 state" if time.size == 1 else f"{time.size} states"
+        return f"there are only {found} to fit, at least {MIN_SAMPLES} are needed"
     if float(np.ptp(energy)) <= 1e-12 * float(np.max(np.abs(energy))):  # the rounding of a constant
         return f"the energy is constant, {energy[0]:g}: nothing vibrates"
     return None

@@ -120,7 +120,7 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
     ("line", "parts"),
     [
         ("sugest --td 1 x", ["No such command 'sugest'", "Did you mean 'suggest'?", "d2rpick --help"]),
-        ("dance", ["No such command 'dance'", "suggest, explore, plan"]),
+        ("dance", ["No such command 'dance'", "info, plan, suggest"]),
         ("suggest --tdd 1 x", ["--tdd", "Did you mean", "--td", "d2rpick suggest --help"]),
         ("verify --tolerence 1 x", ["--tolerence", "Did you mean", "--tolerance"]),
         ("suggest --td 1 --td-window 1 2 x", ["--td", "--td-window"]),
@@ -252,7 +252,9 @@ def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(tmp_pa
     file = tmp_path / "input"
     file.write_bytes(table(lambda t: t * t))
     for command in ("suggest", "explore"):
-        assert "nothing in the record shows a flight; name td, or a window for it" in refused(command, str(file))
+        assert "shows a flight, in which td could be chosen; give --td, and the end of the load as --after" in refused(
+            command, str(file)
+        )
     assert run("plan", str(file)).exit_code == 1
 
 

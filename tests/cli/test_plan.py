@@ -57,6 +57,7 @@ def test_all_forms_hold_the_same_windows(history: list[str]) -> None:
     check_by_schema(found)
     supported = [(row["tr"], row["td"]) for row in found["windows"] if row["status"] == "supported"]
     every = [(row["tr"], row["td"]) for row in found["windows"] if row["tr"] is not None]
+    assert all((row["quality"] is None) is (row["tr"] is None) for row in found["windows"])
     assert 1 < len(supported) < len(every)
     for flag, wanted in (((), supported), (("--all",), every)):
         lines = run("plan", "-q", "-f", "value", *flag, *PART, *history).stdout.splitlines()
@@ -79,6 +80,19 @@ def csv_rows(text: str) -> list[dict[str, object]]:
         {key: float(cell) if key in ("tr", "td") and cell else cell or None for key, cell in row.items()}
         for row in rows
     ]
+
+
+def test_a_poor_window_is_called_poor() -> None:
+    """A level that matches is not all: most of the vibration may be kinetic at td."""
+    box = str(shared("openradioss/car_drop/drop2T01.gz"))
+    found = answer("plan", "--part", "all", box)
+    rows = [row for row in found["windows"] if row["status"] == "supported"]
+    assert [row["quality"] for row in rows] == ["good", "poor"]
+    for row in rows:
+        alone = answer("suggest", "--part", "all", "--td-window", str(row["flight_start"]), str(row["flight_end"]), box)
+        assert alone["quality"] == row["quality"]
+    text = run("plan", "-q", "--part", "all", box).stdout
+    assert f"flight {rows[1]['flight']}   poor: about 5" in text
 
 
 def test_the_card_holds_the_supported_windows_and_passes_check(history: list[str], tmp_path: Path) -> None:
@@ -236,7 +250,7 @@ def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(history: list[s
     assert judged.exit_code == 0, judged.stdout
     again = run(*args)
     assert again.exit_code == 2
-    assert "exists" in again.stderr
+    assert "the file exists; choose another folder or --overwrite" in again.stderr
     assert run(*args, "--overwrite").exit_code == 0
     alone = run("plan", "--part", "box", "--write-deck", str(folder), *history)
     assert alone.exit_code == 2

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from d2rpick.choice.examine import examine
@@ -74,6 +75,30 @@ def test_every_format_of_a_run_tells_its_flight_within_a_millisecond(rolled: Rol
     assert flight["end"] == pytest.approx(rolled.end, abs=MILLISECOND)
     assert found["recommended"]["tr"] >= rolled.start - 2e-4
     assert not codes(found) & {"contact-in-window", "work-in-window", "flight-sources-disagree"}
+
+
+@pytest.mark.parametrize(
+    ("names", "options"),
+    [
+        (("x velocity", "z velocity"), ()),
+        (("Global_X_Velocity [m/s]", "Global_Z_Velocity [m/s]"), ()),
+        (("v1", "v2"), ("--channel", "x_velocity=v1", "--channel", "z_velocity=v2")),
+    ],
+)
+def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
+    names: tuple[str, str], options: tuple[str, ...], rolled: Rolled, tmp_path: Path
+) -> None:
+    table = pd.read_csv(rolled.files["csv"])
+    velocities = {name: table[axis] / 50.0 for name, axis in zip(names, ("momentum_x", "momentum_z"), strict=True)}
+    kept = table[["time", "internal_energy"]].assign(**velocities, mass=50.0)
+    kept.to_csv(tmp_path / "run.csv", index=False)
+    td = str(round(rolled.end - 0.01, 3))
+    found, expected = (
+        answer("suggest", "--td", td, *asked, str(file))["flight"]
+        for asked, file in ((options, tmp_path / "run.csv"), ((), rolled.files["csv"]))
+    )
+    assert found == expected
+    assert found["source"] == "momentum"
 
 
 @pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])

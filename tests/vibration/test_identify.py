@@ -173,7 +173,7 @@ RAMP = np.linspace(0.0, 1.0, 201)
 @pytest.mark.parametrize(
     ("energy", "reason"),
     [
-        (RAMP[:23], "23 samples, fewer than the 24"),
+        (RAMP[:23], "only 23 states to fit, at least 24"),
         (np.full(201, 3.3), "constant, 3.3"),
         (np.zeros(201), "constant, 0"),
         (np.where(np.arange(201) % 2, 1.0, -1.0), "does not oscillate"),
