@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.quality import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.switched_run import Times
@@ -80,6 +81,11 @@ class Planned:
         if self.answer is None or self.window is None:
             return None
         return next((one for one in self.answer.candidates if one.recommended), None)
+
+    @property
+    def quality(self) -> Quality | None:
+        """How good the recommended pair is; None without one."""
+        return self.answer.quality if self.answer and self.candidate else None
 
     @property
     def locks_in(self) -> bool | None:

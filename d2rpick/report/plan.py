@@ -21,7 +21,7 @@ WINDOW = (
     "flight", "flight_start", "flight_end", "flight_source", "certain", "status", "reason", "tr", "td", "rigid_time",
     "rigid_fraction", "run_time_share", "locks_in", "basis", "kind", "level_error", "lock_in_error", "residual",
     "kinetic_share", "margin", "margin_source", "landing_spread", "landing", "landing_planned", "position_error",
-    "position_error_part", "position_error_body", "position_error_assumes",
+    "position_error_part", "position_error_body", "position_error_assumes", "quality",
 )  # fmt: skip
 
 
@@ -102,6 +102,7 @@ def window(plan: Plan, row: Planned) -> dict[str, Any]:
         "position_error_part": best.position_error_part if best else None,
         "position_error_body": best.position_error_body if best else None,
         "position_error_assumes": best.position_error_assumes if best else None,
+        "quality": row.quality.grade if row.quality else None,
     }
 
 
@@ -120,6 +121,7 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     if plan.run_time_share is not None:
         lines.append(("run time", f"about {plan.run_time_share:.0%} of the reference's"))
     lines += [(f"flight {row.number}", given_up(row)) for row in supported if row.answer and row.answer.longer]
+    lines += [(f"flight {row.number}", row.quality.told) for row in plan.rows if row.quality and _is_poor(row)]
     if any(row.candidate and row.candidate.position_error_assumes for row in plan.rows):
         told = "; `deck` tells which do" if plan.settings.bodies is None else ""
         lines.append(("off by", f"holds if the parts become one rigid body{told}"))
@@ -182,4 +184,9 @@ def quality(row: Planned) -> str | None:
         return "nothing vibrates"
     name, error = ("level error", best.level_error) if best.residual is None else ("residual", best.residual)
     off = "" if best.position_error is None else f", off by {best.position_error:.2g}"
-    return f"{name} {tables.measure(error)}{off}{' if one body' if best.position_error_assumes else ''}"
+    assumed = " if one body" if best.position_error_assumes else ""
+    return f"{'poor: ' * _is_poor(row)}{name} {tables.measure(error)}{off}{assumed}"
+
+
+def _is_poor(row: Planned) -> bool:
+    return row.quality is not None and row.quality.grade == "poor"

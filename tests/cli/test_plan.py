@@ -139,6 +139,30 @@ def test_one_oscillator_is_one_flight() -> None:
     assert row["residual"] < 1e-3
 
 
+def test_a_poor_window_is_called_so_with_its_reason(history: list[str]) -> None:
+    """`suggest` calls the same pair the best of a bad td."""
+    plain = answer("plan", *history)["windows"]
+    assert {row["quality"] for row in plain if row["td"]} <= {"good", "fair"}
+    file = str(shared("openradioss/car_drop/drop2T01.gz"))
+    rows = answer("plan", "--part", "flying", file)["windows"]
+    for row in (row for row in rows if row["td"]):
+        asked = ("suggest", "--part", "flying", "--td", repr(row["td"]), file)
+        assert row["quality"] == answer(*asked)["quality"] == ("good" if row["kind"] == "start" else "poor")
+    table = run("plan", "-q", "--part", "flying", file).stdout
+    assert "poor: level error 0.040, off by" in table
+    assert "flight 3   poor: about 52% of the vibration energy is kinetic at td" in table
+
+
+def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
+    file = str(shared("openradioss/car_drop/drop2T01.gz"))
+    asked = ("--part", "flying", "--tr", "0", "--td", "0.27")
+    told = run("verify", "-q", *asked, file).stdout.splitlines()[0]
+    assert told.endswith("by the energy level alone: tr lies in the flight, and nothing vibrates there")
+    card = run("card", "-q", "--part", "1", *asked[2:], "--solver", "ls-dyna", "--history", file).stdout
+    assert "at-rest: nothing vibrates" in card
+    assert "evel error" not in card
+
+
 def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tmp_path: Path) -> None:
     done = tmp_path / "switches.txt"
     run("plan", "-q", "-f", "value", *PART, "-o", str(done), *history)
