@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 import numpy as np
 
 from d2rpick.choice.objections import objections
+from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import Moment, Moments
 from d2rpick.vibration.together import measured_of, moments_of
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 # Candidates that are looked at together, at most: arrays of more are no faster, and noise makes tens of thousands a td.
 _MOST: Final = 20_000
 # A residual that may be so much higher is worth a note.
-_MUCH_HIGHER = 0.1
+MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
 
@@ -271,11 +272,13 @@ def judge(situation: Situation, found: Sequence[Moment]) -> Candidates:
 
 
 def _at_start(situation: Situation) -> Moments | None:
-    """Where nothing vibrates in the flight, its start; else nothing."""
+    """Where nothing vibrates in the flight, its start, not before it as it is read; else nothing."""
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
         return None
-    return Moments.of([Moment(max(start, float(situation.history.time[0])), "start", None)])
+    first = max(start, float(situation.history.time[0]))
+    read = not_before(first)
+    return Moments.of([Moment(read if read < situation.td else first, "start", None)])
 
 
 def _as_found(situation: Situation, moments: Moments) -> Moments:
@@ -312,7 +315,7 @@ def _remarks(situation: Situation, reach: float, known: Measured | None, parts: 
         from d2rpick.vibration.part_shares import main_contributors  # not above: a table has no parts
 
         yield f"mismatch of {main_contributors(parts)}"
-    if known and known.residual_high > known.residual + _MUCH_HIGHER:
+    if known and known.residual_high > known.residual + MUCH_HIGHER:
         yield f"residual up to {known.residual_high:.2g} if what the oscillator leaves over is a further mode"
     if known and reach > known.timing_tolerance:
         yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known.timing_tolerance:.2g}"

@@ -158,7 +158,9 @@ def _not_rigid(switched: History, rigid: tuple[float, float] | None, tr: float, 
         yield f"the switched run has no state between tr {tr:g} and td {td:g}: it may not have been rigid"
         return
     room = 2 * switched.step
-    if rigid[0] > tr + room or rigid[1] < td - room or rigid[0] < tr - room or rigid[1] > td + room:
+    if rigid[1] - rigid[0] <= room < td - tr:
+        yield f"the energy of the switched run does not stand still from tr {tr:g} to td {td:g}: was it switched?"
+    elif rigid[0] > tr + room or rigid[1] < td - room or rigid[0] < tr - room or rigid[1] > td + room:
         found = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
         yield f"{found}, not from tr {tr:g} to td {td:g}"
 

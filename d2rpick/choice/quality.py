@@ -8,6 +8,7 @@ import numpy as np
 
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
+from d2rpick.vibration.measures import TOLERATED_GROWTH
 
 if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate
@@ -83,6 +84,10 @@ def _fair(situation: Situation, best: Candidate) -> list[str]:
         found.append("the sign of the deformation is unknown")
     elif best.residual > _MOST_GOOD:
         found.append(f"the vibration after td is off by {best.residual:.0%}")
+    elif best.tr_high is not None and best.timing_tolerance is not None:
+        grown = TOLERATED_GROWTH * (best.tr_high - best.tr) / best.timing_tolerance if best.timing_tolerance else np.inf
+        if grown > _MOST_GOOD:
+            found.append("tr is not known well enough for its timing tolerance")
     if best.residual_high is not None and best.residual_high > _MOST_FAIR:
         found.append(f"with a further mode hidden in the record it may be off by {best.residual_high:.0%}")
     if not situation.flight.certain:

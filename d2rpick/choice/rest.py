@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -14,15 +15,22 @@ if TYPE_CHECKING:
 
 # Level errors up to here count as equal: no tr is better than another one.
 _ONE_LEVEL: Final = 0.02
+# Share of a flight before the contact that ends it: the margin that td keeps, in which the contact may have begun.
+_BEFORE_CONTACT: Final = 0.03
 
 
-def nothing_vibrates(history: History, start: float, td: float, tolerance: float, *, deformed: bool) -> bool:
-    """Whether the energy is round-off from ``start`` to ``td`` [time] or, by the level error, stays on that of td.
+def nothing_vibrates(
+    history: History, flight: tuple[float, float | None], td: float, tolerance: float, *, deformed: bool
+) -> bool:
+    """Whether the energy is round-off all through ``flight`` [time] or, by the level error, stays on that of ``td``.
 
-    ``tolerance`` is that on the level error [-].  Where a vibration is known (``deformed``), a constant level does
-    not mean rest.
+    Free flight excites nothing: what vibrates in any part of it has done so from its start.  So all of it is asked,
+    where its end is known, and not only the time up to td.  ``tolerance`` is that on the level error [-].  Where a
+    vibration is known (``deformed``), a constant level does not mean rest.
     """
-    _, inside = history.between(start, td)
+    start, end = flight
+    last = td if end is None else max(td, end - _BEFORE_CONTACT * (end - start))
+    _, inside = history.between(start, last)
     if not inside.size:
         return False
     least = round_off(history)  # 0 where no energy is written at all: that tells nothing
@@ -31,6 +39,7 @@ def nothing_vibrates(history: History, start: float, td: float, tolerance: float
     if inside.size < MIN_SAMPLES_PER_PERIOD:  # between so few a vibration is not seen
         return False
     level = history.energy_at(td)
-    if deformed or level <= 0 or inside.min() < 0:
+    low, high = float(inside.min()), float(inside.max())
+    if deformed or level <= 0 or low < 0:
         return False
-    return float(np.abs(np.sqrt(inside / level) - 1).max()) <= min(_ONE_LEVEL, tolerance)
+    return max(1 - sqrt(low / level), sqrt(high / level) - 1) <= min(_ONE_LEVEL, tolerance)

@@ -95,15 +95,16 @@ def explore_of(
     situations = [look(time) for time in np.unique([*times, *named]).tolist()]
     offers = [replace(one, recommended=one.td == chosen) for one in _marked([*offers_of(situations, peaks)])]
     asked = next((one for one in offers if one.td == td), None)
+    told = suggestion.situation  # the first td of the flight has too little before it to tell of a vibration
     if td is not None and look(td).in_flight:
-        situation = look(td)  # the energy alone shows another flight to each td: the one that suggest names is shown
+        situation = told = look(td)  # the energy alone shows another flight to each td: that of suggest is shown
     start = asked or max(filter(_found, offers), key=lambda one: one.rigid_time or 0.0, default=None)
     return TradeOff(
         situation=situation,
         suggestion=suggestion,
         td_window=inside,
         offers=tuple(offers),
-        cautions=tuple(_cautions(situation, window, inside, offers)),
+        cautions=tuple(_cautions(told, window, inside, offers)),
         asked=asked,
         recommended=next((one for one in offers if one.recommended), None),
         start=start,

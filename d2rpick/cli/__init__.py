@@ -19,33 +19,34 @@ from d2rpick.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Each command in a line, for the help: that does without the modules behind them.
+# Each command in a line, for the help, which does without the modules behind them: those of a run, of many runs, of
+# decks, and the models.
 COMMANDS: Final = {
+    "info": "Show what is in the files of a run.",
+    "plan": "Plan the rigid windows of all flights of a run.",
     "suggest": "Choose tr for a td, or both times.",
     "explore": "Show what each td costs.",
-    "plan": "Plan the rigid windows of all flights of a run.",
     "parts": "Say which parts may be switched, and what that saves.",
-    "calibrate": "Fit the cost of elements to runs of a site.",
     "verify": "Judge a pair of times, or a finished switched run.",
-    "replay": "Compute the floating oscillator in closed form.",
-    "info": "Show what is in the files of a run.",
+    "study": "Choose tr for many runs, and one tr for all.",
     "extract": "Write the chosen energy as csv or hdf5.",
     "card": "Print solver input for switching windows.",
     "check": "Check the switches of decks, also against a run.",
     "rule": "Explain a rule of check, or list all.",
-    "study": "Choose tr for many runs, and one tr for all.",
-    "reproduce": "Reproduce the published results.",
+    "calibrate": "Fit the cost of elements to runs of a site.",
+    "replay": "Compute the floating oscillator in closed form.",
     "rollover": "Compute a box that trips or falls, flies and lands.",
+    "reproduce": "Reproduce the published results.",
 }
 COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
 EXAMPLES: Final = """\b
 Examples:
+  d2rpick plan --part flying sample_data/rollover_box.matsum
   d2rpick suggest --td 0.064 sample_data/energy.csv
-  d2rpick verify --tr 0.013 --td 0.064 sample_data/energy.csv
   d2rpick check sample_data/switching.k --history sample_data/energy.glstat
-  d2rpick replay --help
+  d2rpick plan --help
 """
 
 

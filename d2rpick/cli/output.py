@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 
@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from d2rpick.choice.warnings import Caution
 
 OBJECTION = 1
+# Formats that names of files promise.
+_NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
+# What a report is often expected to be, and is not.
+_PRINTED: Final = (".pdf", ".doc", ".docx")
 
 
 class Output(NamedTuple):
@@ -38,8 +42,7 @@ class Output(NamedTuple):
             from d2rpick.report import figures
 
             figures.picture_format(plot)
-        if options.get("report") == "-":
-            raise D2RPickError("-: --report writes a file; give its name")
+        _check_report(options.get("report"))
         names = {"--output-file": options["output_file"], "--plot": plot, "--report": options.get("report")}
         claimed: dict[str, str] = {}
         for option, name in names.items():
@@ -48,6 +51,9 @@ class Output(NamedTuple):
                 other = claimed.setdefault(os.path.realpath(name), option)
                 if other != option:
                     raise D2RPickError(f"{name}: {option} and {other} are the same file; give two")
+        is_result = "write_as" not in options  # of a history the name itself decides
+        if file is not None and not output.quiet and is_result and (form := _meant(file)):
+            tell(f"note: {file} gets the table; -f {form} writes what its name promises")
         return output
 
     def spare(self, inputs: Iterable[str]) -> None:
@@ -116,6 +122,24 @@ class Output(NamedTuple):
         except (OSError, RuntimeError) as error:  # Python before 3.13 tells a loop of links by RuntimeError
             reason = getattr(error, "strerror", None) or "a loop of symbolic links"
             raise D2RPickError(f"{name}: cannot be written ({reason}); give another file") from error
+
+
+def _check_report(name: str | None) -> None:
+    """Raise D2RPickError where a report would not be what its name says: it is an HTML page in a file."""
+    if name == "-":
+        raise D2RPickError("-: --report writes a file; give its name")
+    if name is not None and name.lower().endswith(_PRINTED):
+        raise D2RPickError(f"{name}: the report is an HTML page; name it .html, and print it to PDF in a browser")
+
+
+def _meant(name: str) -> str | None:
+    """Give the format that the name of a result promises, where the command has it and none was asked for."""
+    ctx = click.get_current_context()
+    if ctx.get_parameter_source("output_format") is not click.core.ParameterSource.DEFAULT:
+        return None
+    form = next((form for ending, form in _NAMED.items() if name.lower().endswith(ending)), None)
+    (choice,) = [one.type for one in ctx.command.params if one.name == "output_format"]
+    return form if isinstance(choice, click.Choice) and form in choice.choices else None
 
 
 def tell(message: str) -> None:

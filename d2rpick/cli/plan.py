@@ -36,7 +36,7 @@ Examples:
     "--min-rigid",
     type=shared.NOT_NEGATIVE,
     metavar="T",
-    help="Leave shorter windows out.  [default: 5% of the record, and where one behind is more than twice as long]",
+    help="Leave shorter windows out.  [default: 5% of the record; one gives way to a later one twice as long]",
 )
 @click.option(
     "--all",

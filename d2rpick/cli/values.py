@@ -48,7 +48,7 @@ def _without_unit(text: str) -> str:
     from d2rpick.histories.names import in_seconds
 
     value = in_seconds(text)
-    return "" if value is None else f": give it in the unit of the history, without naming that; in s it is {value:g}"
+    return "" if value is None else f": give a number in the unit of the history, {value:g} where it is s"
 
 
 # of d2rpick.histories.opening, which is too heavy to be imported for --help; a test holds them together

@@ -110,9 +110,12 @@ def read_deck(path: str, content: bytes | None = None) -> Deck:
     deck = Deck(path)
     main = SourceFile(path, content)
     if next(main.blocks(), None) is None:
-        found = "only *END was found, no keyword before it" if main.marks else "no keyword was found"
-        wanted = "*KEYWORD and the cards were expected" if main.marks else "an LS-DYNA deck was expected"
-        raise DeckError(f"{path}: {found} (a line that begins with *), {wanted}")
+        if main.marks:
+            found, wanted = "only *END was found, no keyword before it", "*KEYWORD and the cards"
+        else:
+            found = "no keyword was found"
+            wanted = "an LS-DYNA deck (lines that begin with *) or a file of a Radioss run (/BEGIN, /RUN)"
+        raise DeckError(f"{path}: {found}; {wanted} {'were' if main.marks else 'was'} expected")
     _Reader(deck).read(main, _Context(deck.scope))
     return deck
 

@@ -43,10 +43,16 @@ def check_companions(databases: Sequence[Legs]) -> None:
 def check_legs(legs: Sequence[Database]) -> None:
     """Refuse files of one format that are not of one run.
 
-    A restart repeats the state it begins with.  Files that begin at the same time are copies, or of different runs:
-    then all states that they share are compared.
+    All legs of a run hold the same quantities.  A restart repeats the state it begins with.  Files that begin at the
+    same time are copies, or of different runs: then all states that they share are compared.
     """
     for one, other in combinations(legs, 2):
+        here, there = _held(one), _held(other)
+        if here and there and not here & there:
+            raise FormatError(
+                f"{one.source} and {other.source} have neither a column nor a part in common, legs of one run were "
+                "expected; give the files of one run"
+            )
         for times, columns in ((_own_times, _energies), (_part_times, _part_energies)):
             try:
                 shared = _shared(times(one), times(other))
@@ -94,6 +100,11 @@ def coinciding(times: Samples, others: Samples, room: float) -> int:
     behind = np.searchsorted(others, times)
     near = [np.abs(others[np.clip(behind - step, 0, others.size - 1)] - times) for step in (0, 1)]
     return int(np.count_nonzero(np.minimum(*near) <= room))
+
+
+def _held(leg: Database) -> set[str | int]:
+    """Columns and parts of a leg."""
+    return {*leg.channels, *(part.id for part in leg.parts)}
 
 
 def _own_times(leg: Database) -> Samples:

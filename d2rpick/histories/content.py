@@ -149,6 +149,10 @@ class OnDisk(Content):
         self._views.extend((begin, end, _sum(data)))
         return data
 
+    def glance(self, begin: int, end: int) -> bytes:
+        """Bytes from one address to another, of which nothing is remembered: for what will be read again."""
+        return self._near(begin, min(end, self._size)).tobytes()
+
     def fields(self, addresses: Addresses, width: int) -> Bytes:
         """Bytes at many addresses, ``width`` of each, shape (n, width); to be trusted after a `check`."""
         if np.any(addresses[1:] < addresses[:-1]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 # in quotes: numpy.typing costs start-up
 Samples: TypeAlias = "NDArray[np.float64]"
+
+# Nobody means a time in this first share of a record: a number that lies there in another unit was given in this one.
+_NEVER_MEANT: Final = 0.01
 
 
 class Precision(NamedTuple):
@@ -304,9 +307,10 @@ class History:
         span = self.time[-1] - self.time[0]
         if any(self.time[0] <= time <= self.time[-1] for time in times if time) or times[-1] < self.time[-1] + span:
             return ""
+        least = max(float(self.time[0]), 0.0) + _NEVER_MEANT * float(np.ptp(self.time))
         for unit, size in (("ms", 1e-3), ("us", 1e-6)):
             values = [float(f"{time * size:.12g}") for time in times]
-            if values[-1] > 0 and all(self.time[0] <= value <= self.time[-1] for value in values):
+            if least <= values[-1] and all(self.time[0] <= value <= self.time[-1] for value in values):
                 shown = " ".join(f"{value:g}" for value in values)
                 return f"; was it meant in {unit}? Then give `{argument}` {shown}, in the unit of the record"
         return ""

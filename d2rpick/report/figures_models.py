@@ -139,16 +139,15 @@ def draw_rollover(
         grid["roll"].plot(time, np.degrees(record.roll), **drawn)
         grid["height"].plot(time, record.centre.imag, **drawn)
     if switched:
-        name = "switched less without"
         off = np.degrees(switched.roll - reference.roll)
-        grid["roll difference"].plot(time, off, color=REFERENCE, linewidth=1, label=name)
+        grid["roll difference"].plot(time, off, color=SWITCHED, linewidth=1)
         off = 1e3 * (switched.centre - reference.centre).imag
-        grid["height difference"].plot(time, off, color=REFERENCE, linewidth=1, label=name)
+        grid["height difference"].plot(time, off, color=SWITCHED, linewidth=1)
     units = {
         "roll": "roll [degrees]",
-        "roll difference": "[degrees]",
-        "height": "centre [m]",
-        "height difference": "[mm]",
+        "roll difference": "roll off by [degrees]",
+        "height": "height [m]",
+        "height difference": "height off by [mm]",
     }
     for row in rows:
         grid[row].set_ylabel(units[row])

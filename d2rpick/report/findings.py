@@ -54,6 +54,8 @@ def as_table(checks: Checks) -> str:
         lines.append(_shown(result.deck, root))
         if not result.cards:
             lines.append("  no switching cards")
+        elif not result.windows and not result.findings:
+            lines.append("  switching cards that switch nothing")
         lines += [f"  {line}" for line in _window_lines(result.windows, root)]
         lines += [
             f"  {_shown(f.file, root)}:{f.line}:{f.column}: {f.severity} {f.rule} {f.message}" for f in result.findings

@@ -117,8 +117,8 @@ def resource(name: str) -> Markup:
 def table(title: str, head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None) -> Markup:
     """Give a table in a box that scrolls sideways where it is too wide; the row ``marked`` stands out.
 
-    Columns of numbers, and of what is not known, are set to the right.  ``title`` is what the box is called when it is
-    reached by keyboard.
+    Columns of numbers, and of what is not known, are set to the right.  Lines break at blanks alone, never within a
+    number.  ``title`` is what the box is called when it is reached by keyboard.
     """
     body = [list(row) for row in rows]
     right = [all(row[i] is None or isinstance(row[i], (int, float)) for row in body) for i in range(len(head))]
@@ -127,7 +127,7 @@ def table(title: str, head: Sequence[str], rows: Iterable[Sequence[Cell]], marke
     lines = [
         tag(
             "tr",
-            *(tag("td", _text(cell), **own) for cell, own in zip(row, classes, strict=True)),
+            *(_cell(_text(cell), own) for cell, own in zip(row, classes, strict=True)),
             **({"class_": "marked"} if i == marked else {}),
         )
         for i, row in enumerate(body)
@@ -135,6 +135,10 @@ def table(title: str, head: Sequence[str], rows: Iterable[Sequence[Cell]], marke
     content = tag("table", tag("thead", tag("tr", *top)), tag("tbody", *lines))
     box = tag("div", content, class_="scroll", role="region", aria_label=title, tabindex="0")
     return join([tag("p", _HINT, class_="hint"), box]) if len(head) > _FIT else box
+
+
+def _cell(text: str, own: Mapping[str, str]) -> Markup:
+    return tag("td", text, **(own or ({"class_": "words"} if " " in text else {})))
 
 
 def pairs(rows: Iterable[tuple[str, str]]) -> Markup:

@@ -40,6 +40,6 @@ def _card(best: PartSet | None) -> Markup:
     if best is None:
         nothing = tag("p", "No set of parts can be recommended.")
         return tag("div", tag("h2", "Nothing recommended"), nothing, class_="card refused")
-    saved = tag("span", tag("i", "saved"), f"{best.saving:.0%}")
+    saved = tag("span", tag("i", "saves about"), f"{best.saving:.0%}", tag("i", " of the run time"))
     listed = tag("p", f"parts {ranges(best.parts)}")
     return tag("div", tag("h2", best.name), tag("div", saved, class_="times"), listed, class_="card chosen")

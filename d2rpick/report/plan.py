@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from d2rpick.choice.plan import Plan, Planned
 
 SCHEMA = "d2rpick/plan/1"
-HEAD = ("", "flight", "from", "to", "margin", "tr", "td", "rigid", "of record", "run time", "quality", "status")
+HEAD = (
+    "", "flight", "from", "to", "margin", "tr", "td", "rigid", "of record", "run time", "error", "out of place",
+    "quality", "status",
+)  # fmt: skip
 
 # Keys of a window in JSON, and columns of the csv.
 WINDOW = (
@@ -121,10 +124,11 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     if plan.run_time_share is not None:
         lines.append(("run time", f"about {plan.run_time_share:.0%} of the reference's"))
     lines += [(f"flight {row.number}", given_up(row)) for row in supported if row.answer and row.answer.longer]
-    lines += [(f"flight {row.number}", row.quality.told) for row in plan.rows if row.quality and _is_poor(row)]
+    graded = [(f"flight {row.number}", row.quality) for row in supported if row.quality]
+    lines += [(name, quality.told) for name, quality in graded if quality.grade == "poor"]
     if any(row.candidate and row.candidate.position_error_assumes for row in plan.rows):
         told = "; `deck` tells which do" if plan.settings.bodies is None else ""
-        lines.append(("off by", f"holds if the parts become one rigid body{told}"))
+        lines.append(("place", f"out of place as listed if the parts become one rigid body{told}"))
     if waiting or plan.done:
         what = "with those that are done and these" if plan.done else "with these windows"
         after = ", and plan the others from that run (--done)" if waiting else ""
@@ -143,8 +147,10 @@ def given_up(row: Planned) -> str:
 
 
 def head(plan: Plan) -> list[str]:
-    """Columns of the table; of the run time only where the cost of the parts is known."""
-    return [name for name in HEAD if name != "run time" or plan.settings.cost_share is not None]
+    """Columns of the table; run time and place only where they are known."""
+    unknown = {"run time"} if plan.settings.cost_share is None else set()
+    unknown |= set() if _placed(plan) else {"out of place"}
+    return [name for name in HEAD if name not in unknown]
 
 
 def rows(plan: Plan) -> list[list[tables.Cell]]:
@@ -162,31 +168,40 @@ def rows(plan: Plan) -> list[list[tables.Cell]]:
             row.rigid_time,
             None if row.rigid_time is None else f"{row.rigid_time / span:.0%}",
             *([] if plan.settings.cost_share is None else [_run_time(row)]),
-            quality(row),
+            error(row),
+            *([_place(row)] if _placed(plan) else []),
+            row.quality.grade if row.quality else None,
             row.status,
         ]
         for row in plan.rows
     ]
 
 
-def _run_time(row: Planned) -> str | None:
-    """Run time with this window alone."""
-    share = row.candidate.run_time_share if row.candidate else None
-    return None if share is None else f"{share:.0%}"
-
-
-def quality(row: Planned) -> str | None:
+def error(row: Planned) -> str | None:
     """How well the pair of a window matches, in a word or two."""
     best = row.candidate
     if best is None:
         return None
     if best.kind == "start":
         return "nothing vibrates"
-    name, error = ("level error", best.level_error) if best.residual is None else ("residual", best.residual)
-    off = "" if best.position_error is None else f", off by {best.position_error:.2g}"
-    assumed = " if one body" if best.position_error_assumes else ""
-    return f"{'poor: ' * _is_poor(row)}{name} {tables.measure(error)}{off}{assumed}"
+    name, off = ("level error", best.level_error) if best.residual is None else ("residual", best.residual)
+    return f"{name} {tables.measure(off)}"
 
 
-def _is_poor(row: Planned) -> bool:
-    return row.quality is not None and row.quality.grade == "poor"
+def _placed(plan: Plan) -> bool:
+    """Whether it is known of any window how far a rigid body is out of place."""
+    return any(row.candidate and row.candidate.position_error is not None for row in plan.rows)
+
+
+def _place(row: Planned) -> str | None:
+    """How far a rigid body is out of place at td [length]."""
+    best = row.candidate
+    if best is None or best.position_error is None:
+        return None
+    return f"{best.position_error:.2g}{' if one body' if best.position_error_assumes else ''}"
+
+
+def _run_time(row: Planned) -> str | None:
+    """Run time with this window alone."""
+    share = row.candidate.run_time_share if row.candidate else None
+    return None if share is None else f"{share:.0%}"

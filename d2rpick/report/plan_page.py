@@ -9,7 +9,7 @@ from d2rpick.report.explorer import explorer
 from d2rpick.report.figures_page import svg_element
 from d2rpick.report.figures_plan import draw_plan
 from d2rpick.report.html import Markup, drawings, pairs, remarks, resource, section, table, tag
-from d2rpick.report.plan import head, heading, outlook, quality, rows
+from d2rpick.report.plan import error, head, heading, outlook, rows
 from d2rpick.report.shell import shell_line
 
 if TYPE_CHECKING:
@@ -65,5 +65,12 @@ def _sections(
 
 def _window(row: Planned, plan: Plan) -> Markup:
     assert row.window is not None
-    told = tag("p", f"{quality(row)}; {page.rigid_for(row.window, plan.history)}")
+    assert row.quality is not None
+    told = pairs(
+        [
+            ("saves", page.rigid_for(row.window, plan.history)),
+            ("quality", row.quality.told),
+            ("error", error(row) or "-"),
+        ]
+    )
     return page.pair(f"Flight {row.number}", row.window, told, plan.history, "card chosen")

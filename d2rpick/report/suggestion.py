@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from d2rpick.choice.candidates import MUCH_HIGHER
 from d2rpick.errors import name_units, printable
+from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
 from d2rpick.report.situation import frame, heading, mechanics
 
@@ -130,7 +132,10 @@ def _kept(answer: Suggestion, best: Candidate) -> str:
     if answer.situation.at_rest:
         return "everything: nothing vibrates in the flight up to td"
     if share is not None and best.residual is not None:
-        return f"{1 - share:.0%} of the vibration energy; the vibration after td is off by {best.residual:.1%}"
+        high = best.residual_high
+        hidden = high is not None and high > best.residual + MUCH_HIGHER
+        more = f", up to {high:.0%} if the record hides a further mode" if hidden else ""
+        return f"{1 - share:.0%} of the vibration energy; the vibration after td is off by {best.residual:.1%}{more}"
     if expected and expected.ratio is not None:
         least = f", {expected.ratio_low:.0%} at worst" if expected.ratio_low is not None else ""
         return f"about {expected.ratio:.0%} of the energy that the reference has after td{least}"
@@ -187,9 +192,11 @@ def given_up(longer: Pair, chosen: Pair) -> str:
 
 def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
     """The windows of acceptable tr: the one with the recommended tr, the longest others, and what they share."""
-    named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[:_NAMED]
     share = sum(one.share for one in windows)
-    shown = [f"{w.start:.6g} to {w.end:.6g} ({w.share:.1%}{', recommended' * holds(w, tr)})" for w in named]
+    if len(windows) == 1:
+        return f"every tr from {window_as_read(*windows[0][:2])}, {share:.0%} of the flight up to td"
+    named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[:_NAMED]
+    shown = [f"{window_as_read(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})" for w in named]
     more = f" and {len(windows) - len(named)} shorter windows" if len(windows) > len(named) else ""
     return f"every tr from {'; '.join(shown)}{more}; in all {share:.0%} of the flight up to td"
 

@@ -36,7 +36,8 @@ def as_page(found: TradeOff, record: page.PageContext) -> str:
 
 def _sections(found: TradeOff, record: page.PageContext) -> Iterator[Markup]:
     yield suggestion_page.choice(found.suggestion)
-    yield tag("section", tag("p", answer(found)), remarks(found.cautions))
+    further = [one for one in found.cautions if one not in found.suggestion.cautions]
+    yield tag("section", tag("p", answer(found)), remarks(further))
     if record.explorer:
         yield explorer(record.explorer)
     yield drawings(record.figures)

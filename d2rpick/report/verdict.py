@@ -78,9 +78,9 @@ def _told(answer: Verdict) -> str:
 def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
     """Rows of numbers that both runs have, below ``COMPARED``."""
     return [
-        ("energy locked in, at td", switched.energy_frozen, switched.energy_td),
-        ("mean after td", switched.mean_after, switched.mean_after_reference),
-        ("spread after td", switched.spread_after, switched.spread_after_reference),
+        ("energy right after td", switched.energy_frozen, switched.energy_td),
+        ("mean energy after td", switched.mean_after, switched.mean_after_reference),
+        ("standard deviation after td", switched.spread_after, switched.spread_after_reference),
     ]
 
 
@@ -95,7 +95,7 @@ def deviations(switched: Comparison) -> list[tuple[str, str]]:
 def _comparison(switched: Comparison) -> list[str]:
     """Lines that hold the switched run against the reference."""
     return [
-        f"switched run  {printable(', '.join(switched.source))}; after td means to {switched.end:.6g}",
+        f"switched run  {printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
         tables.as_text(COMPARED, comparison(switched)),
         *(f"{name.ljust(38)}  {text}" for name, text in deviations(switched)),
         *(f"note: {printable(note)}" for note in switched.notes),

@@ -71,6 +71,6 @@ def _measures(answer: Verdict) -> Iterator[tuple[str, str]]:
 def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
     """Show what the finished switched run has of the reference."""
     title = "The switched run"
-    listed = [("after td", f"means to {found.end:.6g}"), *deviations(found), *page.digests(files)]
+    listed = [("compared", f"from td to {found.end:.6g}"), *deviations(found), *page.digests(files)]
     listed += [("note", note) for note in found.notes]
     return section(title, table(title, ("quantity", *COMPARED[1:]), comparison(found)), pairs(listed))

@@ -248,7 +248,8 @@ class _Record(NamedTuple):
 def _lacking(time: Samples, energy: Samples) -> str | None:
     """Say what a record lacks for any judgement."""
     if time.size < MIN_SAMPLES:
-        return f"the record has {time.size} samples, fewer than the {MIN_SAMPLES} a fit needs"
+        found = "1 state" if time.size == 1 else f"{time.size} states"
+        return f"there are only {found} to fit, at least {MIN_SAMPLES} are needed"
     if float(np.ptp(energy)) <= 1e-12 * float(np.max(np.abs(energy))):  # the rounding of a constant
         return f"the energy is constant, {energy[0]:g}: nothing vibrates"
     return None
@@ -315,8 +316,7 @@ def _judged(
 def _loose(name: str, misfit: float, structure: float, local_structure: float) -> str | None:
     """Say how the fit fails to follow the samples."""
     if misfit > MAX_MISFIT:
-        fitted = max(0.0, 1 - misfit)
-        return f"{name} fits only {fitted:.0%} of the variation of the energy, less than {1 - MAX_MISFIT:.0%}"
+        return f"{name} misses the energy by {misfit:.0%} of its standard deviation, more than {MAX_MISFIT:.0%}"
     if structure > MAX_STRUCTURE:
         return (
             f"{name} deviates systematically by {structure:.2g} of the standard deviation of the energy, "

@@ -9,12 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.choice.of_run import read
 from d2rpick.choice.quality import GRADES, Quality, quality_of, states_per_period
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
+from d2rpick.report.suggestion import as_table
 from tests.records import ENERGY, TIME, vibration
+from tests.shared import shared
 
 RECORD = History(TIME, ENERGY, ("paper",), "made", "E")
 
@@ -121,6 +124,35 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     guessed = replace(found.situation, flight=found.situation.flight._replace(source="energy"))
     assert guessed.at_rest
     assert quality_of(guessed, found.chosen, None) == Quality("fair", ("the flight is not certain",))
+
+
+def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
+    """Late in a damped record the level is so low that the misfit of the oscillator moves the crossing by much."""
+    history = read([str(shared("openradioss/oscillator_referenceT01.gz"))]).history
+    early, late = (suggest(history, td, Settings()) for td in (0.068753, 0.144191))
+    for answer, wanted in ((early, "good"), (late, "fair")):
+        best, quality = answer.chosen, answer.quality
+        assert best is not None
+        assert quality is not None
+        assert best.tr_high is not None
+        assert best.timing_tolerance is not None
+        assert best.residual == pytest.approx(0, abs=1e-3)
+        assert quality.grade == wanted
+        assert (best.tr_high - best.tr > 4 * best.timing_tolerance) is (wanted == "fair")
+        verdict = verify(history, best.tr, answer.situation.td, Settings()).quality
+        assert verdict == quality
+    assert "further mode" not in as_table(early, 1)
+    assert "up to 46% if the record hides a further mode" in as_table(late, 1)
+
+
+def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
+    """A structure that rings in many modes is quiet for moments; free flight excites nothing anew."""
+    time = np.linspace(0, 1, 201)
+    energy = np.where(time < 0.2, 50 * time, 10.0) + 1.5 * (time > 0.5) * np.sin(200 * time) ** 2
+    quiet = suggest(History(time, energy, ("made",), "made", "E"), 0.4, Settings(after=0.25)).situation
+    assert quiet.at_rest  # of what comes after td nothing is known
+    assert not replace(quiet, flight=quiet.flight._replace(end=0.9)).at_rest
+    assert replace(quiet, flight=quiet.flight._replace(end=0.5)).at_rest
 
 
 def test_between_few_states_nothing_is_called_at_rest() -> None:

@@ -134,3 +134,12 @@ def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
     found = explore_of(reference(history), asked, (0.27, 1.0), td=0.37, steps=4)
     assert found.situation.flight == alone
     assert explore_of(reference(history), asked, (0.27, 1.0), steps=4).situation.flight != alone
+
+
+def test_the_basis_is_that_of_the_recommended_pair() -> None:
+    """The first td of the flight has a single state before it, which is no reason why a basis is refused."""
+    reference = read(["sample_data/rollover_box.matsum"], Selection(parts=("box",)))
+    found = explore_of(reference, Settings(), steps=20)
+    refused = [[one for one in of.cautions if one.code == "energy-only"] for of in (found, found.suggestion)]
+    assert refused[0] == refused[1]
+    assert len(refused[0]) == 1

@@ -252,7 +252,9 @@ def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(tmp_pa
     file = tmp_path / "input"
     file.write_bytes(table(lambda t: t * t))
     for command in ("suggest", "explore"):
-        assert "nothing in the record shows a flight; name td, or a window for it" in refused(command, str(file))
+        assert "shows a flight, in which td could be chosen; give --td, and the end of the load as --after" in refused(
+            command, str(file)
+        )
     assert run("plan", str(file)).exit_code == 1
 
 

@@ -472,3 +472,11 @@ def test_the_history_is_named_relative_to_the_working_folder(tmp_path: Path) -> 
     Path("energy.csv").write_bytes(Path(ENERGY).read_bytes())
     found = answer("check", DECK, "--history", str(tmp_path / "energy.csv"))
     assert found["history"] == ["energy.csv"]
+
+
+def test_an_energy_of_several_parts_is_not_called_that_of_one(tmp_path: Path) -> None:
+    deck = tmp_path / "main.k"
+    run("card", "--tr", "0.12", "--td", "0.37", "--part", "1,2", "-o", str(deck))
+    lines = run("check", str(deck), "--history", BOX, "--tolerance", "0.001").stdout.splitlines()
+    (found,) = [line for line in lines if "D2R201" in line]
+    assert "the energy of the 2 parts that are switched together is" in found

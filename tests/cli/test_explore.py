@@ -130,11 +130,11 @@ def test_nothing_to_recommend_is_an_objection() -> None:
 def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(tmp_path: Path) -> None:
     ramp = tmp_path / "ramp.csv"
     ramp.write_text("time,internal_energy\n" + "".join(f"{i / 100},{i * i}\n" for i in range(101)))
-    assert "name td" in run("explore", str(ramp)).stderr
+    assert "give --td, and" in run("explore", str(ramp)).stderr
     asked = run("suggest", "--td", "0.5", str(ramp))
     result = run("explore", "--td", "0.5", "--steps", "4", "-f", "json", str(ramp))
     assert (asked.exit_code, result.exit_code) == (1, 1)
-    assert "name td" not in result.stderr
+    assert "give --td" not in result.stderr
     assert "no-candidate" in result.stderr
     found = json.loads(result.stdout)
     assert found["td_window"] == [0.0, 1.0]  # no flight is seen, so that all of the record is explored

@@ -187,6 +187,19 @@ def test_two_runs_are_not_legs_of_one(tmp_path: Path) -> None:
             assert result.exit_code == (0 if legs else 2)
 
 
+def test_tables_of_different_quantities_are_not_legs_of_one(tmp_path: Path) -> None:
+    """Of no common column no state would be left, as if the run had written none."""
+    for name, head in (("one", "time,internal_energy"), ("other", "time,force"), ("leg", "time,internal_energy")):
+        start = 4 if name == "leg" else 0
+        rows = [f"{start + i},{i + 1}" for i in range(4)]
+        (tmp_path / f"{name}.csv").write_text("\n".join([head, *rows, ""]))
+    one, other, leg = (str(tmp_path / f"{name}.csv") for name in ("one", "other", "leg"))
+    result = run("info", one, other)
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert "neither a column nor a part in common" in result.stderr
+    assert run("info", one, leg).exit_code == 0
+
+
 @pytest.mark.parametrize("name", ["binout_signalling_nan_warning", "t01_signalling_nan_warning", "int_limit_matsum"])
 def test_odd_numbers_reach_no_warning_of_the_machine(name: str) -> None:
     result = run("info", str(shared(f"faults/{name}")))

@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick import __version__
-from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.command import DECK, ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
 from tests.json_schemas import check_by_schema
 
 SUGGEST = ("suggest", "--td", "0.064")
@@ -314,3 +314,23 @@ def test_no_recommendation_leaves_no_older_one_in_the_file(tmp_path: Path) -> No
     file.write_text("0.0128853\n")
     result = run(*NOTHING, "-f", "value", "-o", str(file), "--overwrite")
     assert (result.exit_code, file.read_text()) == (1, "")
+
+
+def test_a_name_that_promises_another_format_is_told(tmp_path: Path) -> None:
+    told = "-f json writes what its name promises"
+    name = str(tmp_path / "answer.json")
+    result = run("suggest", "--td", "0.0687534", "-o", name, ENERGY)
+    assert (result.exit_code, result.stderr.count(told)) == (0, 1)
+    for asked in (("-f", "json"), ("-f", "table"), ("-q",)):
+        result = run("suggest", "--td", "0.0687534", "--overwrite", *asked, "-o", name, ENERGY)
+        assert (result.exit_code, result.stderr) == (0, "")
+    assert run("check", "-o", str(tmp_path / "found.csv"), DECK).stderr == ""  # which has no csv
+    assert run("replay", *OSCILLATOR, "--t-end", "0.1", "--dt", "0.01", "-o", str(tmp_path / "run.csv")).stderr == ""
+
+
+def test_a_report_is_not_named_what_it_is_not(tmp_path: Path) -> None:
+    name = tmp_path / "report.PDF"
+    result = run("suggest", "--td", "0.064", "--report", str(name), ENERGY)
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert "the report is an HTML page" in result.stderr
+    assert not name.exists()

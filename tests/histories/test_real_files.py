@@ -88,7 +88,7 @@ READABLE = {
     ),
     "OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01": Readable(
         "internal_energy", 801, ((0.0, 0.0), (4.0005, 216242.9), (8.001, 350376.8)),
-        ("no variables of parts 2 in the file",),
+        ("no variables of part 2 in the file",),
     ),
     "OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01.csv": Readable(
         "INTERNAL ENERGY", 801, ((0.0, 0.0), (4.0005, 216242.9), (8.001, 350376.8)),
@@ -138,14 +138,14 @@ READABLE = {
     ),
     "OpenRadioss__miniqa-RUPTURE-FAIL_TAB-ELEM_SAMP-reference-1ELEM_SAMPT01": Readable(
         "internal_energy", 258, ((0.0, 0.0), (1.290304, 15.86773), (2.596601, 28.01545)),
-        ("no variables of parts 1 in the file",),
+        ("no variables of part 1 in the file",),
     ),
     "OpenRadioss__miniqa-RUPTURE-FAIL_TAB-ELEM_SAMP-reference-1ELEM_SAMPT01.csv": Readable(
         "INTERNAL ENERGY", 258, ((0.0, 0.0), (1.290304, 15.86773), (2.596601, 28.01545)),
     ),
     "OpenRadioss__miniqa-SPH-WavesCompression-reference-CUBCT01": Readable(
         "internal_energy", 45, ((0.0, 0.004994001), (14.94388, 0.2808917), (29.52089, 0.3925156)),
-        ("no variables of parts 1 in the file",),
+        ("no variables of part 1 in the file",),
     ),
     "OpenRadioss__miniqa-SPH-WavesCompression-reference-CUBCT01.csv": Readable(
         "INTERNAL ENERGY", 45, ((0.0, 0.004994001), (14.94388, 0.2808917), (29.52089, 0.3925156)),

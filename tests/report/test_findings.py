@@ -17,6 +17,7 @@ from d2rpick.rules import RULES, Checked, Finding, Severity, check_deck
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, automatic
 from tests.decks import write
 from tests.json_schemas import check_by_schema
+from tests.shared import shared
 
 SCHEMAS = Path(__file__).parents[1] / "schemas"
 BAD = HEAD + PARTS + automatic(1, "0.02", rigid=["1", "2"]) + automatic(2, "0.5", deformable=["1"]) + END
@@ -35,6 +36,12 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
     assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
     assert any(line.startswith("  main.k:23:28: error D2R101 TIME1 is 0.5") for line in lines)
     assert lines[-1] == "1 error, 0 warnings, 1 info in 2 decks"
+
+
+def test_a_card_without_a_window_is_not_passed_over() -> None:
+    deck = shared("real/radioss-decks/BLOCK_0000.rad")  # /RBODY/ON without a main node
+    lines = report.as_table(report.Checks([check_deck(str(deck))], deck.parent)).split("\n")
+    assert lines[:2] == ["BLOCK_0000.rad", "  switching cards that switch nothing"]
 
 
 def test_json(results: list[Checked], tmp_path: Path) -> None:

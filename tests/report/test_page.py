@@ -299,7 +299,7 @@ def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> No
     )
     for name in (reference, *legs):
         assert f"{name}: {hashlib.sha256(Path(name).read_bytes()).hexdigest()}" in page.text
-    for text in ("The switched run", "mean after td", "hourglass energy of box", "The window is 0.1 to 0.37"):
+    for text in ("The switched run", "mean energy after td", "hourglass energy of box", "The window is 0.1 to 0.37"):
         assert text in page.text
 
 

@@ -173,18 +173,18 @@ RAMP = np.linspace(0.0, 1.0, 201)
 @pytest.mark.parametrize(
     ("energy", "reason"),
     [
-        (RAMP[:23], "23 samples, fewer than the 24"),
+        (RAMP[:23], "only 23 states to fit, at least 24"),
         (np.full(201, 3.3), "constant, 3.3"),
         (np.zeros(201), "constant, 0"),
         (np.where(np.arange(201) % 2, 1.0, -1.0), "does not oscillate"),
         (RAMP, "vibration periods, fewer than"),
         ((RAMP * np.exp(-5 * RAMP)) ** 2, "vibration periods, fewer than"),  # critically damped
         ((np.exp(-3 * RAMP) - np.exp(-9 * RAMP)) ** 2, "deviates systematically"),  # overdamped
-        (np.sin(20 * RAMP) ** 2 + np.sin(31 * RAMP) ** 2, "less than 60%"),
+        (np.sin(20 * RAMP) ** 2 + np.sin(31 * RAMP) ** 2, "more than 40%"),
         (np.sin(20 * RAMP) ** 2 + 0.2 * np.sin(31 * RAMP) ** 2, "deviates systematically"),
         (np.exp(2 * RAMP) * np.sin(20 * RAMP) ** 2, "grows"),
         (np.sin(20 * RAMP) ** 2 - 805, "plastic energy would be -8.1e+02"),
-        (np.random.default_rng(0).standard_normal(201), "less than 60%"),
+        (np.random.default_rng(0).standard_normal(201), "more than 40%"),
     ],
 )
 def test_what_no_oscillator_describes_is_refused_with_the_reason(energy: Samples, reason: str) -> None:
@@ -235,7 +235,7 @@ def test_oscillators_of_a_real_solver(name: str, omega: float, alpha: float) -> 
 @pytest.mark.parametrize(("name", "end_of_load"), [("load_L1_ref.csv", 0.0197), ("load_L3_ref.csv", 0.0235)])
 def test_a_real_load_is_refused_and_the_flight_after_it_accepted(name: str, end_of_load: float) -> None:
     time, energy = columns(f"openradioss/{name}", "IE_J")
-    assert refused(time, energy).startswith("one oscillator ")
+    assert "more than" in refused(time, energy)
     flight = time >= end_of_load
     assert accepted(time[flight], energy[flight])[0].misfit == pytest.approx(0.0, abs=1e-3)
 
@@ -243,12 +243,12 @@ def test_a_real_load_is_refused_and_the_flight_after_it_accepted(name: str, end_
 def test_a_real_rollover_is_refused() -> None:
     time, energy = columns("openradioss/rollover_ref.csv", "boxIE_J")
     flight = (time >= 0.09) & (time <= 0.37)
-    assert "fits only 29% of the variation of the energy, less than 60%" in refused(time[flight], energy[flight])
+    assert "misses the energy by 71%" in refused(time[flight], energy[flight])
 
 
 @pytest.mark.parametrize("channel", ["IE_total_J", "IE_spring1_J", "IE_spring2_J"])
 def test_a_real_chain_of_two_modes_is_refused(channel: str) -> None:
-    assert "fits only" in refused(*columns("openradioss/chain_ref.csv", channel))
+    assert "more than" in refused(*columns("openradioss/chain_ref.csv", channel))
 
 
 def test_a_parameter_that_changes_next_to_nothing_leaves_no_overflow() -> None:

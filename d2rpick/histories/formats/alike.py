@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.content import Content
+    from d2rpick.histories.formats.ahead import Ahead
 
     Bytes = NDArray[np.uint8]
 
@@ -26,7 +27,9 @@ class Stretch(NamedTuple):
     example: int
 
 
-def like_example(data: Content, run: Stretch, offset: int, literal: Bytes, varied: Bytes | None = None) -> int:
+def like_example(
+    data: Content, run: Stretch, offset: int, literal: Bytes, varied: Bytes | None = None, ahead: Ahead | None = None
+) -> int:
     """Count the blocks of ``run`` that have, from ``offset`` on, the literal bytes of its example.
 
     Parameters
@@ -39,6 +42,8 @@ def like_example(data: Content, run: Stretch, offset: int, literal: Bytes, varie
         255 for the bytes that must be those of the example, 0 for the others.
     varied : array of shape (size,), optional
         Gets the bits in which a byte of any counted block differs from the example.
+    ahead : Ahead, optional
+        Takes numbers from the counted blocks, with ``offset`` 0.
 
     Examples
     --------
@@ -61,6 +66,8 @@ def like_example(data: Content, run: Stretch, offset: int, literal: Bytes, varie
             step = int(((rows ^ example) & literal).any(axis=1).argmax())
         if varied is not None and step:
             varied |= differing if alike else _differing(rows[:step], example)
+        if ahead is not None and step:
+            ahead.take(rows[:step], differing)
         done += step
         if not alike:
             break

@@ -10,69 +10,31 @@ are the same in all blocks, as those of a part at rest: they are fetched once.
 from __future__ import annotations
 
 from array import array
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.content import Content, content_of
+from d2rpick.histories.formats.ahead import BATCH, Ahead
 from d2rpick.histories.formats.alike import CHUNK, Stretch, like_example
 from d2rpick.histories.formats.fortran import decode
+from d2rpick.histories.formats.grammar import UNSURE
 
 if TYPE_CHECKING:
-    import re
-    from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+    from collections.abc import Hashable, Iterator, Mapping, Sequence
 
+    from d2rpick.histories.formats.grammar import BlockLayout, Grammar
     from d2rpick.histories.history import Samples
 Bytes = NDArray[np.uint8]
 Addresses = NDArray[np.int64]
 
-UNSURE: Final = -1  # in place of an offset: the field is cut, or stands in the block twice
-
-_BATCH: Final = 1 << 14  # numbers converted at a time: they stay in the cache
 _RECENT: Final = 4  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
 _NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
-_OVERLONG: Final = 512  # bytes of a line that no solver writes
 _MANY: Final = 64  # of so many blocks it is remembered what differs between them, a small share of the file
-
-
-@dataclass(frozen=True, eq=False)
-class BlockLayout:
-    """Where in a block what stands.
-
-    ``fields`` maps the name of a number to its offset in the block, or to UNSURE.  ``literal`` is 255 for the
-    bytes that all blocks of this layout share, line ends among them, and 0 for the others; its shape is that
-    of the block.  No line of a block can be hidden between literal bytes.
-    ``last`` names the number the block ends with.  ``broken_off`` is True when the head of another run
-    follows in place of the next block.
-    """
-
-    fields: Mapping[Any, int]
-    literal: Bytes
-    last: Hashable
-    broken_off: bool
-
-
-@dataclass(frozen=True)
-class Grammar:
-    """What the engine has to know about a database.
-
-    ``start`` is the text a block's first line begins with, ``describe`` takes a block apart, ``whole`` tells
-    whether a block that stands alone in its file is known to be whole.  The numbers have ``width`` columns
-    and ``decimals`` places.  ``compare_all`` compares every block in full when the file is opened; otherwise,
-    where all blocks have one size, only their first lines, and the rest when it is read.
-    """
-
-    start: bytes
-    describe: Callable[[bytes], BlockLayout]
-    whole: Callable[[BlockLayout], bool]
-    width: int
-    decimals: int
-    compare_all: bool
 
 
 class Blocks:
@@ -88,6 +50,8 @@ class Blocks:
         Address behind the head.
     grammar : Grammar
         What a block looks like.
+    ahead : sequence of names, optional
+        Numbers that will be asked for first, together: they are taken while all blocks are compared.
 
     Attributes
     ----------
@@ -103,7 +67,9 @@ class Blocks:
         The last block, when the file ends within it: it is no state unless ``admit_rest`` makes it one.
     """
 
-    def __init__(self, data: bytes | Content, source: str, begin: int, grammar: Grammar) -> None:
+    def __init__(
+        self, data: bytes | Content, source: str, begin: int, grammar: Grammar, ahead: Sequence[Hashable] = ()
+    ) -> None:
         self.source = source
         self._data = content_of(data)
         self._grammar = grammar
@@ -115,6 +81,8 @@ class Blocks:
         self._compared = grammar.compare_all
         self._trusted = False  # whether a part of each block was compared for numbers that were asked for
         self._varied: dict[int, Bytes] = {}  # by the start of a run of many blocks: 0 for the bytes that they share
+        self._asked_ahead = tuple(ahead)
+        self._ahead: dict[int, Samples] = {}  # by the start of such a run: the numbers taken of its blocks
         self.states, self.complete = 0, True
         self.notes: tuple[str, ...] = ()
         self.rest: Stretch | None = None
@@ -138,8 +106,10 @@ class Blocks:
             If a state lacks one of the numbers, has it twice, or has something else in its place.
         """
         if anchors and not self._compared and (self._trusted or not self._alike(names, anchors)):
-            self._compare_in_full()  # who asks again will go on asking: one comparison is for all
+            self._compare_in_full(names)  # who asks again will go on asking: one comparison is for all
         self._trusted = self._trusted or bool(anchors)
+        if self._ahead and tuple(names) == self._asked_ahead:
+            return self._table(names, self._taken())
         moving = self._moving(names)
         if 2 * np.count_nonzero(moving) > moving.size:
             return self._table(names)
@@ -179,13 +149,11 @@ class Blocks:
         """Replace the addresses in ``values`` by the numbers that stand there."""
         grammar = self._grammar
         addresses = values.view(np.int64)
-        if not values.size:
-            return
-        for at in range(0, values.size, _BATCH):
-            where = addresses[at : at + _BATCH].copy()
+        for at in range(0, values.size, BATCH):
+            where = addresses[at : at + BATCH].copy()
             fields = self._data.fields(where, grammar.width).view(f"S{grammar.width}").ravel()
             found = decode(fields, grammar.decimals)
-            values[at : at + _BATCH] = found
+            values[at : at + BATCH] = found
             if np.isnan(found).any():
                 self._data.check()
                 bad = int(np.argmax(np.isnan(found)))
@@ -211,16 +179,27 @@ class Blocks:
             moving |= before[offsets + self._grammar.width] > before[offsets]
         return moving
 
-    def _table(self, names: Sequence[Hashable]) -> Samples:
-        """Fetch numbers of all states one by one, shape (states, len(names))."""
-        values = np.empty((self.states, len(names)))
+    def _taken(self) -> dict[int, Samples]:
+        """Hand out the numbers taken ahead, by the start of their run; none of a run where one is no number."""
+        found, self._ahead = self._ahead, {}  # who asks again has them
+        return {start: values for start, values in found.items() if not np.isnan(values).any()}
+
+    def _table(self, names: Sequence[Hashable], taken: Mapping[int, Samples] | None = None) -> Samples:
+        """Numbers of all states, shape (states, len(names)): of some runs they are known, the others are fetched."""
+        values, left = np.empty((self.states, len(names))), np.ones(self.states, bool)
         addresses = values.view(np.int64)  # each address gives way to the number found there
         row = 0
         for run in self:
-            starts = run.start + run.stride * np.arange(run.repeats)
-            np.add(starts[:, None], self._offsets(run, names), out=addresses[row : row + run.repeats])
-            row += run.repeats
-        self._fetch(values.reshape(-1), names)
+            rows = slice(row, row := row + run.repeats)
+            if taken and run.start in taken:
+                values[rows], left[rows] = taken[run.start][: run.repeats], False
+            else:
+                starts = run.start + run.stride * np.arange(run.repeats)
+                np.add(starts[:, None], self._offsets(run, names), out=addresses[rows])
+        fetched = values if left.all() else values[left]
+        self._fetch(fetched.reshape(-1), names)
+        if fetched is not values:
+            values[left] = fetched
         return values
 
     def _offsets(self, run: Stretch, names: Sequence[Hashable]) -> Addresses:
@@ -237,7 +216,7 @@ class Blocks:
 
     def _walk(self) -> None:
         """Find all runs of blocks, leaving out blocks that are not whole."""
-        self._runs, self._varied = array("q"), {}
+        self._runs, self._varied, self._ahead = array("q"), {}, {}
         self.notes = ()
         self.complete = not self._data[self._end : self._end + 4096].strip()
         self.states, self.tail, self.rest = 0, self._begin, None
@@ -280,7 +259,8 @@ class Blocks:
         """Take the block apart: the same for a layout not met before."""
         following = self._find(position + 1)
         if following is None:
-            return position, self._end - position, 1
+            last = Stretch(position, self._end - position, 1, position)
+            return self._repeated(last, recent), last.stride, 1
         stride = following - position
         if self.layout(position, stride).broken_off:
             return position, stride, 1
@@ -288,20 +268,42 @@ class Blocks:
         del recent[_RECENT:]
         return position, stride, self._count(position, position, stride)
 
+    def _repeated(self, last: Stretch, recent: list[tuple[int, int]]) -> int:
+        """Find a recent example that the last block of the file is like, or take the block itself."""
+        alike = (
+            example
+            for example, stride in recent
+            if stride == last.stride
+            and like_example(self._data, last._replace(example=example), 0, self.layout(example, stride).literal)
+        )
+        return next(alike, last.start)
+
     def _count(self, position: int, example: int, stride: int) -> int:
         """Count the blocks from ``position`` on that look like the example and have another behind them."""
         literal, start = self.layout(example, stride).literal, self._grammar.start
         run = Stretch(position, stride, (self._end - position) // stride, example)
-        if self._compared:
-            varied = np.zeros_like(literal) if run.repeats >= _MANY else None
-            count = like_example(self._data, run, 0, literal, varied)
-            if varied is not None and count > _MANY:
-                self._varied[position] = varied
+        if self._compared and run.repeats >= _MANY:
+            count = self._count_and_take(run, literal)
+        elif self._compared:
+            count = like_example(self._data, run, 0, literal)
         else:
             first_line = self.text(example, _LINE).find(b"\n") + 1
             count = like_example(self._data, run, 0, literal[:first_line])
             count = like_example(self._data, run._replace(repeats=count), stride - 1, literal[-1:])
         return count if self.text(position + count * stride, len(start)) == start else max(0, count - 1)
+
+    def _count_and_take(self, run: Stretch, literal: Bytes) -> int:
+        """Count the blocks like the example; remember what differs in them, and the numbers that will be asked for."""
+        varied, fields = np.zeros_like(literal), self.layout(run.example, run.stride).fields
+        offsets = np.array([fields.get(name, UNSURE) for name in self._asked_ahead], dtype=np.int64)
+        sure = offsets.size > 0 and not np.any(offsets == UNSURE)
+        ahead = Ahead(offsets, self._grammar.width, self._grammar.decimals) if sure else None
+        count = like_example(self._data, run, 0, literal, varied, ahead)
+        if count > _MANY:
+            self._varied[run.start] = varied
+            if ahead is not None:
+                self._ahead[run.start] = ahead.numbers()
+        return count
 
     def _alike(self, names: Sequence[Hashable], anchors: Sequence[Hashable]) -> bool:
         """Tell whether in all blocks the text from anchors to numbers is that of their examples.
@@ -340,9 +342,9 @@ class Blocks:
             for block in (min(1, last), last)
         )
 
-    def _compare_in_full(self) -> None:
+    def _compare_in_full(self, names: Sequence[Hashable]) -> None:
         states = self.states
-        self._compared = True
+        self._compared, self._asked_ahead = True, tuple(names)
         self._walk()
         if self.states != states:
             raise FormatError(f"{self.source}: states overlap, the file is damaged")
@@ -357,20 +359,6 @@ class Blocks:
             if found >= 0:
                 return at + found + 1
         return None
-
-
-def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: int, behind: int) -> None:
-    """Let what ``changing`` matches in a piece of a block differ from block to block.
-
-    It must match short pieces only, lest a whole line hide in one.
-    """
-    for piece in changing.finditer(block, first, behind):
-        literal[piece.start() : piece.end()] = 0
-
-
-def overlong(block: bytes) -> bool:
-    """Whether a line is longer than solvers write: states were blanked, and hide in it."""
-    return max(map(len, block.split(b"\n"))) >= _OVERLONG
 
 
 def _spoken(name: Hashable) -> str:

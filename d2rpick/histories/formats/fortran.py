@@ -58,6 +58,8 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     >>> decode(np.array([b"   4.87301E-03", b"  -8.05000E+02", b"   2.00000E-20"]), decimals=5).tolist()
     [0.00487301, -805.0, 2e-20]
     """
+    if not fields.size:
+        return np.empty(0)
     width = fields.dtype.itemsize
     column = np.ascontiguousarray(np.frombuffer(fields.tobytes(), np.uint8).reshape(-1, width).T)
     point, mark = width - 5 - decimals, width - 4
@@ -70,9 +72,11 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     usual &= shrinks | (column[mark + 1] == ord("+"))
     usual &= np.all(column[: point - 2] == ord(" "), axis=0)
 
-    mantissa = np.zeros(fields.size)
+    whole = np.zeros(fields.size, np.int64)
     for place in mantissa_columns:
-        mantissa = mantissa * 10.0 + digit[place]
+        whole *= 10
+        whole += digit[place]
+    mantissa = whole.astype(np.float64)
     exponent = digit[mark + 2].astype(np.int16) * 10 + digit[mark + 3]
     exponent = np.where(shrinks, -exponent, exponent) - decimals
     values: Samples = np.where(

@@ -15,7 +15,8 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
-from d2rpick.histories.formats.fixed_text import UNSURE, BlockLayout, Blocks, Grammar, overlong, release
+from d2rpick.histories.formats.fixed_text import Blocks
+from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, overlong, release
 from d2rpick.histories.formats.text_head import head, written_head
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class Glstat(SolverFile):
     def __init__(self, data: bytes | Content, source: str, needed: Sequence[str] = ()) -> None:
         self.source = source
         self.title, self.version, begin = head(data)
-        self._blocks = Blocks(data, source, begin, _GRAMMAR)
+        self._blocks = Blocks(data, source, begin, _GRAMMAR, ahead=(_TIME, _ENERGY))
         self.channels = self._names()
         names = [_TIME]
         with suppress(FormatError):  # that there is no such line is said when it is read

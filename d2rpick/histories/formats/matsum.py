@@ -17,7 +17,8 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
-from d2rpick.histories.formats.fixed_text import UNSURE, BlockLayout, Blocks, Grammar, overlong, release
+from d2rpick.histories.formats.fixed_text import Blocks
+from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, overlong, release
 from d2rpick.histories.formats.text_head import head, written_head
 from d2rpick.histories.history import Part
 

@@ -208,7 +208,8 @@ class TimeHistory(SolverFile):
         silent = [part.id for part in self._head.parts if part not in self.parts]
         if not silent:
             return ()
-        return (f"{self.source}: no variables of parts {listing(silent)} in the file (card /TH/PART)",)
+        which = f"part {silent[0]}" if len(silent) == 1 else f"parts {listing(silent)}"
+        return (f"{self.source}: no variables of {which} in the file (card /TH/PART)",)
 
 
 class _Records:

@@ -117,7 +117,7 @@ def _plain(source: Source) -> tuple[Content, str]:
     """Text with line feeds alone and no mark before it, and its encoding."""
     data = source.data
     if not isinstance(data, bytes):
-        pieces = (data[at : at + _PIECE] for at in range(0, len(data), _PIECE))
+        pieces = (data.glance(at, at + _PIECE) for at in range(0, len(data), _PIECE))
         if all(piece.isascii() and b"\r" not in piece and b"\0" not in piece for piece in pieces):
             return data, "latin-1"  # of which ASCII is a part
     data = bytes(data)

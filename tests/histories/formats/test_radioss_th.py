@@ -117,7 +117,7 @@ def test_a_group_of_elements_is_no_part_and_its_energy_not_counted_twice() -> No
 def test_a_part_without_variables_is_noted_and_refused() -> None:
     run = opened(t01(2, [MadePart(1, "box"), MadePart(2, "step", codes=())]))
     assert [part.id for part in run.parts] == [1]
-    assert any("no variables of parts 2 in the file" in note for note in run.notes)
+    assert any("no variables of part 2 in the file" in note for note in run.notes)
     with pytest.raises(FormatError, match="no internal_energy of part 2, parts with variables: 1;"):
         run.part_channel("internal_energy", [2])
 
