@@ -24,6 +24,11 @@ def cases(count: int) -> settings:
     return settings(max_examples=count * _MORE, deadline=None, suppress_health_check=list(HealthCheck))
 
 
+def inputs(count: int) -> int:
+    """So many inputs in a thorough run of twenty, in proportion in others; the usual run has a thousandth of them."""
+    return count * _MORE // 20 if _MORE > 1 else count // 1000
+
+
 def some(items: Sequence[Item]) -> Sequence[Item]:
     """Each item in a thorough run, else every twentieth."""
     return items[:: max(1, 20 // _MORE)]

@@ -45,12 +45,15 @@ def acceptable_windows(situation: Situation, candidates: Candidates, recommended
     array of shape (n, 2)
         First and last time of each window, ascending [time].
     """
-    if situation.at_rest:  # any tr before td is right
-        return np.array([[situation.earliest_tr, np.nextafter(situation.td, -np.inf)]])
     grid = monotone_grid(situation, candidates)
-    widest = _windows_below(situation, grid, min(situation.settings.tolerance, _residual_left(situation)))
+    if situation.at_rest:  # any tr before td is right, unless td itself is wrong
+        widest = grid[np.newaxis, [0, -1]]
+    else:
+        widest = _windows_below(situation, grid, min(situation.settings.tolerance, _residual_left(situation)))
     judged = approve(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
     kept = widest[np.reshape(judged, (-1, 3)).all(axis=1)]
+    if situation.at_rest:
+        return kept
     if kept.size and kept[-1, 1] >= grid[-1] and not (recommended is not None and kept[-1, 0] <= recommended):
         kept = kept[:-1]
     return kept

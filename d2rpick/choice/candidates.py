@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 import numpy as np
 
 from d2rpick.choice.objections import objections
+from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import Moment, Moments
 from d2rpick.vibration.together import measured_of, moments_of
@@ -271,11 +272,13 @@ def judge(situation: Situation, found: Sequence[Moment]) -> Candidates:
 
 
 def _at_start(situation: Situation) -> Moments | None:
-    """Where nothing vibrates in the flight, its start; else nothing."""
+    """Where nothing vibrates in the flight, its start, not before it as it is read; else nothing."""
     start = situation.earliest_tr
     if start is None or not situation.at_rest:
         return None
-    return Moments.of([Moment(max(start, float(situation.history.time[0])), "start", None)])
+    first = max(start, float(situation.history.time[0]))
+    read = not_before(first)
+    return Moments.of([Moment(read if read < situation.td else first, "start", None)])
 
 
 def _as_found(situation: Situation, moments: Moments) -> Moments:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.choice.warnings import end_of_flight, end_of_load
+from d2rpick.histories.digits import above
 from d2rpick.vibration.measures import column_of
 
 if TYPE_CHECKING:
@@ -19,19 +20,23 @@ if TYPE_CHECKING:
 
 
 class Objection(NamedTuple):
-    """A reason and the candidates that it ``holds`` for, of shape (n,); ``error`` (n,) where the sentence names it."""
+    """A reason and the candidates that it ``holds`` for, of shape (n,).
+
+    ``error`` (n,) and the ``limit`` that it is above where the sentence names them.
+    """
 
     holds: NDArray[np.bool_]
     reason: str
     error: Samples | None = None
+    limit: float = 0.0
 
     def sentence(self, place: int) -> str:
         """Say it of the candidate at a place."""
-        return self.reason if self.error is None else f"error {self.error[place]:.3g} {self.reason}"
+        return self.reason if self.error is None else f"error {above(self.error[place], self.limit)} {self.reason}"
 
     def ordered(self, order: NDArray[np.intp]) -> Objection:
         """Give the same for candidates in another order."""
-        return Objection(self.holds[order], self.reason, None if self.error is None else self.error[order])
+        return Objection(self.holds[order], self.reason, None if self.error is None else self.error[order], self.limit)
 
 
 def objections(
@@ -66,7 +71,7 @@ def objections(
     error, judged = np.where(compared, column_of(known, "lock_in_error"), level_error), described & same_sign
     yield Objection(judged & np.isnan(error), "the energy is not positive here, so there is nothing to compare")
     tolerance = situation.settings.tolerance
-    yield Objection(judged & (error > tolerance), f"above the tolerance {tolerance:g}", error)
+    yield Objection(judged & (error > tolerance), f"above the tolerance {tolerance:g}", error, tolerance)
 
 
 def _against_td(situation: Situation) -> Iterator[str]:

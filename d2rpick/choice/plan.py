@@ -210,11 +210,12 @@ def _rows(
     """Give every flight with its window, as if each were the first."""
     last = max((one.td for one in known), default=None)
     landed: float | None = None  # of the flight before
-    for number, flight in enumerate(flights, start=1):
+    for number, seen in enumerate(flights, start=1):
+        flight = _given(reference.history, seen, settings.after)
         start, end = bounds(reference.history, flight)
         margin = margin_before_contact(reference.history, flight, settings.margin)
         row = Planned(number, flight, start, end, margin, "left-out")
-        within = [one for one in known if one.flight == flight]
+        within = [one for one in known if one.flight == seen]
         if within:
             for one in within:
                 yield replace(row, status="done", reason=one.told, done=one)
@@ -229,20 +230,28 @@ def _rows(
         landed = flight.end
 
 
+def _given(history: History, flight: Flight, after: float | None) -> Flight:
+    """Let a flight in which the load is said to end begin there, as ``suggest`` does."""
+    start, end = bounds(history, flight)
+    return flight if after is None or not start <= after < end else flight._replace(start=after, source="given")
+
+
 def _asked(
     reference: Reference, row: Planned, settings: Settings, shortest: float, landed: float | None, fits: Fits
 ) -> Planned:
     """Ask ``suggest`` for the window of a flight, which does not reach back beyond the landing of the one before.
 
-    The energy alone shows another beginning to each td: the flight begins where the td that is chosen has it.
+    The energy alone shows another beginning to each td, or an oscillator where another td has none: the flight is known
+    as the td that is chosen knows it.
     """
     own = settings.after is not None and row.start <= settings.after <= row.end
     asked = settings if own else replace(settings, after=None)
     answer = suggest_of(reference, (row.start, row.end), asked, since=landed, fits=fits)
-    begins = answer.situation.flight.start
+    known = answer.situation.flight
     row = replace(row, answer=answer)
-    if begins is not None and begins < row.start:
-        row = replace(row, flight=row.flight._replace(start=begins), start=begins)
+    if known.start is not None and (known.start < row.start or answer.recommended):
+        flight = row.flight._replace(start=known.start, source=known.source)
+        row = replace(row, flight=flight, start=known.start)
     if answer.recommended is None:
         why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
         return replace(row, reason="; ".join(why))

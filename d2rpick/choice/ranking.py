@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.histories.digits import above
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
     )
     return tuple(
         f"{name} unknown, at most {limit:g} was asked for" if value is None
-        else f"{name} {value:.3g} above the limit {limit:g}"
+        else f"{name} {above(value, limit)} above the limit {limit:g}"
         for name, value, limit in limits
         if limit is not None and (value is None or value > limit)
     )  # fmt: skip

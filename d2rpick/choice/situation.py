@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.choice.rest import nothing_vibrates
+from d2rpick.histories.digits import sum_as_read
 from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.model import Evidence, describing, model_at
 
@@ -59,12 +60,14 @@ class Situation:
     @property
     def earliest_tr(self) -> float | None:
         """Start of the flight with the margin, or None when unknown [time]."""
-        return None if self.flight.start is None else self.flight.start + (self.settings.margin or 0.0)
+        start = self.flight.start
+        return None if start is None else sum_as_read(start, self.settings.margin or 0.0)
 
     @property
     def latest_td(self) -> float:
         """End of the flight with the margin; infinite when no contact was seen [time]."""
-        return float("inf") if self.flight.end is None else self.flight.end - (self.settings.margin or 0.0)
+        end = self.flight.end
+        return float("inf") if end is None else sum_as_read(end, -(self.settings.margin or 0.0))
 
     @cached_property
     def at_rest(self) -> bool:

@@ -10,6 +10,7 @@ from d2rpick.choice.ranking import EQUALLY_GOOD, over_limits, rank, recommend
 from d2rpick.choice.verify import verify_at
 from d2rpick.choice.warnings import Caution, cautions_of, out_of_place
 from d2rpick.errors import RangeError
+from d2rpick.histories.digits import as_read
 
 if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate, Candidates
@@ -137,7 +138,7 @@ def suggest_at(situation: Situation, *, with_better: bool = True, found: Candida
 def find_better_pair(situation: Situation) -> Pair | None:
     """Give the nearest peak of the energy in the flight that has an acceptable tr, and the best one there.
 
-    The pair is verified as a user would do it: the record is examined anew at that td.
+    The pair is the one that a user finds who asks for that td: the record is examined anew there.
     """
     start = situation.earliest_tr
     if start is None:
@@ -147,16 +148,26 @@ def find_better_pair(situation: Situation) -> Pair | None:
     refused = 0
     for td in sorted(situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)):
         there = situation.at(td)
-        if there.vibration.doubts:
+        if there.vibration.doubts or not _saving(there):
             continue
-        best = recommend(rank(find_candidates(there, in_flight=True))).chosen
-        if best and not best.same_swing:
-            if _verifies(situation, best.tr, td):
-                return Pair(best.tr, td, best.residual)
-            refused += 1
-            if refused == _MOST_REFUSED:
-                return None
+        best = _saving(_anew(situation, td))
+        if best and _holds_as_printed(situation, best.tr, td):
+            return Pair(best.tr, td, best.residual)
+        refused += 1
+        if refused == _MOST_REFUSED:
+            return None
     return None
+
+
+def _saving(situation: Situation) -> Candidate | None:
+    """Give what is recommended at a td, where that saves something."""
+    best = recommend(rank(find_candidates(situation, in_flight=True))).chosen
+    return best if best and not best.same_swing else None
+
+
+def _anew(situation: Situation, td: float) -> Situation:
+    """Look at the same record for another td, as if that had been asked for."""
+    return examine(situation.history, td, situation.settings, situation.fits)
 
 
 def _expected(situation: Situation, best: Candidate | None) -> Expectation | None:
@@ -183,12 +194,10 @@ def _windows(
     return tuple(AcceptableWindow(low, high, (high - low) / (situation.td - start)) for low, high in found)
 
 
-def _verifies(situation: Situation, tr: float, td: float) -> bool:
-    """Whether ``verify`` would verify a pair, in full and in the six digits that people read."""
-    anew = examine(situation.history, td, situation.settings, situation.fits)
-    printed = float(f"{tr:.6g}"), float(f"{td:.6g}")
+def _holds_as_printed(situation: Situation, tr: float, td: float) -> bool:
+    """Whether ``verify`` would verify a pair in the six digits that people read."""
     try:
-        return all(verify_at(anew.at(late), early).verified for early, late in ((tr, td), printed))
+        return verify_at(_anew(situation, as_read(td)), as_read(tr)).verified
     except RangeError:  # rounded beyond an end of the record, or onto each other
         return False
 

@@ -18,6 +18,7 @@ from d2rpick.choice.reach_back import longest_rigid_times
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import SOURCES, witnesses
+from d2rpick.histories.digits import not_after, sum_as_read
 from d2rpick.vibration.fits import Fits
 
 if TYPE_CHECKING:
@@ -71,8 +72,10 @@ def flights_of(history: History, settings: Settings, fits: Fits | None = None) -
     """Find all flights; where the energy is all there is, one oscillator for the whole record, else none is sought."""
     if any(True for _ in witnesses(history)) or not settings.replay:
         return find_flights(history, settings, fits)
-    middle = examine(history, float(history.time[0] + history.time[-1]) / 2, settings, fits)
-    if middle.flight.source == "oscillator":
+    first = float(history.time[0]) if settings.after is None else settings.after
+    middle = examine(history, (first + float(history.time[-1])) / 2, settings, fits)
+    start, end = bounds(history, middle.flight)
+    if middle.evidence.span and start < end:  # it ends with the oscillator, also where its start is given
         return (middle.flight,)
     return find_flights(history, replace(settings, replay=False))
 
@@ -133,11 +136,13 @@ def within_flight(look: Look, history: History, window: tuple[float, float]) -> 
 
 
 def _latest(situation: Situation, window: tuple[float, float]) -> float:
-    """Last td in the window that keeps the margin; where none does, the last one in the flight."""
+    """Last td in the window that keeps the margin, also as it is read; where none does, the last one in the flight."""
     low, high = window
     margin = margin_before_contact(situation.history, situation.flight, situation.settings.margin).time
     end = float("inf") if situation.flight.end is None else situation.flight.end
-    return min(high, end - margin if end - margin > low else max(low, situation.latest_td))
+    latest = sum_as_read(end, -margin)
+    latest = latest if latest > low else situation.latest_td
+    return min(high, max(low, latest if np.isinf(latest) else not_after(latest)))
 
 
 def _flying(look: Look, window: tuple[float, float]) -> Situation:

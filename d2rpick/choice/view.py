@@ -26,17 +26,16 @@ _UNSURE = 0.01
 
 
 class View(NamedTuple):
-    """From ``start`` to ``end`` [time]; there the flight has energies from ``low`` to ``high``, the record ``highest``.
+    """From ``start`` to ``end`` [time]; there the flight has energies from ``low`` to ``high``.
 
-    ``cut`` tells what stands above the flight: "landing", "load" or "" where nothing does.
+    ``above`` names what stands above the flight in that time, "load" and "landing", and how high [energy].
     """
 
     start: float
     end: float
     low: float
     high: float
-    highest: float
-    cut: str
+    above: tuple[tuple[str, float], ...]
 
 
 class Scale(NamedTuple):
@@ -99,18 +98,18 @@ def view(history: History, flight: Flight, times: list[float], known: float | No
         inner = inner if inner[0] < inner[1] else (first, last)
     beyond = _BEYOND * (inner[1] - inner[0])
     start, end = max(first, inner[0] - beyond), min(last, inner[1] + beyond)
-    flown = _flown(history, flight, inner)
+    begin = inner[0] if flight.start is None else flight.start
+    stop = inner[1] if flight.end is None else flight.end
+    flown = _flown(history, begin, stop, inner)
     low, high = float(flown.min()), float(flown.max())
-    after = end if flight.end is None else flight.end
-    landed = float(history.between(after, end)[1].max(initial=high))
-    highest = float(history.between(start, end)[1].max(initial=landed))
-    return View(start, end, low, high, highest, "" if highest <= high else "landing" if landed == highest else "load")
+    middle = min(max(start, (begin + stop) / 2), end)
+    sides = (("load", start, middle), ("landing", middle, end))
+    highest = [(what, float(history.between(*side)[1].max(initial=high))) for what, *side in sides]
+    return View(start, end, low, high, tuple((what, energy) for what, energy in highest if energy > high))
 
 
-def _flown(history: History, flight: Flight, inner: tuple[float, float]) -> Samples:
+def _flown(history: History, start: float, end: float, inner: tuple[float, float]) -> Samples:
     """Energies in the flight, but for its ends; where it has no state, those between which it lies."""
-    start = inner[0] if flight.start is None else flight.start
-    end = inner[1] if flight.end is None else flight.end
     off = _UNSURE * (end - start)
     flown = history.between(start + off, end - off)[1]
     return flown if flown.size else history.energies_at(np.array(inner))

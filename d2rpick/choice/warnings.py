@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.errors import name_units
+from d2rpick.histories.digits import not_after, window_as_read
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.situation import Situation
     from d2rpick.flight.bodies import RigidBody
-    from d2rpick.flight.flight import Flight
 
 # Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.
 POOR_KINETIC_SHARE = 0.5
@@ -66,7 +66,7 @@ def _of_parts(situation: Situation) -> Iterator[Caution]:
 def _of_flight(situation: Situation) -> Iterator[Caution]:
     flight, td, earliest = situation.flight, situation.td, situation.earliest_tr
     if flight.refusal:
-        yield Caution("no-free-flight", f"{flight.refusal}{_nearest_flight(flight)}")
+        yield Caution("no-free-flight", f"{flight.refusal}{_nearest_flight(situation)}")
     for doubt in flight.doubts:
         yield Caution("flight-sources-disagree", doubt)
     if flight.source == "energy":
@@ -125,10 +125,13 @@ def _margin(situation: Situation) -> str:
     return f" with the margin {situation.settings.margin:.6g}" if situation.settings.margin else ""
 
 
-def _nearest_flight(flight: Flight) -> str:
-    """Name the flight that is nearest to td."""
+def _nearest_flight(situation: Situation) -> str:
+    """Name the flight that is nearest to td, and the last td in it where a margin is kept."""
+    flight = situation.flight
     if flight.start is None or flight.source == "given":
         return ""
     if flight.end is None:
         return f"; the next flight begins at {flight.start:.6g}"
-    return f"; the nearest flight lasts from {flight.start:.6g} to {flight.end:.6g}; td must lie in it"
+    margin = _margin(situation)
+    last = f",{margin} its last td is {not_after(situation.latest_td):.6g}" if margin else "; td must lie in it"
+    return f"; the nearest flight lasts from {window_as_read(flight.start, flight.end)}{last}"

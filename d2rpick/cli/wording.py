@@ -12,6 +12,7 @@ OPTIONS: Final = {
     "energy": "--energy",
     "fit_window": "--fit-window",
     "min_rigid": "--min-rigid",
+    "overwrite": "--overwrite",
     "parts": "--part",
     "td": "--td",
     "td_window": "--td-window",

@@ -142,8 +142,9 @@ def _simple(card: Card, kind: Kind) -> SwitchSet:
     if kind == "inertia":
         part = [_moved(card.integer(rows[0], 0), card.transform.part)] if rows else []
         reals = [card.real(row, at) for row, count in zip(rows[1:], _REALS[kind], strict=False) for at in range(count)]
-        missing = " and ".join(_INERTIA_ROWS[len(rows) :])
-        return SwitchSet(card, kind, None, (), (*part, *reals), missing and f"{missing} missing", *part)
+        missing = _INERTIA_ROWS[len(rows) :]
+        problem = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing" if missing else ""
+        return SwitchSet(card, kind, None, (), (*part, *reals), problem, *part)
     if card.name.endswith("_CONTROL"):
         values = [card.real(row, at) for row in rows[:1] for at in range(4)]
         return SwitchSet(card, kind, None, (), tuple(values))

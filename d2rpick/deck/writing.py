@@ -66,7 +66,7 @@ def write_deck(main: str, card: PrintedCard, folder: str, *, overwrite: bool = F
             raise DeckError(f"{folder}: this is the folder of the deck; choose another one")
         for name in files:
             if (place / name).exists() and not overwrite:
-                raise DeckError(f"{place / name}: the file exists; choose another folder, or let it be replaced")
+                raise DeckError(f"{place / name}: the file exists; choose another folder or `overwrite`")
         for name, content in files.items():
             _put(place / name, content)
     except OSError as error:

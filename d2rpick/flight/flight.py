@@ -70,16 +70,27 @@ class Witness(NamedTuple):
     def of(cls, source: str, time: Samples, around: Callable[[float], FreeFlight | None], *, decisive: bool) -> Witness:
         """Give the source that shows flights over ``time`` (n,), which looks around no time, and for all, only once."""
         once = cache(around)
-        return cls(source, time, once, cache(partial(all_windows, time, once)), decisive)
+        return cls(source, time, once, cache(partial(all_windows, time, partial(_of_middle, time, once))), decisive)
 
     def holding(self, td: float) -> FreeFlight | None:
         """Give the flight that it shows around td: that of the first mark whose flight holds td, else td's own."""
-        shared = filter(None, map(self.around, marks(self.time, td)))
-        return next((flight for flight in shared if flight.start <= td <= flight.end), None) or self.around(td)
+        return _holding(self.time, self.around, td)
 
     def counts(self) -> bool:
         """Whether there is no flight where it shows none."""
         return self.decisive or bool(self.flights())
+
+
+def _holding(time: Samples, around: Callable[[float], FreeFlight | None], td: float) -> FreeFlight | None:
+    shared = filter(None, map(around, marks(time, td)))
+    return next((flight for flight in shared if flight.start <= td <= flight.end), None) or around(td)
+
+
+def _of_middle(time: Samples, around: Callable[[float], FreeFlight | None], moment: float) -> FreeFlight | None:
+    """Give the flight around a time as it is told of a td in its middle: so that a flight is listed as it is used."""
+    flight = around(moment)
+    of_middle = _holding(time, around, (flight.start + flight.end) / 2) if flight else None
+    return of_middle if of_middle and of_middle.start <= moment <= of_middle.end else flight
 
 
 _WITNESSES: WeakKeyDictionary[History, tuple[Witness, ...]] = WeakKeyDictionary()

@@ -35,11 +35,11 @@ _JUDGED: Final = frozenset(
     name for term in ("hourglass", "sliding", "external_work", "total", "ratio", "eroded") for name in _NAMES[term]
 )
 _TOTAL_INTERNAL: Final = ("ietotal", "totalinternalenergy")
-# Of the centre of mass of the model; a planar one has two of the three.
+# Of the centre of mass of the model; a planar one has two of the three.  The last are any names of these quantities.
 _VELOCITIES: Final = (
     ("globalxvelocity", "globalyvelocity", "globalzvelocity"),
     ("xmomentum", "ymomentum", "zmomentum"),
-    ("momentumx", "momentumy", "momentumz"),
+    ("xvelocity", "yvelocity", "zvelocity"),
 )
 
 

@@ -300,8 +300,12 @@ class History:
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def _in_another_unit(self, times: Sequence[float], argument: str) -> str:
-        """Ask whether an argument was given in another unit, in which it lies in the record as it does not now."""
-        if any(self.time[0] <= time <= self.time[-1] for time in times if time):
+        """Ask whether an argument was given in another unit, in which it lies in the record as it does not now.
+
+        One that misses the record by less than its length does so in the record's own unit.
+        """
+        span = self.time[-1] - self.time[0]
+        if any(self.time[0] <= time <= self.time[-1] for time in times if time) or times[-1] < self.time[-1] + span:
             return ""
         least = max(float(self.time[0]), 0.0) + _NEVER_MEANT * float(np.ptp(self.time))
         for unit, size in (("ms", 1e-3), ("us", 1e-6)):
@@ -362,14 +366,13 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     keep = np.append(time[:-1] < later[1:], np.ones(min(1, time.size), dtype=bool))
     notes = []
     if equal:
-        notes.append(f"{equal} states have the same printed time as the next one; the last of equal times counts")
+        same = "1 state has" if equal == 1 else f"{equal} states have"
+        notes.append(f"{same} the same printed time as the next one; the last of equal times counts")
     if back:
         steps = "once" if back == 1 else f"{back} times"
         lost = int(np.count_nonzero(~keep)) - equal
-        notes.append(
-            f"time steps back {steps} (restart); where legs overlap the newer one counts, "
-            f"{lost} older states were dropped"
-        )
+        dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
+        notes.append(f"time steps back {steps} (restart); where legs overlap the newer one counts, {dropped} dropped")
     return keep, tuple(notes)
 
 

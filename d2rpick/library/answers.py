@@ -181,7 +181,7 @@ class Verdict(Answer):
         return as_json(self._core, self.command)
 
     def to_frame(self) -> pd.DataFrame:
-        """Give the measures of the pair as a table of one row, a column per measure; what is not known is NaN.
+        """Give the measures of the pair as a table of one row, with the columns of the csv; what is not known is NaN.
 
         Examples
         --------
@@ -190,10 +190,10 @@ class Verdict(Answer):
         >>> verdict.to_frame()["verified"].tolist()
         [True]
         """
-        from d2rpick.report.keys import of_verdict
+        from d2rpick.report.verdict import row
 
-        row = of_verdict(self._core)
-        return frame_of([row], list(row), basis=self.basis, source=list(self.situation.history.source))
+        found = row(self._core)
+        return frame_of([found], list(found), basis=self.basis, source=list(self.situation.history.source))
 
     def plot(self) -> Figure:
         """Draw the energy with its level at td, and the pair, as a matplotlib Figure."""

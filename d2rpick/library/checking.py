@@ -57,7 +57,7 @@ class Findings(Document):
         >>> d2.check("sample_data/switching.k", history=history).to_frame()["rule"].tolist()
         ['D2R202', 'D2R203']
         """
-        keys = ("rule", "severity", "message", "file", "line", "column")
+        keys = ("rule", "severity", "message", "file", "line", "column", "deck")
         return frame_of(self.to_dict()["findings"], keys, decks=list(self.decks))
 
 
@@ -94,6 +94,13 @@ def check(
         If a rule does not exist.
     TypeError, ValueError
         If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> found = d2.check("sample_data/switching.k")
+    >>> [(window.part, window.td) for window in found.windows]
+    [(11, 0.0687534), (12, 0.064)]
     """
     from d2rpick.library.repeat import options_of
     from d2rpick.rules import check_deck, configuration_for

@@ -176,6 +176,10 @@ def from_frame(
     name : str
         What messages call it.
 
+    Returns
+    -------
+    Run
+
     Raises
     ------
     D2RPickError

@@ -161,7 +161,8 @@ def _flight(found: TradeOff) -> dict[str, Any]:
     inner = history.between(seen.start, seen.end)
     time, energy = outline(*inner, stretches=_STRETCHES)
     unit = history.time_unit
-    cut = f"; cut at the top: the {seen.cut}, up to {seen.highest:.4g}" if seen.highest > scale.high else ""
+    above = [f"the {what}, up to {energy:.4g}" for what, energy in seen.above if energy > scale.high]
+    cut = f"; cut at the top: {' and '.join(above)}" if above else ""
     return {
         "caption": f"Internal energy in the flight{cut}",
         "time": f"time [{unit}]" if unit else "time",

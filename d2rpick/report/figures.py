@@ -80,7 +80,7 @@ def show_level(axes: Axes, level: float, highest: float) -> None:
         axes.set_ylim(bottom=level / BELOW_LEVEL)
 
 
-def show_span(axes: Axes, span: tuple[float, float], scale: Scale, cut: tuple[str, float]) -> None:
+def show_span(axes: Axes, span: tuple[float, float], scale: Scale, above: Sequence[tuple[str, float]]) -> None:
     """Show of a curve the times in ``span``; what is higher than the scale is cut, with a mark.
 
     Parameters
@@ -89,15 +89,16 @@ def show_span(axes: Axes, span: tuple[float, float], scale: Scale, cut: tuple[st
     span : (float, float)
         First and last time in sight [time].
     scale : Scale
-    cut : (str, float)
-        What stands highest in the span, and how high: the mark names it where it is cut.
+    above : sequence of (str, float)
+        What stands high in the span, and how high: a mark names it where it is cut.
     """
     axes.set_xlim(*span)
     if scale.logarithmic:
         make_logarithmic(axes, scale.low, scale.high)
     axes.set_ylim(scale.low, scale.high)
-    what, highest = cut
-    if what and highest > scale.high:
+    for what, highest in above:
+        if highest <= scale.high:
+            continue
         early = what == "load"  # it stands on the left, a landing on the right
         axes.annotate(
             f"{what}, up to {highest:.4g} \N{UPWARDS ARROW}", (0 if early else 1, 1), xycoords="axes fraction",

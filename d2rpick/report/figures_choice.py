@@ -97,7 +97,7 @@ def _show(axes: Axes, situation: Situation, seen: View) -> None:
     """Show the flight; the level belongs to it, also where td lies beyond."""
     level = situation.energy_td
     scale = scale_of(min(seen.low, level), max(seen.high, level), level)
-    show_span(axes, (seen.start, seen.end), scale, (seen.cut, seen.highest))
+    show_span(axes, (seen.start, seen.end), scale, seen.above)
 
 
 def _draw_energy(

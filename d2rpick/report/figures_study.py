@@ -129,7 +129,8 @@ def _show(axes: Axes, answer: Study, drawn: Sequence[StudyRow]) -> None:
     inner, seen = (np.concatenate([levels, *_energies(curves, *window)]) for window in ((early, td), span))
     # the lowest level stays in sight beside the middle one
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
-    show_span(axes, span, scale_of(float(inner.min()), float(inner.max()), level), ("highest run", float(seen.max())))
+    scale = scale_of(float(inner.min()), float(inner.max()), level)
+    show_span(axes, span, scale, [("highest run", float(seen.max()))])
 
 
 def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[Samples]:

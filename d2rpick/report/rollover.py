@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.models.rollover.record import BOX
-from d2rpick.models.rollover.scan import Outcome
 from d2rpick.report import tables
+from d2rpick.report.keys import of_warnings
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.warnings import Caution
     from d2rpick.models.rollover.record import Record
+    from d2rpick.models.rollover.scan import Outcome
 
 SCHEMA = "d2rpick/rollover/1"
-_COLUMNS = tuple(field.name for field in fields(Outcome))
+# Of each run, in JSON and as columns.
+_OUTCOME: Final[Mapping[str, Callable[[Outcome], float]]] = {
+    "tr": lambda one: one.tr,
+    "energy": lambda one: one.energy,
+    "energy_ratio": lambda one: one.energy_ratio,
+    "roll_error": lambda one: one.roll_error,
+    "x_error": lambda one: one.x_error,
+    "z_error": lambda one: one.z_error,
+    "omega_error": lambda one: one.omega_error,
+    "lost_energy": lambda one: one.lost_energy,
+    "mean_ratio": lambda one: one.mean_ratio,
+}
+_COLUMNS = tuple(_OUTCOME)
 
 
 class Scan(NamedTuple):
@@ -62,7 +74,7 @@ def as_markdown(outcomes: Sequence[Outcome]) -> str:
 
 def as_csv(outcomes: Sequence[Outcome]) -> str:
     """A row for each tr, at full precision."""
-    return tables.as_csv(_COLUMNS, [list(asdict(one).values()) for one in outcomes]).rstrip("\n")
+    return tables.as_csv(_COLUMNS, [[*_of_outcome(one).values()] for one in outcomes]).rstrip("\n")
 
 
 def as_json(scan: Scan, command: Sequence[str]) -> str:
@@ -73,15 +85,19 @@ def as_json(scan: Scan, command: Sequence[str]) -> str:
             "schema": SCHEMA,
             "tool_version": __version__,
             "command": list(command),
-            "warnings": [caution._asdict() for caution in cautions],
+            "warnings": of_warnings(cautions),
             "released": reference.released,
             "landed": reference.landed,
             "td": answer.situation.td,
             "energy_td": _energy(reference, answer.situation.td),
             "recommended": _recommended(answer),
-            "runs": [asdict(one) for one in outcomes],
+            "runs": [_of_outcome(one) for one in outcomes],
         }
     )
+
+
+def _of_outcome(one: Outcome) -> dict[str, float]:
+    return {key: read(one) for key, read in _OUTCOME.items()}
 
 
 def _recommended(answer: Suggestion) -> float | None:
@@ -90,7 +106,7 @@ def _recommended(answer: Suggestion) -> float | None:
 
 def _short(one: Outcome) -> list[tables.Cell]:
     """Four digits are enough to read: runs differ in the second."""
-    return [float(f"{value:.4g}") for value in asdict(one).values()]
+    return [float(f"{value:.4g}") for value in _of_outcome(one).values()]
 
 
 def _time(time: float | None) -> str:

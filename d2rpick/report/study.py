@@ -6,7 +6,9 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from d2rpick.errors import printable
+from d2rpick.histories.digits import window_as_read
 from d2rpick.report import tables
+from d2rpick.report.keys import of_warnings
 from d2rpick.studies.common import runs_of
 from d2rpick.studies.resume_file import PLAIN, plain
 from d2rpick.version import __version__
@@ -89,10 +91,9 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
         found += "the intervals overlap" if answer.agree else "the intervals do not overlap"
     shared = f"none: {common.reason}"
     if common.tr is not None and common.window:
-        low, high = common.window
         known = [error for error in common.errors if error is not None]
         shared = f"{common.tr:g}, acceptable in {answer.judged} of {runs_of(answer.judged)}; "
-        shared += f"so is every tr from {low:.6g} to {high:.6g}; "
+        shared += f"so is every tr from {window_as_read(*common.window)}; "
         shared += f"error there {tables.measure(min(known))} to {tables.measure(max(known))}"
     return [
         ("td", f"{td_of(answer)}, {answer.judged} of {runs_of(len(answer.rows))} judged"),
@@ -113,7 +114,7 @@ def _front(answer: Study, command: Sequence[str]) -> dict[str, Any]:
         "schema": SCHEMA,
         "tool_version": __version__,
         "command": list(command),
-        "warnings": [{"code": caution.code, "message": caution.message} for caution in answer.cautions],
+        "warnings": of_warnings(answer.cautions),
         "td": answer.td,
         "td_window": answer.td_window,
     }

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from d2rpick.choice.candidates import MUCH_HIGHER
 from d2rpick.errors import name_units, printable
+from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
 from d2rpick.report.situation import frame, heading, mechanics
 
@@ -193,9 +194,9 @@ def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
     """The windows of acceptable tr: the one with the recommended tr, the longest others, and what they share."""
     share = sum(one.share for one in windows)
     if len(windows) == 1:
-        return f"every tr from {windows[0].start:.6g} to {windows[0].end:.6g}, {share:.0%} of the flight up to td"
+        return f"every tr from {window_as_read(*windows[0][:2])}, {share:.0%} of the flight up to td"
     named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[:_NAMED]
-    shown = [f"{w.start:.6g} to {w.end:.6g} ({w.share:.1%}{', recommended' * holds(w, tr)})" for w in named]
+    shown = [f"{window_as_read(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})" for w in named]
     more = f" and {len(windows) - len(named)} shorter windows" if len(windows) > len(named) else ""
     return f"every tr from {'; '.join(shown)}{more}; in all {share:.0%} of the flight up to td"
 

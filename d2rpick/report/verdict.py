@@ -35,13 +35,17 @@ def as_markdown(answer: Verdict) -> str:
     return "\n".join([table, *(f"\n* {tables.in_markdown(reason)}" for reason in answer.reasons)])
 
 
-def as_csv(answer: Verdict) -> str:
-    """One row, a column for each measure, those of a switched run with ``switched_`` before them, and the reasons."""
+def row(answer: Verdict) -> dict[str, Any]:
+    """Each measure by its key, those of a switched run with ``switched_`` before them, and the reasons as one text."""
     situation = answer.situation
-    row = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **keys.of_verdict(answer)}
-    row |= _of_switched(answer)
-    row["reasons"] = "; ".join(answer.reasons)
-    return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
+    measured = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **keys.of_verdict(answer)}
+    return {**measured, **_of_switched(answer), "reasons": "; ".join(answer.reasons)}
+
+
+def as_csv(answer: Verdict) -> str:
+    """One row, a column for each key of `row`."""
+    found = row(answer)
+    return tables.as_csv(list(found), [list(found.values())]).rstrip("\n")
 
 
 def as_json(answer: Verdict, command: Sequence[str]) -> str:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import Reference, verify_of
 from d2rpick.choice.suggest import find_better_pair, suggest_at
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution
+from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, end_of_flight, end_of_load
 from d2rpick.errors import name_units
+from d2rpick.histories.digits import above
 from d2rpick.rules.base import Fault
 
 if TYPE_CHECKING:
@@ -161,20 +162,20 @@ def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]
     if earliest is None:
         yield Fault("D2R204", False, _UNKNOWN)
     else:
-        end = f"before the end of the load at {earliest:.6g} ({last.flight.source})"
+        end = f"before {end_of_load(last)} ({last.flight.source})"
         yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; switch after it")
 
 
 def _of_flight(verdict: Verdict) -> Iterator[Fault]:
     situation, tr = verdict.situation, verdict.candidate.tr
-    earliest, flight = situation.earliest_tr, situation.flight
+    earliest = situation.earliest_tr
     if earliest is None:
         yield Fault("D2R204", False, _UNKNOWN)
     elif tr < earliest:
-        end = f"before the end of the load at {earliest:.6g} ({flight.source})"
+        end = f"before {end_of_load(situation)} ({situation.flight.source})"
         yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; {_way_out(verdict)}")
     if situation.td > situation.latest_td:
-        end = f"after the end of the flight at {situation.latest_td:.6g}"
+        end = f"after {end_of_flight(situation)}"
         yield Fault("D2R204", True, f"td = {situation.td:.6g} lies {end}; switch back before it")
 
 
@@ -197,7 +198,7 @@ def _of_error(verdict: Verdict) -> Iterator[Fault]:
         parts = situation.history.parts or ()
         of = f" of the {len(parts)} parts that are switched together" if len(parts) > 1 else ""
         levels = f"the energy{of} is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
-        expected = f"{what} {error:.3g}, at most {tolerance:g} was expected"
+        expected = f"{what} {above(error, tolerance)}, at most {tolerance:g} was expected"
         yield Fault("D2R201", False, f"{levels}: {expected}; {_way_out(verdict)}")
 
 

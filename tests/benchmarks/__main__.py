@@ -193,7 +193,10 @@ ROWS = (
     Row("wide window / --td, noise", choosing("window_to_td", "noisy", "wide"), most=3.0),
     Row("wide window / --td, energy alone", choosing("window_to_td", "noisy", "wide", "--no-verify"), most=3.0),
     Row("narrow window / --td, end of the load unknown", choosing("open_window_to_td"), most=3.0),
+    Row("narrow window / --td, clean oscillator", choosing("window_to_td", "clean", "narrow"), most=3.0),
     Row("wide window / --td, clean oscillator", choosing("window_to_td", "clean", "wide"), most=3.0),
+    Row("narrow window / --td, signs of two parts", choosing("window_to_td", "parts", "narrow"), most=3.0),
+    Row("wide window / --td, signs of two parts", choosing("window_to_td", "parts", "wide"), most=3.0),
     Row("explore / --td, noise, 1e5 states", choosing("explore_to_td", "noisy", "0.9", "--after", "0.1"), most=10.0),
     Row("explore / --td, noise, end of the load unknown", choosing("explore_to_td", "noisy", "0.9"), most=10.0),
     Row(
@@ -221,7 +224,7 @@ ROWS = (
     Row("cards of a 50 MB deck / loop over its lines", lambda: deck_ratio(numbered=False), most=1 / 3),
     Row("  with the number of each card's line", lambda: deck_ratio(numbered=True)),
     Row("parts and elements of a 50 MB deck / loop over its lines", inventory_ratio, most=15.0),
-    Row("check of a 50 MB deck / dynars.parse_deck", check_ratio),
+    Row("check of a 50 MB deck / dynars.parse_deck", check_ratio, most=1.0),
     Row("  memory for the cards [MB]", deck_memory, most=32.0),
     Row("check / import click: processes", lambda: process_ratio("click", *CHECK)),
     Row("loop over lines / glstat, 1e5 states", reading("glstat_to_loop"), least=8.0),
@@ -229,7 +232,7 @@ ROWS = (
     Row("loop over lines / matsum, 2000 states, 500 parts", reading("matsum_to_loop", None), least=5.0),
     Row("loop over lines / matsum, 2000 states, 1 part", reading("matsum_to_loop", 2501), least=25.0),
     Row("lasso-python / binout, 1e5 states", reading("lasso_to_binout"), least=12.0),
-    Row("binout, 1e5 states / dynars.Binout", reading("binout_to_dynars")),
+    Row("binout, 1e5 states / dynars.Binout", reading("binout_to_dynars"), most=1.0),
     Row("memory / (2 answers + 64 MB): glstat", reading("memory_over_limit", "glstat"), most=1.0),
     Row("memory / (2 answers + 64 MB): matsum", reading("memory_over_limit", "matsum"), most=1.0),
     Row("memory / (2 answers + 64 MB): binout", reading("memory_over_limit", "binout"), most=1.0),
@@ -238,7 +241,7 @@ ROWS = (
     Row("csv, 1e6 rows, 20 columns / pandas.read_csv", reading("csv_to_pandas"), most=2.0),
     Row("hdf5, 1e6 rows / h5py alone: processes", reading("hdf5_to_h5py"), most=2.0),
     Row("writing csv, 1e6 rows / pandas to_csv", reading("write_to_pandas"), most=1.0),
-    Row("extract of 1e6 rows / pandas read and to_csv: processes", reading("extract_to_pandas"), most=1.0),
+    Row("extract of 1e6 rows (process) / pandas to_csv alone", reading("extract_to_pandas"), most=1.0),
 )
 
 

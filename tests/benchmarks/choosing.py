@@ -67,8 +67,12 @@ def noisy_growth() -> float:
 
 
 def window_to_td(kind: str, width: str, *options: str) -> float:
-    """`--td-window` over `--td` in the same record of 1e5 states, ``kind`` "noisy" or "clean"."""
-    file = str(_noisy(100_000) if kind == "noisy" else _clean(100_000))
+    """`--td-window` over `--td` in the same record of 1e5 states, ``kind`` "noisy", "clean" or "parts"."""
+    file = str({"noisy": _noisy, "clean": _clean, "parts": _two_parts}[kind](100_000))
+    if kind == "parts":
+        options = (*options, "--energy", "IE_left", "--energy", "IE_right")
+        found = json.loads(_output(*_suggest(file, *options, "-f", "json")))
+        assert found["basis"] == "parts"
     return _ratio(_suggest(file, *options, window=_WINDOWS[width]), _suggest(file, *options))
 
 
@@ -153,10 +157,20 @@ def _clean(states: int) -> Path:
     return _written(f"clean{states}.csv", time, MODE.energy(0.15 * time))
 
 
-def _written(name: str, time: Samples, energy: Samples) -> Path:
+def _two_parts(states: int) -> Path:
+    """Energies of two springs that vibrate in the two modes of their chain, with white noise."""
+    time = np.linspace(0.0, 1.0, states)
+    slow, fast = (np.exp(-0.8 * time) * np.sin(2 * np.pi * cycles * time) for cycles in (8.0, 13.7))
+    energies = np.stack([(slow + 0.5 * fast) ** 2, (0.7 * slow - 0.6 * fast) ** 2])
+    energies += _NOISE * energies.max() * np.random.default_rng(14).standard_normal(energies.shape)
+    return _written(f"parts{states}.csv", time, *energies, names=("IE_left", "IE_right"))
+
+
+def _written(name: str, time: Samples, *energies: Samples, names: Sequence[str] = ("internal_energy",)) -> Path:
     file = Path(_folder.name) / name
     if not file.exists():
-        file.write_bytes(csv_table.write({"time": time, "internal_energy": np.round(energy, 9)}))
+        columns = {column: np.round(energy, 9) for column, energy in zip(names, energies, strict=True)}
+        file.write_bytes(csv_table.write({"time": time, **columns}))
     return file
 
 

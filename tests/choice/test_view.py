@@ -29,9 +29,11 @@ def test_the_flight_is_shown_and_what_stands_above_it_is_named() -> None:
     seen = view(made(), Flight(2.0, 8.0, "given"), [7.0])
     assert (seen.start, seen.end) == pytest.approx((1.64, 8.36))
     assert (seen.low, seen.high) == pytest.approx((0.9, 1.1), abs=1e-3)
-    assert (seen.highest, seen.cut) == (500, "landing")
-    early = view(made(np.where(TIME < 2, 900, RECORD)), Flight(2.0, 8.0, "given"), [7.0])
-    assert (early.highest, early.cut) == (900, "load")
+    assert seen.above == (("load", 50), ("landing", 500))
+
+
+def test_what_does_not_stand_above_the_flight_is_not_named() -> None:
+    assert view(made(np.where(TIME < 2, 1, RECORD)), Flight(2.0, 8.0, "given"), [7.0]).above == (("landing", 500),)
 
 
 def test_times_beyond_the_flight_are_shown_too() -> None:
@@ -42,7 +44,7 @@ def test_times_beyond_the_flight_are_shown_too() -> None:
 
 
 def test_without_a_flight_the_whole_record_is_shown_and_nothing_is_cut() -> None:
-    assert view(made(), Flight(None, None, None), [5.0]) == (0.0, 10.0, RECORD.min(), 500, 500, "")
+    assert view(made(), Flight(None, None, None), [5.0]) == (0.0, 10.0, RECORD.min(), 500, ())
 
 
 def test_a_flight_without_an_end_lasts_as_far_as_it_is_known() -> None:
@@ -59,8 +61,10 @@ def test_any_flight_of_any_record_can_be_shown(times: list[float], one: float, o
     history = History(time, np.cos(time), ("made",), "made", "energy")
     seen = view(history, Flight(start, end, "given"), [float(time[0] + td * (time[-1] - time[0]))])
     assert time[0] <= seen.start < seen.end <= time[-1]
-    assert seen.low <= seen.high <= seen.highest
-    assert (seen.cut == "") == (seen.high == seen.highest)
+    assert seen.low <= seen.high
+    highest = history.between(seen.start, seen.end)[1].max(initial=seen.high)
+    assert max([seen.high, *(energy for _, energy in seen.above)]) == highest
+    assert all(energy > seen.high for _, energy in seen.above)
 
 
 def test_the_motion_is_that_of_the_record_until_tr_rigid_then_and_continuous() -> None:

@@ -88,6 +88,7 @@ def test_parts_are_completed_from_the_history_that_was_typed() -> None:
         (("--td", "0.064", "--after", "86", ENERGY), "Then give --after 0.086, in the unit of the record"),
         (("--td", "0.064", "--fit-window", "10", "60", ENERGY), "Then give --fit-window 0.01 0.06, in the unit of"),
         (("--td-window", "0.06", "0.2", ENERGY), "--td-window 0.06 0.2 reaches outside the record, 0 to 0.15\n"),
+        (("--td", "0.16", ENERGY), "--td 0.16 lies outside the record, 0 to 0.15\n"),
         (("--td", "0.6", ENERGY), "--td 0.6 lies outside the record, 0 to 0.15\n"),
         (("--td", "64ms", ENERGY), "give a number in the unit of the history, 0.064 where it is s"),
         (("64", ENERGY), "a time is given as --td, a number in the unit of the record"),

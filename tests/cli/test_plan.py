@@ -250,7 +250,7 @@ def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(history: list[s
     assert judged.exit_code == 0, judged.stdout
     again = run(*args)
     assert again.exit_code == 2
-    assert "exists" in again.stderr
+    assert "the file exists; choose another folder or --overwrite" in again.stderr
     assert run(*args, "--overwrite").exit_code == 0
     alone = run("plan", "--part", "box", "--write-deck", str(folder), *history)
     assert alone.exit_code == 2

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from d2rpick.choice.examine import examine
@@ -15,6 +16,7 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
 from d2rpick.flight.energy_alone import quiet_time
 from d2rpick.flight.flight import seen_flight
+from d2rpick.histories.digits import window_as_read
 from d2rpick.histories.history import Balance, Given, History
 from d2rpick.histories.opening import open_run
 from d2rpick.histories.selection import Selection
@@ -75,6 +77,30 @@ def test_every_format_of_a_run_tells_its_flight_within_a_millisecond(rolled: Rol
     assert not codes(found) & {"contact-in-window", "work-in-window", "flight-sources-disagree"}
 
 
+@pytest.mark.parametrize(
+    ("names", "options"),
+    [
+        (("x velocity", "z velocity"), ()),
+        (("Global_X_Velocity [m/s]", "Global_Z_Velocity [m/s]"), ()),
+        (("v1", "v2"), ("--channel", "x_velocity=v1", "--channel", "z_velocity=v2")),
+    ],
+)
+def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
+    names: tuple[str, str], options: tuple[str, ...], rolled: Rolled, tmp_path: Path
+) -> None:
+    table = pd.read_csv(rolled.files["csv"])
+    velocities = {name: table[axis] / 50.0 for name, axis in zip(names, ("momentum_x", "momentum_z"), strict=True)}
+    kept = table[["time", "internal_energy"]].assign(**velocities, mass=50.0)
+    kept.to_csv(tmp_path / "run.csv", index=False)
+    td = str(round(rolled.end - 0.01, 3))
+    found, expected = (
+        answer("suggest", "--td", td, *asked, str(file))["flight"]
+        for asked, file in ((options, tmp_path / "run.csv"), ((), rolled.files["csv"]))
+    )
+    assert found == expected
+    assert found["source"] == "momentum"
+
+
 @pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])
 def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, form: str, tmp_path: Path) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
@@ -82,7 +108,8 @@ def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, form: 
     result = run("suggest", "--td", str(td), "-f", "json", *part, file)
     assert result.exit_code == 1
     assert "no free flight at td" in result.stderr
-    assert f"to {json.loads(result.stdout)['flight']['end']:.6g}" in result.stderr
+    flight = json.loads(result.stdout)["flight"]
+    assert window_as_read(flight["start"], flight["end"]) in result.stderr
     judged = answer("verify", "--tr", "0.2", "--td", str(td), *part, file)
     assert (judged["verified"], judged["td_ok"]) == (False, False)
     rows = answer("study", "--td", str(td), *part, file)["runs"]

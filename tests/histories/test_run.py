@@ -67,7 +67,7 @@ def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() ->
     assert run.part_energies(run.parts).tolist() == [
         [values("internal_energy", state, id_) for id_ in (7, 3)] for state in range(1, 8)
     ]
-    assert run.notes == ("1 states have the same printed time as the next one; the last of equal times counts",)
+    assert run.notes == ("1 state has the same printed time as the next one; the last of equal times counts",)
 
 
 def test_a_missing_branch_is_named_with_what_there_is() -> None:

@@ -16,11 +16,12 @@ from hypothesis import strategies as st
 
 import d2rpick as d2
 from d2rpick.library.answers import written
-from tests.command import BOX, DECK, ENERGY, ROLLOVER, answer, run
+from d2rpick.report.keys import MEASURES
+from tests.command import BOX, DECK, ENERGY, GLSTAT, ROLLOVER, answer, run
 from tests.sample_deck import DECK as SAMPLE_DECK
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
 TD = "0.0687534"
 loose: Any = d2  # for what a type checker would not let pass
@@ -29,6 +30,14 @@ loose: Any = d2  # for what a type checker would not let pass
 def same(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> None:
     """Hold two documents against each other, but for the command that asked for them."""
     assert {**mine, "command": None} == {**theirs, "command": None}
+
+
+def holds(frame: pd.DataFrame, rows: Sequence[Mapping[str, Any]], *, but: Collection[str] = ()) -> None:
+    """Ask for every value of the rows of a document, bit for bit, NaN where it is null."""
+    assert len(frame) == len(rows) > 0
+    for told, expected in zip(frame.to_dict("records"), rows, strict=True):
+        for key in expected.keys() - {*but}:
+            assert pd.isna(told[key]) if expected[key] is None else told[key] == expected[key], key
 
 
 @st.composite
@@ -49,8 +58,13 @@ def test_the_library_and_the_command_line_say_the_same(
     file = tmp_path / "run.csv"
     pd.DataFrame({"time": record[0], "internal_energy": record[1]}).to_csv(file, index=False)
     run = d2.read(file)
-    same(d2.suggest(run, td).to_dict(), answer("suggest", "--td", repr(td), str(file)))
-    verdict = d2.verify(run, tr, td, margin=0.01)
+    found, verdict = d2.suggest(run, td), d2.verify(run, tr, td, margin=0.01)
+    same(found.to_dict(), answer("suggest", "--td", repr(td), str(file)))
+    if found.candidates:
+        holds(found.to_frame(), found.to_dict()["candidates"])
+    assert found.to_frame().attrs["basis"] == found.basis
+    measures = {"energy_td", "kinetic_share", *MEASURES, "verified", "tr_ok", "td_ok"}
+    holds(verdict.to_frame(), [{key: value for key, value in verdict.to_dict().items() if key in measures}])
     same(verdict.to_dict(), answer("verify", "--tr", repr(tr), "--td", repr(td), "--margin", "0.01", str(file)))
 
 
@@ -132,16 +146,20 @@ def test_the_command_of_an_answer_asks_the_same() -> None:
     assert found.to_dict()["command"] == list(found.command)
 
 
-def test_a_table_of_candidates_loses_nothing() -> None:
-    found = d2.suggest(d2.read(ROLLOVER, energy="boxIE_J"), td=0.37)
-    frame = found.to_frame()
-    assert len(frame) == len(found.candidates) > 1
-    for row, candidate in zip(frame.to_dict("records"), found.candidates, strict=True):
-        for name in ("tr", "energy", "level_error", "tr_low", "tr_high", "rigid_time", "acceptable", "kind"):
-            assert row[name] == getattr(candidate, name)
-        assert candidate.residual is None
-        assert np.isnan(row["residual"])
-    assert frame.attrs["basis"] == found.basis == "energy"
+def test_tables_lose_nothing_that_the_json_has(tmp_path: Path) -> None:
+    """Of a part the shares in each flight, of a td what stands for itself beside the row: lists are no cells."""
+    run = d2.read(BOX)
+    plan, parts = d2.plan(run, parts="box"), d2.parts(run, deck=SAMPLE_DECK)
+    holds(plan.to_frame(), plan.to_dict()["windows"])
+    holds(parts.to_frame(), parts.to_dict()["parts"], but=["flights"])
+    holds(parts.sets_frame(), parts.to_dict()["sets"])
+    study = d2.study([BOX, tmp_path / "absent"], td=0.37)
+    holds(study.to_frame(), study.to_dict()["runs"])
+    findings = d2.check(DECK, history=d2.read(GLSTAT))
+    holds(findings.to_frame(), findings.to_dict()["findings"])
+    explored = d2.explore(run, parts="box", steps=10)
+    lists = ["quality_reasons", "acceptable_windows", "expected"]
+    holds(explored.to_frame(), explored.to_dict()["offers"], but=lists)
 
 
 def test_a_table_of_a_run_holds_its_energies() -> None:

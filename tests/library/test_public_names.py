@@ -36,6 +36,13 @@ def test_every_public_name_is_there_and_says_what_it_is(name: str) -> None:
     assert getattr(d2, name).__doc__
 
 
+def test_every_function_has_an_example_its_errors_and_its_arguments() -> None:
+    for function in filter(isfunction, (getattr(d2, name) for name in d2.__all__)):
+        text = function.__doc__ or ""
+        assert ">>> " in text, function.__name__
+        assert all(part in text for part in ("Parameters\n", "Raises\n", "Returns\n")), function.__name__
+
+
 def test_the_public_names_are_all_that_is_shown() -> None:
     assert dir(d2) == sorted(d2.__all__)
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.trade_off import STEPS
+from d2rpick.histories.digits import window_as_read
 from d2rpick.report.html import resource
 from d2rpick.report.tables import measure, short
 from tests.command import ENERGY, ROLLOVER, run
@@ -248,7 +249,7 @@ def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None
         browser.find(".handle").send_keys(Keys.ARROW_LEFT)
         found = suggested(browser.value("command"))
         (kept,) = (one for one in found["acceptable_windows"] if one["recommended"])
-        assert f"{short(kept['start'])} to {short(kept['end'])}" in browser.value("windows")
+        assert window_as_read(kept["start"], kept["end"]) in browser.value("windows")
         assert browser.value("after").startswith(f"about {found['expected']['ratio']:.0%}")
     assert not browser.driver.find_elements("css selector", ".motion")
     assert browser.complaints() == []

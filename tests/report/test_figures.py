@@ -17,7 +17,7 @@ from d2rpick.report.figures_study import draw_study
 from d2rpick.studies.common import Common
 from d2rpick.studies.row import StudyRow
 from d2rpick.studies.study import Study
-from tests.command import BOX, ENERGY
+from tests.command import BOX, ENERGY, ROOT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,6 +25,14 @@ if TYPE_CHECKING:
 
 def texts(axes: Axes) -> list[str]:
     return [text.get_text() for text in axes.texts]
+
+
+def test_load_and_landing_are_both_cut_with_a_mark() -> None:
+    (axes,) = d2.suggest(d2.read(ROOT / "sample_data" / "rollover_box.matsum"), td=0.37, parts="box").plot().axes
+    assert [text for text in texts(axes) if "\u2191" in text] == [
+        "load, up to 70.09 \u2191",
+        "landing, up to 52.09 \u2191",
+    ]
 
 
 def marks(axes: Axes) -> list[int]:

@@ -217,6 +217,17 @@ def test_missing_lines_of_a_card_are_named(tmp_path: Path) -> None:
         assert not found(tmp_path, deck)["D2R002"]
 
 
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        ("         1\n", "the second line (XC to TM) and the third line (IXX to IZZ) are missing;"),
+        ("         1\n       0.0\n", "the third line (IXX to IZZ) is missing;"),
+    ],
+)
+def test_missing_lines_of_an_inertia_are_named(rows: str, told: str, tmp_path: Path) -> None:
+    assert told in message(tmp_path, "D2R001", HEAD + PARTS + "*DEFORMABLE_TO_RIGID_INERTIA\n" + rows + END)
+
+
 def test_contacts_are_listed_where_none_has_the_number(tmp_path: Path) -> None:
     deck = next(iter(RULES["D2R007"].failing)).deck
     assert "the deck has 7 (*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID 'floor')" in message(tmp_path, "D2R007", deck)

@@ -159,9 +159,8 @@ def _cells(where: str, row: str, layout: Layout) -> list[str]:
     if layout.names and is_time(cells[0]) and is_time(layout.names[0]):
         raise FormatError(f"{where}: a second header, another curve begins here; put each curve into its own file")
     if len(cells) != layout.columns:
-        raise FormatError(
-            f"{where}: {len(cells)} values, {layout.columns} were expected as in the other rows; repair the line"
-        )
+        found = "1 value" if len(cells) == 1 else f"{len(cells)} values"
+        raise FormatError(f"{where}: {found}, {layout.columns} were expected as in the other rows; repair the line")
     return cells
 
 

@@ -225,9 +225,9 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
         ("time,IE\n0,1\n1,1e999\n2,3\n", "table:3: 'IE' is '1e999'"),
         ("time,IE\n0,1\n1,1_0\n2,3\n", "table:3: 'IE' is '1_0'"),
         ("time,IE\n0,1\n\n1,*****\n2,3\n", r"table:4: 'IE' is '\*\*\*\*\*'"),
-        ("time,IE\n0,1\n1\n2,3\n", "table:3: 1 values, 2 were expected"),
+        ("time,IE\n0,1\n1\n2,3\n", "table:3: 1 value, 2 were expected"),
         ("time,IE\n0,1\n1,2,3\n2,3\n", "table:3: 3 values, 2 were expected"),
-        ("time,IE\n0,1\n1,2\nend\n", "table:4: 1 values"),
+        ("time,IE\n0,1\n1,2\nend\n", "table:4: 1 value,"),
         ("time,IE\n0\n1,2\n2,3\n", "table:2: '0' differs from the rows below"),
         ("time,IE\n0,-\n1,2\n2,3\n", "table:2: '0,-' differs from the rows below"),
         ("time;IE\n0,5;1.5\n0,6;1,5\n", "table:2: 'IE' is '1.5'|table:2: '0,5;1.5' differs"),
@@ -275,7 +275,7 @@ LONG = [f"{i},{i % 7}.5" for i in range(20_000)]  # more than a table is read in
 @pytest.mark.parametrize(
     ("row", "text", "reason"),
     [
-        (18_000, "18000", "table:18002: 1 values"),
+        (18_000, "18000", "table:18002: 1 value,"),
         (18_000, "18000,1,2", "table:18002: 3 values"),
         (18_000, "18000,1_0", "table:18002: 'IE' is '1_0'"),
         (18_000, "18000,nan", "table:18002: 'IE' is 'nan'"),

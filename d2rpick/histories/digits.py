@@ -1,0 +1,87 @@
+"""Numbers in the digits that people read: times in six, which are typed again, and errors in three."""
+
+from __future__ import annotations
+
+from typing import Final
+
+_DIGITS: Final = 6
+# No file has more digits of a time, and a double has some to spare.
+_EXACT: Final = 12
+
+
+def as_read(time: float) -> float:
+    """Give the time that is typed again where one was read.
+
+    Examples
+    --------
+    >>> as_read(0.0128852793630525)
+    0.0128853
+    """
+    return float(f"{time:.{_DIGITS}g}")
+
+
+def sum_as_read(time: float, further: float) -> float:
+    """Add two times that were read without the digits that only a sum of doubles has.
+
+    Examples
+    --------
+    >>> 0.2884 - 0.02, sum_as_read(0.2884, -0.02)
+    (0.26839999999999997, 0.2684)
+    """
+    return float(f"{time + further:.{_EXACT}g}") if further else time
+
+
+def not_before(time: float) -> float:
+    """Give the first time in six digits that is not before this one.
+
+    Examples
+    --------
+    >>> not_before(0.1000520661), not_before(0.25)
+    (0.100053, 0.25)
+    """
+    read = as_read(time)
+    return read if read >= time else _stepped(read, 1)
+
+
+def not_after(time: float) -> float:
+    """Give the last time in six digits that is not after this one.
+
+    Examples
+    --------
+    >>> not_after(0.1986539), not_after(0.25)
+    (0.198653, 0.25)
+    """
+    read = as_read(time)
+    return read if read <= time else _stepped(read, -1)
+
+
+def window_as_read(start: float, end: float) -> str:
+    """Write a window so that every time from the one to the other, as they are read, lies in it.
+
+    One that is too short for that is written in full.
+
+    Examples
+    --------
+    >>> window_as_read(0.08800000000000001, 0.3108), window_as_read(0.10005206, 0.10005208)
+    ('0.0880001 to 0.3108', '0.10005206 to 0.10005208')
+    """
+    low, high = not_before(start), not_after(end)
+    return f"{low:.{_DIGITS}g} to {high:.{_DIGITS}g}" if low <= high else f"{float(start)!r} to {float(end)!r}"
+
+
+def above(value: float, limit: float) -> str:
+    """Write a value that is above a limit in three digits, or in as many as show that it is.
+
+    Examples
+    --------
+    >>> above(0.31416, 0.2), above(0.20004, 0.2)
+    ('0.314', '0.20004')
+    """
+    texts = (f"{value:.{digits}g}" for digits in range(3, 17))
+    return next((text for text in texts if float(text) > limit), repr(float(value)))
+
+
+def _stepped(read: float, steps: int) -> float:
+    """Go on by some units of the last digit that is read."""
+    mantissa, _, exponent = f"{read:.{_DIGITS - 1}e}".partition("e")
+    return float(f"{int(mantissa.replace('.', '')) + steps}e{int(exponent) - _DIGITS + 1}")

@@ -1,0 +1,187 @@
+"""One question has one answer: pairs, windows and flights that are named are those that another command finds there."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.acceptable_windows import acceptable_windows
+from d2rpick.choice.of_run import read
+from d2rpick.choice.plan import plan_of
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.choice.suggest_td import suggest_in_longest_flight
+from d2rpick.choice.verify import Verdict, verify
+from d2rpick.flight.flight import all_seen, seen_flight
+from d2rpick.histories.digits import as_read
+from d2rpick.histories.opening import Selection
+from d2rpick.report.suggestion import acceptable
+from d2rpick.rules.judgement import faults_of
+from tests.choice.test_same_answers import made
+from tests.drops import drop, written
+from tests.energies import codes, of
+from tests.shared import shared
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from d2rpick.choice.of_run import Reference
+    from d2rpick.histories.history import History, Samples
+
+PLAIN = Settings()
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory: pytest.TempPathFactory) -> Reference:
+    return read(written(drop(), tmp_path_factory.mktemp("run")), Selection(parts=("box",)))
+
+
+def resting() -> History:
+    """Constant energy over times of many digits."""
+    time = 0.10005206614732742 + np.linspace(0, 1, 101)
+    return of(np.ones(time.size), time)
+
+
+def save(file: Path, time: Samples, energy: Samples) -> None:
+    table = np.stack([time, energy], axis=1)
+    np.savetxt(file, table, delimiter=",", header="time,internal_energy", comments="", fmt="%.17g")
+
+
+def read_again(history: History, tr: float, td: float, asked: Settings) -> Verdict:
+    """Judge a pair as it is read."""
+    return verify(history, as_read(tr), as_read(td), asked)
+
+
+@pytest.mark.parametrize("td", [0.7, 0.8])
+def test_the_better_pair_is_what_is_said_of_its_td(td: float) -> None:
+    history = made("five modes")
+    pair = suggest(history, td, PLAIN).better_pair
+    assert pair
+    assert suggest(history, pair.td, PLAIN).recommended == pair
+
+
+@pytest.mark.parametrize("asked", [{"max_residual": 0.9}, {"max_kinetic_share": 0.9}])
+def test_where_nothing_vibrates_no_tr_is_acceptable_that_does_not_verify(asked: dict[str, Any]) -> None:
+    history, settings = resting(), Settings(after=0.3, **asked)
+    answer = suggest(history, 0.8, settings)
+    assert answer.situation.at_rest
+    assert not verify(history, 0.5, 0.8, settings).verified
+    assert not answer.windows
+    assert not acceptable_windows(answer.situation, answer.candidates, None).size
+
+
+def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:
+    history = resting()
+    asked = Settings(after=float(history.time[0]))
+    answer = suggest(history, 0.8, asked)
+    assert "at-rest" in codes(answer)
+    assert answer.recommended
+    assert read_again(history, *answer.recommended[:2], asked).verified
+
+
+def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
+    for margin in (0.0123456789, 0.02):
+        asked = Settings(margin=margin)
+        for row in plan_of(box, asked).rows:
+            if row.window:
+                assert read_again(box.history, *row.window, asked).verified
+
+
+def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
+    history, asked = made("five modes"), Settings(after=0.1)
+    answer = suggest(history, 0.8, asked)
+    line = acceptable(answer.windows or (), None)
+    windows = re.findall(r"(\S+) to (\S+) \(", line)
+    assert len(windows) > 2
+    for start, end in windows:
+        assert verify(history, float(start), 0.8, asked).verified
+        assert verify(history, float(end), 0.8, asked).verified
+
+
+def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) -> None:
+    second = plan_of(box, PLAIN).rows[1]
+    after = (second.start + second.end) / 2
+    (row,) = (one for one in plan_of(box, Settings(after=after)).rows if one.number == second.number)
+    assert row.window
+    flight = verify(box.history, *row.window, Settings(after=after)).situation.flight
+    assert (row.flight.start, row.flight.end, row.flight.source) == (after, flight.end, flight.source)
+    assert row.margin.time == pytest.approx(0.03 * (second.end - after))
+    assert row.window[1] <= row.end - row.margin.time
+
+
+def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None:
+    asked = Settings(margin=0.01)
+    flight = plan_of(box, PLAIN).rows[1]
+    verdict = verify(box.history, flight.start + 0.005, flight.end - 0.005, asked)
+    reasons = [reason for reason in verdict.reasons if "with the margin" in reason]
+    told = [fault.message for fault in faults_of(verdict) if fault.rule == "D2R204"]
+    assert len(reasons) == len(told) == 2
+    for reason, message in zip(reasons, told, strict=True):
+        assert reason.removeprefix("td ") in message
+
+
+@pytest.mark.parametrize("margin", [None, 0.01])
+def test_the_last_td_that_is_named_lies_in_the_flight(box: Reference, margin: float | None) -> None:
+    asked, flights = Settings(margin=margin), plan_of(box, PLAIN).rows
+    answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, asked)
+    (message,) = (one.message for one in answer.cautions if one.code == "no-free-flight")
+    found = re.search(r"its last td is (\S+)$" if margin else r"to (\S+), the last td in it$", message)
+    assert found
+    assert suggest(box.history, float(found[1]), asked).recommended
+
+
+@pytest.mark.parametrize("file", ["rollover_r100_T01.gz", "rollover_referenceT01.gz", "car_drop/drop2T01.gz"])
+def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
+    history = read([str(shared(f"openradioss/{file}"))]).history
+    listed = all_seen(history)
+    assert listed
+    for source, flight in listed:
+        used = seen_flight(history, (flight.start + flight.end) / 2)
+        assert (source, flight) == (used.source, used.flight)
+
+
+def test_an_error_that_is_refused_reads_as_too_large() -> None:
+    history, td = made("one mode"), 0.8
+    best = suggest(history, td, PLAIN).chosen
+    assert best
+    assert best.residual
+    barely = Settings(max_residual=best.residual * (1 - 1e-6))
+    (reason,) = (one for one in verify(history, best.tr, td, barely).reasons if "above the limit" in one)
+    value, limit = map(float, re.findall(r"[\d.]+", reason))
+    assert value > limit
+
+
+def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it(tmp_path: Path) -> None:
+    """An oscillator is seen around some td of the flight, but not around the one that is chosen."""
+    rng, time = np.random.default_rng(0), np.linspace(0, 1, 1500)
+    load, contact, omega, alpha = rng.uniform(0.05, 0.3), rng.uniform(0.6, 0.9), rng.uniform(20, 60), rng.uniform(0, 3)
+    energy = np.exp(-alpha * time) * np.sin(omega * time + omega) ** 2
+    energy += np.where(time < load, 6 * np.sin(np.pi * time / load) ** 2, 0)
+    energy += np.where(time > contact, 20 * ((time - contact) / (1 - contact)) ** 2, 0)
+    file = tmp_path / "energy.csv"
+    save(file, time, energy)
+    reference = read([str(file)])
+    rows = [row for row in plan_of(reference, PLAIN).rows if row.window]
+    assert rows
+    for row in rows:
+        assert row.window
+        flight = verify(reference.history, *row.window, PLAIN).situation.flight
+        assert (row.flight.source, row.flight.certain, row.start) == (flight.source, flight.certain, flight.start)
+
+
+def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does(tmp_path: Path) -> None:
+    time = np.linspace(0, 1, 1500)
+    energy = np.exp(-time) * np.sin(40 * time) ** 2 + np.where(time > 0.8, 30 * (time - 0.8), 0)
+    file, asked = tmp_path / "energy.csv", Settings(after=0.1)
+    save(file, time, energy)
+    reference = read([str(file)])
+    (row,) = plan_of(reference, asked).rows
+    assert row.window
+    flight = verify(reference.history, *row.window, asked).situation.flight
+    assert row.flight == flight
+    assert row.end == pytest.approx(0.8, abs=0.01)
+    assert row.margin.source == "flight"
+    assert suggest_in_longest_flight(reference.history, asked).td_window == (0.1, row.end)

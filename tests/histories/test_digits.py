@@ -1,0 +1,36 @@
+"""Times as they are read and typed again."""
+
+from __future__ import annotations
+
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from d2rpick.histories.digits import above, as_read, not_after, not_before, window_as_read
+
+TIMES = st.floats(-1e9, 1e9).filter(lambda time: not 0 < abs(time) < 1e-290)
+
+
+@given(TIMES)
+@example(0.0)
+@example(0.999999999)
+@example(-0.999999999)
+@example(99999.95)
+def test_a_time_that_is_rounded_is_the_nearest_of_six_digits_on_its_side(time: float) -> None:
+    below, above = not_after(time), not_before(time)
+    assert below <= time <= above
+    assert as_read(below) == below
+    assert as_read(above) == above
+    assert as_read(time) in (below, above)
+    assert (below == above) == (as_read(time) == time)
+
+
+@given(TIMES, st.floats(0, 1e3))
+def test_a_window_that_is_read_lies_in_the_window(start: float, length: float) -> None:
+    low, high = map(float, window_as_read(start, start + length).split(" to "))
+    assert start <= low <= high <= start + length
+
+
+@given(st.floats(0, 1e3), st.floats(1e-12, 1.0))
+def test_what_is_above_a_limit_reads_as_above_it(limit: float, more: float) -> None:
+    value = limit + more
+    assert value == limit or limit < float(above(value, limit)) <= value * (1 + 5e-3)
