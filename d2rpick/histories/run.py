@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import FormatError, listing
-from d2rpick.histories.companions import doubts
+from d2rpick.histories.companions import check_sum, doubts
 from d2rpick.histories.history import History, Momenta, Track
 from d2rpick.histories.names import QUANTITIES, quantity_note
 from d2rpick.histories.selection import menu, select_parts
@@ -180,6 +180,7 @@ class Run:
             raise FormatError(f"{self.name}: no states; did the run reach its first output?")
         if selection.parts:
             chosen = select_parts(selection.parts, self._holder().parts, self.name)
+            self._check_sum()
             springs = self.springs if selection.springs is None else _numbered(selection.springs, self.parts)
             return self._of_parts(chosen, springs)
         if selection.energy:
@@ -188,6 +189,18 @@ class Run:
             if database.energy_channel is not None:
                 return self._without_springs(database, database.energy_channel)
         return self._of_all_parts()
+
+    def _check_sum(self) -> None:
+        """Refuse parts of another run than the model; what is not in every state is said when it is asked for."""
+        holder = self._holder()
+        if len(self.databases) == 1:
+            return
+        try:
+            energies = self.part_energies(self.parts)
+        except FormatError:
+            return
+        for database in self.databases:
+            check_sum(database, holder, energies)
 
     def _holder(self) -> Legs:
         """The database that knows parts; FormatError with what there is instead of them."""
