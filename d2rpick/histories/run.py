@@ -180,7 +180,6 @@ class Run:
             raise FormatError(f"{self.name}: no states; did the run reach its first output?")
         if selection.parts:
             chosen = select_parts(selection.parts, self._holder().parts, self.name)
-            self._check_sum()
             springs = self.springs if selection.springs is None else _numbered(selection.springs, self.parts)
             return self._of_parts(chosen, springs)
         if selection.energy:
@@ -189,18 +188,6 @@ class Run:
             if database.energy_channel is not None:
                 return self._without_springs(database, database.energy_channel)
         return self._of_all_parts()
-
-    def _check_sum(self) -> None:
-        """Refuse parts of another run than the model; what is not in every state is said when it is asked for."""
-        holder = self._holder()
-        if len(self.databases) == 1:
-            return
-        try:
-            energies = self.part_energies(self.parts)
-        except FormatError:
-            return
-        for database in self.databases:
-            check_sum(database, holder, energies)
 
     def _holder(self) -> Legs:
         """The database that knows parts; FormatError with what there is instead of them."""
@@ -216,6 +203,8 @@ class Run:
     def _of_parts(self, chosen: tuple[Part, ...], springs: tuple[Part, ...] = ()) -> History:
         holder = self._holder()
         energies = self.part_energies(chosen)
+        for database in self.databases:
+            check_sum(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
         if not energies[:, ~left_out].any():  # springs are all that has energy
             left_out[:] = False
