@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.choice.of_run import Reference, verify_of
-from d2rpick.choice.verify import verify_at
+from d2rpick.choice.of_run import Reference, judge_of, verify_of
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
 from d2rpick.deck.printing.common import Printing
 from d2rpick.errors import D2RPickError
@@ -57,13 +56,10 @@ class SolverInput(NamedTuple):
     refusal: str | None = None
 
 
-def input_for(situation: Situation, tr: float, request: CardRequest) -> SolverInput:
+def input_for(reference: Reference, situation: Situation, tr: float, request: CardRequest) -> SolverInput:
     """Print the card of ``tr`` and the td of a situation, judged as it is printed."""
     solver, _ = request.of(situation.history)
-
-    def judge(early: float, late: float) -> Verdict:
-        return verify_at(situation.at(late), early)
-
+    judge = partial(judge_of, reference, situation)
     try:
         found = judged_card([(tr, situation.td)], situation.history, judge, request.by(situation.settings))
     except D2RPickError as error:

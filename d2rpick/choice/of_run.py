@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from d2rpick.choice.examine import examine
 from d2rpick.choice.suggest import Suggestion, suggest_at
-from d2rpick.choice.verify import Verdict, verify, with_comparison
+from d2rpick.choice.verify import Verdict, verify, verify_at, with_comparison
 from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.opening import Selection, open_run
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History, Part, Track
     from d2rpick.histories.run import Run
     from d2rpick.vibration.fits import Fits
@@ -96,6 +97,18 @@ def verify_of(reference: Reference, tr: float, td: float, settings: Settings) ->
         If a time lies outside the record or tr is not before td.
     """
     return _with_health(verify(reference.history, tr, td, settings), reference.run)
+
+
+def judge_of(reference: Reference, known: Situation, tr: float, td: float) -> Verdict:
+    """Judge a pair whose td is that of a situation, or nearly so as it is printed, as `verify_of` does.
+
+    Raises
+    ------
+    RangeError
+        If a time lies outside the record or tr is not before td.
+    """
+    there = known if td == known.td else examine(reference.history, td, known.settings, known.fits)
+    return _with_health(verify_at(there, tr), reference.run)
 
 
 def compare_with(verdict: Verdict, reference: Reference, switched: Reference) -> Verdict:

@@ -16,8 +16,8 @@ from d2rpick.cli.wording import in_words, with_options
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
+    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.trade_off import TradeOff
-    from d2rpick.histories.opening import Run
 
 EXAMPLES = """\b
 Examples:
@@ -91,7 +91,7 @@ def command(
 
         output.write(extras.plot, figures.render(draw_trade_off(found), extras.plot))
     if extras.report:
-        output.write(extras.report, text_bytes(with_options(_page(found, run, options))))
+        output.write(extras.report, text_bytes(with_options(_page(found, reference, options))))
     text = write("trade_off", output_format, found, Shown(ctx.meta["d2rpick.command"], limit))
     output.result(in_words(text, output_format))
     chosen = found.recommended
@@ -99,13 +99,15 @@ def command(
     return finish(ctx, objection=poor, exit_zero=exit_zero)
 
 
-def _page(found: TradeOff, run: Run, options: dict[str, Any]) -> str:
+def _page(found: TradeOff, reference: Reference, options: dict[str, Any]) -> str:
     """Draw the figures, and write the page around them."""
     from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import PageContext
     from d2rpick.report.trade_off_page import as_page, drawn
 
-    request = card_request(run, options, found.situation.history)
+    request = card_request(reference.run, options, found.situation.history)
     pair, judging = found.suggestion.recommended, typed.judging(options)
-    card = input_for(found.suggestion.situation, pair.tr, request) if pair else None
-    return as_page(found, PageContext(run, typed.repeat(), judging, drawn(found), card, explorer=explorer_of([found])))
+    card = input_for(reference, found.suggestion.situation, pair.tr, request) if pair else None
+    return as_page(
+        found, PageContext(reference.run, typed.repeat(), judging, drawn(found), card, explorer=explorer_of([found]))
+    )

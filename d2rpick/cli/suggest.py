@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,7 +18,6 @@ from d2rpick.report.formats import FORMATS, Shown, write
 if TYPE_CHECKING:
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.suggest import Suggestion
-    from d2rpick.histories.opening import Run
 
 EXAMPLES = """\b
 Examples:
@@ -100,7 +100,7 @@ def command(
         output.write(extras.report, text_bytes(with_options(_page(answer, reference, options))))
     poor = shared.falls_short(answer.quality, min_quality)
     if output_format == "card":
-        passed = _card(answer, run, options, output)
+        passed = _card(answer, reference, options, output)
         return finish(ctx, objection=not passed or poor, exit_zero=exit_zero)
     text = write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit))
     output.result(in_words(text, output_format))
@@ -127,25 +127,23 @@ def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> 
 
     run = reference.run
     request, pair = card_request(run, options, answer.situation.history), answer.recommended
-    card = input_for(answer.situation, pair.tr, request) if pair else None
+    card = input_for(reference, answer.situation, pair.tr, request) if pair else None
     explorer = explorer_of([explored_around(reference, answer.situation, answer.td_window)])
     judging = typed.judging(options)
     return as_page(answer, PageContext(run, typed.repeat(), judging, drawn(answer), card, explorer=explorer))
 
 
-def _card(answer: Suggestion, run: Run, options: dict[str, Any], output: Output) -> bool:
+def _card(answer: Suggestion, reference: Reference, options: dict[str, Any], output: Output) -> bool:
     """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
     from d2rpick.choice.judged_card import judged_card
-    from d2rpick.choice.verify import verify_at
+    from d2rpick.choice.of_run import judge_of
 
     pair, situation = answer.recommended, answer.situation
     if pair is None:
         output.content(b"")
         return False
-    request = card_request(run, options, situation.history).by(situation.settings)
-    found = judged_card(
-        [(pair.tr, pair.td)], situation.history, lambda tr, td: verify_at(situation.at(td), tr), request
-    )
+    request = card_request(reference.run, options, situation.history).by(situation.settings)
+    found = judged_card([(pair.tr, pair.td)], situation.history, partial(judge_of, reference, situation), request)
     if found is None:
         raise click.UsageError(need_ids(request, situation.history))
     card, (verdict,) = found

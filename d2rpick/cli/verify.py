@@ -106,7 +106,7 @@ def _page(answer: Verdict, reference: Reference, switched: Run | None, options: 
 
     run = reference.run
     request = card_request(run, options, answer.situation.history)
-    card = input_for(answer.situation, answer.candidate.tr, request) if answer.verified else None
+    card = input_for(reference, answer.situation, answer.candidate.tr, request) if answer.verified else None
     explorer = explorer_of([explored_around(reference, answer.situation)])
     judging = typed.judging(options)
     return as_page(answer, PageContext(run, typed.repeat(), judging, drawn(answer), card, switched, explorer))

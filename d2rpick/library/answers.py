@@ -83,7 +83,7 @@ class Answer(Document):
 
         reference = Reference(self.run.files, self.situation.history)
         explorer = explorer_of([explored_around(reference, self.situation, td_window)], self._asking)
-        card = None if tr is None else input_for(self.situation, tr, CardRequest())
+        card = None if tr is None else input_for(reference, self.situation, tr, CardRequest())
         return page_record(self.run, self.command, figures, card, explorer)
 
 

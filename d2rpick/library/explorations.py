@@ -80,11 +80,13 @@ class Exploration(Document):
     def report(self, path: arguments.Path) -> Path:
         """Write the answer to one HTML page that needs no network; an existing file is replaced."""
         from d2rpick.choice.judged_card import CardRequest, input_for
+        from d2rpick.choice.of_run import Reference
         from d2rpick.report.trade_off_page import as_page, drawn
 
         core = self._core
         pair, explorer = core.suggestion.recommended, explorer_of([core], self._asking)
-        card = input_for(core.suggestion.situation, pair.tr, CardRequest()) if pair else None
+        there = core.suggestion.situation
+        card = input_for(Reference(self.run.files, there.history), there, pair.tr, CardRequest()) if pair else None
         return written(path, as_page(core, page_record(self.run, self.command, drawn(core), card, explorer)))
 
 

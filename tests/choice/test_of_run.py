@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick.choice import examine
 from d2rpick.choice.judged_card import CardRequest, judged_card
-from d2rpick.choice.of_run import Reference, read, suggest_of, verify_of
+from d2rpick.choice.of_run import Reference, judge_of, read, suggest_of, verify_of
 from d2rpick.choice.settings import Settings
-from d2rpick.choice.verify import verify_at
 from d2rpick.histories.opening import open_run
 from d2rpick.histories.selection import Selection
 from d2rpick.report.suggestion import as_json
@@ -93,14 +93,14 @@ def test_a_record_is_examined_once_per_question(examined: Callable[[], int]) -> 
     assert examined() == 1
     assert any("suits this td" in fault.message for fault in faults_of(verdict))
     assert examined() == 0
-    box = suggest_of(read([T01], BOX), 0.37, PLAIN)
+    reference = read([T01], BOX)
+    box = suggest_of(reference, 0.37, PLAIN)
     examined()
     assert box.recommended is not None
     request = CardRequest("ls-dyna")
     situation = box.situation
-    assert judged_card(
-        [box.recommended[:2]], situation.history, lambda tr, td: verify_at(situation.at(td), tr), request
-    )
+    judge = partial(judge_of, reference, situation)
+    assert judged_card([box.recommended[:2]], situation.history, judge, request)
     assert examined() == 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from html import unescape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from d2rpick.histories.opening import Selection
 from d2rpick.report.suggestion import acceptable
 from d2rpick.rules.judgement import faults_of
 from tests.choice.test_same_answers import made
+from tests.command import run
 from tests.drops import drop, written
 from tests.energies import codes, of
 from tests.shared import shared
@@ -128,7 +130,7 @@ def test_the_last_td_that_is_named_lies_in_the_flight(box: Reference, margin: fl
     asked, flights = Settings(margin=margin), plan_of(box, PLAIN).rows
     answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, asked)
     (message,) = (one.message for one in answer.cautions if one.code == "no-free-flight")
-    found = re.search(r"its last td is (\S+)$" if margin else r"to (\S+), the last td in it$", message)
+    found = re.search(r"its last td is (\S+)$" if margin else r"to (\S+); td must lie in it$", message)
     assert found
     assert suggest(box.history, float(found[1]), asked).recommended
 
@@ -185,3 +187,36 @@ def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does(tmp_path: 
     assert row.end == pytest.approx(0.8, abs=0.01)
     assert row.margin.source == "flight"
     assert suggest_in_longest_flight(reference.history, asked).td_window == (0.1, row.end)
+
+
+def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> None:
+    """Also of the health of the run, and of a td that is not printed as it was chosen."""
+    time = np.linspace(0, 1, 1500) / 7
+    values = np.stack([time, np.exp(-time) * np.sin(280 * time) ** 2, 0.2 + 0 * time], axis=1)
+    file = tmp_path / "energy.csv"
+    head = "time,internal_energy,hourglass_energy"
+    np.savetxt(file, values, delimiter=",", header=head, comments="", fmt="%.17g")
+    of_suggest = run("suggest", "-q", "--part", "1", "-f", "card", str(file)).stdout
+    tr, td = re.findall(r"Rigid from (\S+) to (\S+);", of_suggest)[0]
+    of_card = run("card", "-q", "--tr", tr, "--td", td, "--part", "1", "--history", str(file)).stdout
+    page = tmp_path / "page.html"
+    run("verify", "-q", "--tr", tr, "--td", td, "--part", "1", "--report", str(page), str(file))
+    judged = of_card[of_card.index("Judged by") :]
+    assert "hourglass: " in judged
+    assert of_suggest[of_suggest.index("Judged by") :] == judged
+    assert judged.splitlines()[0] in unescape(page.read_text("utf-8"))
+    assert "hourglass: " in unescape(page.read_text("utf-8")).partition("*DEFORMABLE")[0].rpartition("Judged by")[2]
+
+
+def test_a_plan_keeps_the_margin_that_it_lists(tmp_path: Path) -> None:
+    """To a td in it the energy alone shows no end of that flight."""
+    rng, time = np.random.default_rng(277), np.linspace(0, 1, 200)
+    omega, phase = rng.uniform(20, 80, 2), rng.uniform(0, 6, 2)
+    energy = np.sin(omega[0] * time + phase[0]) ** 2 + 0.5 * np.sin(omega[1] * time + phase[1]) ** 2 + 0.6
+    file = tmp_path / "energy.csv"
+    save(file, time, energy)
+    rows = [row for row in plan_of(read([str(file)]), Settings(replay=False)).rows if row.window and row.flight.end]
+    assert rows
+    for row in rows:
+        assert row.window
+        assert row.window[1] <= row.end - row.margin.time

@@ -120,7 +120,7 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
     ("line", "parts"),
     [
         ("sugest --td 1 x", ["No such command 'sugest'", "Did you mean 'suggest'?", "d2rpick --help"]),
-        ("dance", ["No such command 'dance'", "suggest, explore, plan"]),
+        ("dance", ["No such command 'dance'", "info, plan, suggest"]),
         ("suggest --tdd 1 x", ["--tdd", "Did you mean", "--td", "d2rpick suggest --help"]),
         ("verify --tolerence 1 x", ["--tolerence", "Did you mean", "--tolerance"]),
         ("suggest --td 1 --td-window 1 2 x", ["--td", "--td-window"]),

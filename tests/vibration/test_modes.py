@@ -130,7 +130,7 @@ def test_energy_of_one_part_in_which_modes_mix_is_refused() -> None:
 @pytest.mark.parametrize(
     ("time", "energy", "reason"),
     [
-        (TIME[:20], TWO.energy(TIME[:20]), "20 samples"),
+        (TIME[:20], TWO.energy(TIME[:20]), "20 states"),
         (TIME, np.ones(TIME.size), "constant"),
         (TIME, np.exp(-TIME), ""),
     ],
