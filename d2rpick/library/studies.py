@@ -147,5 +147,10 @@ def study(
             rows[answer.number] = replace(row, source=names[answer.number])
     core = summarise(question.td, [rows[number] for number in range(len(names))])
     times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked))
+    for name in (
+        "cost_share",
+        "step_ratio",
+    ):  # of the run time, of which neither the study nor its command says anything
+        choosing.pop(name, None)
     command = ("study", *times, *options_of(selection, choosing, input_format), *positional(names))
     return Study(core.td, core.rows, core.agree, core.common, core.cautions, command, core)

@@ -218,6 +218,11 @@ def test_a_study_and_a_check_say_what_the_command_line_says(tmp_path: Path) -> N
     assert checked.to_frame()["rule"].tolist() == [one["rule"] for one in theirs["findings"]]
 
 
+def test_the_command_of_a_study_runs_whatever_was_asked() -> None:
+    found = loose.study([ENERGY], td=0.0687534, tolerance=0.1, cost_share=0.8, step_ratio=2.0)
+    same(found.to_dict(), answer(*found.command))
+
+
 def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(tmp_path: Path) -> None:
     table = pd.read_csv("sample_data/rollover_box.csv")
     names = {"momentum_x": "a7", "momentum_z": "a8"}
