@@ -118,6 +118,8 @@ def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
     held = f"{verdict.word}{', but of poor quality' * poor}"
     result = held if verdict.verified else f"NOT verified ({'; '.join(verdict.reasons)})"
     yield f"Judged by {', '.join(history.source)}, {history.channel}:{which} {result}."
+    if verdict.situation.at_rest:  # no level to match: the warning says so
+        return
     measures = [
         f"{name} {value:.3f}"
         for name, value in (

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
 # Kinds of values, under the names by which commands ask for them.
-FILE, NAMES, PARTS = values.FILE, values.NAMES, values.PARTS
+CHANNELS, FILE, NAMES, PARTS = values.CHANNELS, values.FILE, values.NAMES, values.PARTS
 TIME, POSITIVE, NOT_NEGATIVE, FRACTION = values.TIME, values.POSITIVE, values.NOT_NEGATIVE, values.FRACTION
 STEP_RATIO = values.AT_LEAST_ONE  # elements that are rigid no longer limit the step: it cannot become smaller
 FORMATS = values.FORMATS
@@ -72,7 +72,7 @@ _FORMAT = click.option(
 )  # fmt: skip
 _TIME = click.option("--time", metavar="NAME|NUMBER", help="Time column, by name, number or HDF5 path.")
 _ENERGY = click.option(
-    "--energy", metavar="NAME|NUMBER", multiple=True, type=NAMES, cls=Either, instead_of=("part",),
+    "--energy", metavar="NAME|NUMBER", multiple=True, type=CHANNELS, cls=Either, instead_of=("part",),
     help="Energy column, label or HDF5 path; repeat it to add several.",
 )  # fmt: skip
 _CHANNEL = click.option(

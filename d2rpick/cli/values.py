@@ -8,7 +8,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from click.shell_completion import CompletionItem
+
+    from d2rpick.histories.run import Run
 
 if TYPE_CHECKING:
     FloatType = click.ParamType[float]
@@ -85,25 +89,50 @@ class PartNames(Names):
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
         """Offer the parts of the files that were typed before, and the words for several."""
-        from pathlib import Path
+        run = _typed_run(ctx)
+        parts = run.parts if run else ()
+        words = [("flying", "parts that fly together"), ("all", "every part that has energy")]
+        offered = [*((str(part.id), part.title) for part in parts), *((p.title, str(p.id)) for p in parts), *words]
+        return _completed(offered, incomplete)
 
-        from click.shell_completion import CompletionItem
 
-        from d2rpick.errors import D2RPickError
-        from d2rpick.histories.opening import open_run
+class ChannelNames(Names):
+    """Names of channels, for the shell to complete from the history that was typed before."""
 
-        words = ctx.meta.get("d2rpick.command", ())[1:]  # click has read no argument yet when an option is completed
-        offered = [("flying", "parts that fly together"), ("all", "every part that has energy")]
-        try:
-            parts = open_run([word for word in words if Path(word).exists()]).parts
-        except (D2RPickError, OSError, IndexError):
-            parts = ()
-        offered = [*((str(part.id), part.title) for part in parts), *((p.title, str(p.id)) for p in parts), *offered]
-        return [CompletionItem(name, help=text) for name, text in offered if name and name.startswith(incomplete)]
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        """Offer the channels of the files that were typed before; underscores stand for blanks, as they may."""
+        run = _typed_run(ctx)
+        names = (name.replace(" ", "_") for one in (run.databases if run else ()) for name in one.channels)
+        return _completed([(name, "") for name in names], incomplete)
+
+
+def _typed_run(ctx: click.Context) -> Run | None:
+    """Open the files that were typed before; None where they are none of a run."""
+    from pathlib import Path
+
+    from d2rpick.errors import D2RPickError
+    from d2rpick.histories.opening import open_run
+
+    words = ctx.meta.get("d2rpick.command", ())[1:]  # click has read no argument yet when an option is completed
+    try:
+        return open_run([word for word in words if Path(word).exists()])
+    except (D2RPickError, OSError, IndexError):
+        return None
+
+
+def _completed(offered: Iterable[tuple[str, str]], incomplete: str) -> list[CompletionItem]:
+    """Give the names that begin with what was typed; what a shell would take apart is left out."""
+    import re
+
+    from click.shell_completion import CompletionItem
+
+    words = [(name, told) for name, told in offered if re.fullmatch(r"[\w./-]+", name)]
+    return [CompletionItem(name, help=told) for name, told in words if name.startswith(incomplete)]
 
 
 NAMES = Names()
 PARTS = PartNames()
+CHANNELS = ChannelNames()
 FILE = File()
 TIME = Number()
 POSITIVE = Number(0.0, above=True)

@@ -32,6 +32,10 @@ _SAME = 0.01
 # Parts that are compared.
 _COMPARED = 50
 
+# Parts have no more internal energy than the model they belong to.  In files of solvers their sum exceeds it by less
+# than 0.1 % of the largest; beyond this share, and round-off beside the kinetic energy, they are of another run.
+_MORE, _ROUND_OFF = 0.1, 1e-6
+
 
 def check_companions(databases: Sequence[Legs]) -> None:
     """Refuse databases that have no time in common."""
@@ -66,6 +70,33 @@ def check_legs(legs: Sequence[Database]) -> None:
                 )
 
 
+def check_sum(whole: Legs, holder: Legs, energies: Samples) -> None:
+    """Refuse parts that have more internal energy than the whole model has at the same times.
+
+    ``energies``: those of some parts of ``holder``, shape (n, parts) [energy].
+    """
+    try:
+        if whole is holder or whole.energy_channel is None:
+            return
+    except FormatError:  # which column it is, is not asked here
+        return
+    here, there = _coincident(holder.part_time, whole.time, _room((holder, whole), (holder.part_time, whole.time)))
+    if not here.size:
+        return
+    parts, model = energies[here].sum(axis=1), whole.channel(whole.energy_channel)[there]
+    kinetic = whole.quantities.get("kinetic_energy")
+    moving = float(np.abs(whole.channel(kinetic)[there]).max()) if kinetic else 0.0
+    room, most = _MORE * float(np.abs(model).max()) + _ROUND_OFF * moving, int(np.argmax(parts - model))
+    if parts[most] - model[most] > room > 0:
+        found = (
+            f"at {holder.part_time[here][most]:.6g} the parts of {holder.source} have an energy of {parts[most]:.6g}"
+        )
+        raise FormatError(
+            f"{found}, the whole model of {whole.source} has {model[most]:.6g}: files of one run were expected; "
+            "give those of one run"
+        )
+
+
 def doubts(databases: Sequence[Legs]) -> Iterator[str]:
     """Say which databases have hardly a state at the same time, within their printed digits, or end apart."""
     for one, other in combinations(databases, 2):
@@ -77,9 +108,8 @@ def doubts(databases: Sequence[Legs]) -> Iterator[str]:
                 f"{one.source} ends at {times[0][-1]:.6g} and {other.source} at {times[1][-1]:.6g}; "
                 "are they from the same run, or is one cut?"
             )
-        room = sum(d.precisions(())[0].quantum(float(t[-1])) for d, t in zip((one, other), times, strict=True))
         coarse, fine = sorted(_common(*times), key=np.size)
-        shared = coinciding(coarse, fine, room / 2)
+        shared = coinciding(coarse, fine, _room((one, other), times))
         if shared < _FEWEST * coarse.size:
             yield (
                 f"{one.source} and {other.source} have only {shared} of {coarse.size} states at the same times; "
@@ -95,11 +125,24 @@ def coinciding(times: Samples, others: Samples, room: float) -> int:
     >>> coinciding(np.array([0.0, 0.0048730, 0.0099579]), np.array([0.0, 0.00487301, 0.00995]), 5e-7)
     2
     """
+    return _coincident(times, others, room)[0].size
+
+
+def _coincident(times: Samples, others: Samples, room: float) -> tuple[Indices, Indices]:
+    """Indices of the times that lie within ``room`` [time] of one of the others, and of the nearest of these."""
     if not others.size:
-        return 0
+        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
     behind = np.searchsorted(others, times)
-    near = [np.abs(others[np.clip(behind - step, 0, others.size - 1)] - times) for step in (0, 1)]
-    return int(np.count_nonzero(np.minimum(*near) <= room))
+    before, after = (np.clip(behind - step, 0, others.size - 1) for step in (1, 0))
+    nearest = np.where(np.abs(others[before] - times) < np.abs(others[after] - times), before, after)
+    here = np.flatnonzero(np.abs(others[nearest] - times) <= room)
+    return here, nearest[here]
+
+
+def _room(databases: Sequence[Legs], times: Sequence[Samples]) -> float:
+    """By how much a time may differ in two databases, as they print it [time]."""
+    ends = zip(databases, times, strict=True)
+    return sum(database.precisions(())[0].quantum(float(time[-1])) for database, time in ends if time.size) / 2
 
 
 def _held(leg: Database) -> set[str | int]:

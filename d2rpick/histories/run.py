@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import FormatError, listing
-from d2rpick.histories.companions import doubts
+from d2rpick.histories.companions import check_sum, doubts
 from d2rpick.histories.history import History, Momenta, Track
 from d2rpick.histories.names import QUANTITIES, quantity_note
 from d2rpick.histories.selection import menu, select_parts
@@ -203,6 +203,8 @@ class Run:
     def _of_parts(self, chosen: tuple[Part, ...], springs: tuple[Part, ...] = ()) -> History:
         holder = self._holder()
         energies = self.part_energies(chosen)
+        for database in self.databases:
+            check_sum(database, holder, energies)
         left_out = np.array([part in springs for part in chosen])
         if not energies[:, ~left_out].any():  # springs are all that has energy
             left_out[:] = False

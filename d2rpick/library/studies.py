@@ -147,7 +147,7 @@ def study(
             rows[answer.number] = replace(row, source=names[answer.number])
     core = summarise(question.td, [rows[number] for number in range(len(names))])
     times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked))
-    choosing.pop("cost_share", None)  # of the run time the study says nothing, and the command takes no option
+    choosing.pop("cost_share", None)  # of the run time neither the study nor its command says anything
     choosing.pop("step_ratio", None)
     command = ("study", *times, *options_of(selection, choosing, input_format), *positional(names))
     return Study(core.td, core.rows, core.agree, core.common, core.cautions, command, core)

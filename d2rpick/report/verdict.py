@@ -69,6 +69,8 @@ def _told(answer: Verdict) -> str:
     """The verdict, and what a pair that verifies keeps."""
     if not answer.verified:
         return answer.word
+    if answer.situation.at_rest:
+        return f"{answer.word}: tr lies in the flight, and nothing vibrates there"
     held = "its level is" if answer.situation.basis == "energy" else "its sign matches and its error is"
     return f"{answer.word}: tr lies in the flight, {held} within the tolerance"
 

@@ -78,13 +78,15 @@ def _own_error(row: StudyRow, profile: Samples) -> float:
 
 
 def fewest_digits(low: float, high: float) -> float:
-    """Give a number of the fewest digits between ``low`` and ``high``, the nearest to their middle.
+    """Give a number of the fewest digits between ``low`` and ``high``: 0, or the nearest to their middle.
 
     Examples
     --------
-    >>> fewest_digits(0.0128717, 0.0128989)
-    0.01289
+    >>> fewest_digits(0.0128717, 0.0128989), fewest_digits(0.0, 0.00027)
+    (0.01289, 0.0)
     """
+    if low <= 0.0 <= high:
+        return 0.0
     middle = (low + high) / 2
     rounded = (float(f"{middle:.{digits}g}") for digits in range(1, 18))
     return float(next((number for number in rounded if low <= number <= high), low))

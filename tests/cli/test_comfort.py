@@ -14,7 +14,7 @@ import pytest
 from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.manual import manual
 from d2rpick.version import __version__
-from tests.command import ENERGY, ROOT, TIME_LIMIT, answer, run
+from tests.command import ENERGY, GLSTAT, ROLLOVER, ROOT, TIME_LIMIT, answer, run
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -75,6 +75,15 @@ def test_parts_are_completed_from_the_history_that_was_typed() -> None:
     assert complete("suggest", MATSUM, "--part", "b") == ["box"]
     assert complete("suggest", "--part", "f") == ["flying"]
     assert complete("suggest", "absent", "--part", "a") == ["all"]
+
+
+def test_channels_are_completed_from_the_history_that_was_typed() -> None:
+    assert complete("suggest", ROLLOVER, "--energy", "") == ["boxIE_J", "stepIE_J", "IE_total_J"]
+    assert complete("suggest", "absent", "--energy", "") == []
+    (offered,) = complete("suggest", GLSTAT, "--energy", "int")
+    assert offered == "internal_energy"  # one word for the shell, and yet the channel
+    one, other = (answer("suggest", "--td", "0.064", "--energy", name, GLSTAT) for name in (offered, "internal energy"))
+    assert one["recommended"] == other["recommended"]
 
 
 @pytest.mark.parametrize(

@@ -153,6 +153,16 @@ def test_one_oscillator_is_one_flight() -> None:
     assert row["residual"] < 1e-3
 
 
+def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
+    file = str(shared("openradioss/car_drop/drop2T01.gz"))
+    asked = ("--part", "flying", "--tr", "0", "--td", "0.27")
+    told = run("verify", "-q", *asked, file).stdout.splitlines()[0]
+    assert told.endswith("by the energy level alone: tr lies in the flight, and nothing vibrates there")
+    card = run("card", "-q", "--part", "1", *asked[2:], "--solver", "ls-dyna", "--history", file).stdout
+    assert "at-rest: nothing vibrates" in card
+    assert "evel error" not in card
+
+
 def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tmp_path: Path) -> None:
     done = tmp_path / "switches.txt"
     run("plan", "-q", "-f", "value", *PART, "-o", str(done), *history)

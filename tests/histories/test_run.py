@@ -176,12 +176,37 @@ def test_companions_have_legs_of_their_own() -> None:
     run = opened(
         {
             "glstat1": glstat_text([1, 2], [1, 2]),
-            "matsum": matsum_text([1, 2, 3], [7], [[5], [6], [7]]),
+            "matsum": matsum_text([1, 2, 3], [7], [[0.5], [6.0], [7.0]]),
             "glstat2": glstat_text([2, 3], [20, 30]),
         }
     )
     assert run.history(Selection()).energy.tolist() == [1, 20, 30]
-    assert run.history(Selection(parts=("7",))).energy.tolist() == [5, 6, 7]
+    assert run.history(Selection(parts=("7",))).energy.tolist() == [0.5, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("parts", "refused"),
+    [
+        ([[1, 9], [10, 10], [5, 4]], False),  # all of it
+        ([[1, 2], [3, 4], [5, 2]], False),  # others are not written
+        ([[1, 9.9], [10, 10], [5, 4]], False),  # within what solvers round
+        ([[1, 2], [9, 15], [5, 4]], True),
+    ],
+)
+def test_parts_with_more_energy_than_the_model_are_of_another_run(parts: list[list[float]], refused: bool) -> None:
+    run = opened({"glstat": glstat_text([1, 2, 3], [10, 20, 9]), "matsum": matsum_text([1, 2, 3], [7, 3], parts)})
+    if refused:
+        with pytest.raises(FormatError, match=r"at 2 the parts of matsum have an energy of 24, .*glstat has 20"):
+            run.history(Selection(parts=("7", "3")))
+    else:
+        assert run.history(Selection(parts=("7", "3"))).energy.tolist() == [sum(row) for row in parts]
+
+
+def test_round_off_of_a_free_fall_is_no_energy_of_another_run() -> None:
+    """A box that falls has some 1e-18 J in its parts, and another 1e-18 J in all."""
+    table = b"time,internal_energy,kinetic_energy\n1,1e-18,5\n2,0,6\n3,0,7\n"
+    run = opened({"csv": table, "matsum": matsum_text([1, 2, 3], [7], [[2e-18], [3e-18], [0.0]])})
+    assert run.history(Selection(parts=("7",))).energy.size == 3
 
 
 # What is taken for the energy.

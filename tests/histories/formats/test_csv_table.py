@@ -305,22 +305,36 @@ def test_only_the_neighbourhood_of_a_bad_line_is_read_line_by_line(monkeypatch: 
     assert 0 < len(taken) < len(LONG) / 2
 
 
-ROWS = ["{},1.5", "{},-2", "{},2,", "1,7", "0,3", "{},nan", "{},1,2", "{};3", "{},x"]
-LINES = [*ROWS, "# comment", "", "  ", ",", "time,IE"]
+ROWS = ["{},1.5", "{},-2", "{},2,", "1,7", "0,3", "{},nan", "{},1,2", "{};3", "{},x", " {} , 1.5", '{},"1.5"', "{}"]
+# With a comma and a point as they stand, whatever the table takes them for.
+CELLS = ["1_0", "0x10", "1e999", "1.5d0", "1~5", "1!5", "+.5", "5.", "1e", "1 2", "-inf", "#"]
+CELLS += ["\xa01.5", "1.5\x85", "\xb2"]  # blanks and a digit beyond ASCII
+LINES = [*ROWS, *(f"{{}},{cell}" for cell in CELLS), "# comment", "# {},1", "", "  ", ",", "time,IE"]
 
 
-@given(st.lists(st.sampled_from(LINES), max_size=8))
-def test_rows_read_piece_by_piece_are_those_read_line_by_line(lines: list[str]) -> None:
-    good = [f"{number},{number}.5" for number in range(3)]
-    numbered = [line.format(number) for number, line in enumerate([*lines, *good], start=3)]
-    content = "\n".join(["time,IE", *good, *numbered, ""])
+@given(
+    st.lists(st.sampled_from(LINES), max_size=8),
+    st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (" ", "."), (" ", ",")]),
+    st.sampled_from(["", ",7", ",", ",x"]),
+    st.sampled_from(["utf-8", "latin-1", "utf-16"]),
+)
+@example(["{},1!5"], (";", ","), "", "utf-8")
+@example(["", "0,3"], (",", "."), "", "utf-8")
+def test_rows_read_piece_by_piece_are_those_read_line_by_line(
+    lines: list[str], form: tuple[str, str], tail: str, encoding: str
+) -> None:
+    good = ["{0},{0}.5"] * 3  # before and behind: times that step back would hide what is wrong with a cell
+    numbered = [line.format(number) for number, line in enumerate([*good, *lines, *good])]
+    head = "time,IE" + ",other" * (tail not in ("", ","))
+    content = "\n".join([head, *(f"{line}{tail}" if line else line for line in numbered), ""])
+    data = content.translate(str.maketrans(dict(zip(",.~!", (*form, *",."), strict=True)))).encode(encoding)
     found: list[object] = []
-    for piece, plain in ((8, table_values._plain_piece), (8, lambda *_: None), (1 << 17, lambda *_: None)):
+    for piece, plain in ((8, table_values._plain_piece), (1 << 17, table_values._plain_piece), (8, lambda *_: None)):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("d2rpick.histories.formats.text._PIECE", piece)
             patch.setattr(table_values, "_plain_piece", plain)
             try:
-                found.append(states_of(read(content)))
+                found.append(states_of(read(data)))
             except FormatError as error:
                 found.append(str(error))
     assert found[0] == found[1] == found[2]
