@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.choice.warnings import end_of_flight, end_of_load
-from d2rpick.histories.digits import above
+from d2rpick.histories.digits import above, first_as_read
 from d2rpick.vibration.measures import column_of
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def objections(
     if earliest is None:
         yield Objection(everywhere, "unknown: nothing shows when the load is over")
     else:
-        yield Objection(tr < earliest, f"before {end_of_load(situation)}")
+        yield Objection(tr < first_as_read(earliest), f"before {end_of_load(situation)}")
     yield from (Objection(everywhere, reason) for reason in _against_td(situation))
     compared = known.astype(bool)
     described = compared | bool(vibration.unknown)

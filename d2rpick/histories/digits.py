@@ -20,6 +20,17 @@ def as_read(time: float) -> float:
     return float(f"{time:.{_DIGITS}g}")
 
 
+def first_as_read(time: float) -> float:
+    """Give the time itself, or the one that is read for it where that lies before.
+
+    Examples
+    --------
+    >>> first_as_read(0.0385101065), first_as_read(0.0385101965)
+    (0.0385101, 0.0385101965)
+    """
+    return min(time, as_read(time))
+
+
 def sum_as_read(time: float, further: float) -> float:
     """Add two times that were read without the digits that only a sum of doubles has.
 

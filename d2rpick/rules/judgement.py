@@ -13,7 +13,7 @@ from d2rpick.choice.of_run import Reference, verify_of
 from d2rpick.choice.suggest import find_better_pair, suggest_at
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, end_of_flight, end_of_load
 from d2rpick.errors import name_units
-from d2rpick.histories.digits import above
+from d2rpick.histories.digits import above, first_as_read
 from d2rpick.rules.base import Fault
 
 if TYPE_CHECKING:
@@ -171,7 +171,7 @@ def _of_flight(verdict: Verdict) -> Iterator[Fault]:
     earliest = situation.earliest_tr
     if earliest is None:
         yield Fault("D2R204", False, _UNKNOWN)
-    elif tr < earliest:
+    elif tr < first_as_read(earliest):
         end = f"before {end_of_load(situation)} ({situation.flight.source})"
         yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; {_way_out(verdict)}")
     if situation.td > situation.latest_td:

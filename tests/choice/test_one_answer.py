@@ -220,3 +220,16 @@ def test_a_plan_keeps_the_margin_that_it_lists(tmp_path: Path) -> None:
     for row in rows:
         assert row.window
         assert row.window[1] <= row.end - row.margin.time
+
+
+def test_a_crossing_at_the_start_of_the_flight_may_be_typed_as_it_is_read() -> None:
+    time = 0.10005206614732742 + np.linspace(0, 1, 401)
+    history = of(1 + np.sin(40 * (time - time[60])) ** 2, time)
+    start = float(time[60])
+    asked = Settings(after=start, replay=False)
+    assert as_read(start) < start
+    for tr in (start, as_read(start)):
+        verdict = verify(history, tr, float(time[60] + np.pi / 10), asked)
+        assert verdict.verified
+        assert not list(faults_of(verdict))
+    assert not verify(history, start - 1e-5, float(time[60] + np.pi / 10), asked).verified
