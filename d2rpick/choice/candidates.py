@@ -283,10 +283,9 @@ def _at_start(situation: Situation) -> Moments | None:
 
 def _as_found(situation: Situation, moments: Moments) -> Moments:
     """Call each given tr a match where one would be found: it is known as well as that one, whoever names it."""
-    given = moments.are("given")
-    if situation.at_rest or not given.any():
+    given, vibration = moments.are("given"), situation.vibration
+    if situation.at_rest or not (given.any() and vibration.has_matches):
         return moments
-    vibration = situation.vibration
     found = _distinct(situation, vibration.moments(situation.settings.tolerance))
     if not found.are("match").any():
         return moments

@@ -113,6 +113,12 @@ class Situation:
         after = np.searchsorted(turns, self.td) - np.searchsorted(turns, times, side="right")
         return np.asarray(np.maximum(after, 0))
 
+    def sees_as(self, other: Situation) -> bool:
+        """Whether the two, of one record, have one flight and one evidence: then only their td differ."""
+        own, its = self.evidence, other.evidence
+        same = own.fit is its.fit and own.parts is its.parts and own.signed is its.signed
+        return same and own.span == its.span and self.flight == other.flight
+
     def at(self, td: float) -> Situation:
         """Give the same record, flight and evidence seen from another ``td``."""
         return self if td == self.td else replace(self, td=td)

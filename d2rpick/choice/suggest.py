@@ -148,9 +148,10 @@ def find_better_pair(situation: Situation) -> Pair | None:
     refused = 0
     for td in sorted(situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)):
         there = situation.at(td)
-        if there.vibration.doubts or not _saving(there):
+        if there.vibration.doubts or not (best := _saving(there)):
             continue
-        best = _saving(_anew(situation, td))
+        anew = _anew(situation, td)
+        best = best if anew.sees_as(there) else _saving(anew)
         if best and _holds_as_printed(situation, best.tr, td):
             return Pair(best.tr, td, best.residual)
         refused += 1

@@ -68,6 +68,10 @@ class Vibration(Protocol):
     def kinetic_share(self) -> float | None:
         """K at td, None where it is not known [-]."""
 
+    @property
+    def has_matches(self) -> bool:
+        """Whether there are closest matches beside crossings and extrema: of several deformations."""
+
     def energy(self, time: float) -> float:
         """E at a time: of the model where it describes the record, of the samples elsewhere [energy]."""
 

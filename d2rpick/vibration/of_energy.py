@@ -43,6 +43,11 @@ class OfEnergy:
         doubts = (SUNK, *(doubt for doubt in self.doubts if doubt != SUNK)) if sunk else self.doubts
         return OfEnergy(self.history, self.td, "; ".join(reasons), doubts)
 
+    @property
+    def has_matches(self) -> bool:
+        """Never: no deformation is known."""
+        return False
+
     def energy(self, time: float) -> float:
         """E of the samples, linear between them [energy]."""
         return self.history.energy_at(time)

@@ -78,6 +78,11 @@ class OfModes:
         """K at td [-]."""
         return measures.kinetic_share(self.mode, self.td)
 
+    @property
+    def has_matches(self) -> bool:
+        """Only of several modes."""
+        return self.profile is not None
+
     def energy(self, time: float) -> float:
         """E of the mode where it describes the record, of the samples elsewhere [energy]."""
         return float(self.mode.energy(time)) if self.described(time) else self.history.energy_at(time)

@@ -68,6 +68,11 @@ class OfParts:
         """K at td [-]."""
         return measures.kinetic_share(self.parts, self.td)
 
+    @property
+    def has_matches(self) -> bool:
+        """Always."""
+        return True
+
     def energy(self, time: float) -> float:
         """E of the whole [energy]."""
         return self.whole.energy(time)
