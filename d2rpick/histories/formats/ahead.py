@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     Bytes = NDArray[np.uint8]
 
-BATCH: Final = 1 << 14  # numbers converted at a time: they stay in the cache
+BATCH: Final = 1 << 15  # numbers converted at a time: they stay in the cache
 
 
 class Ahead:

@@ -61,7 +61,7 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     if not fields.size:
         return np.empty(0)
     width = fields.dtype.itemsize
-    column = np.ascontiguousarray(np.frombuffer(fields.tobytes(), np.uint8).reshape(-1, width).T)
+    column = np.ascontiguousarray(np.ascontiguousarray(fields).view(np.uint8).reshape(-1, width).T)
     point, mark = width - 5 - decimals, width - 4
     mantissa_columns = [point - 1, *range(point + 1, mark)]
     digit = column - np.uint8(ord("0"))  # wraps around for what is below "0", so one comparison is enough
