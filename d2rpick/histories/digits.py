@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 _DIGITS: Final = 6
 # No file has more digits of a time, and a double has some to spare.
@@ -78,6 +81,18 @@ def window_as_read(start: float, end: float) -> str:
     """
     low, high = not_before(start), not_after(end)
     return f"{low:.{_DIGITS}g} to {high:.{_DIGITS}g}" if low <= high else f"{float(start)!r} to {float(end)!r}"
+
+
+def told_apart(numbers: Sequence[float]) -> list[str]:
+    """Write numbers in six digits, or in as many as tell those apart that differ.
+
+    Examples
+    --------
+    >>> told_apart([0.42, 0.0, 0.15]), told_apart([0.42, 0.4199999])
+    (['0.42', '0', '0.15'], ['0.42', '0.4199999'])
+    """
+    texts = ([f"{number:.{digits}g}" for number in numbers] for digits in range(_DIGITS, 17))
+    return next((found for found in texts if len({*found}) == len({*numbers})), [repr(float(n)) for n in numbers])
 
 
 def above(value: float, limit: float) -> str:

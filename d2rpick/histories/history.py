@@ -10,6 +10,7 @@ import numpy as np
 
 from d2rpick.errors import HistoryError, RangeError
 from d2rpick.histories.crossings import find_turns
+from d2rpick.histories.digits import told_apart
 from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
@@ -288,9 +289,10 @@ class History:
         legs = later_legs(self.source) if max(times) > high else []
         more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
         more = more or (self._in_another_unit(times, argument) if argument else "")
-        what = f"{f'`{argument}`' if argument else 'time'} {' '.join(f'{time:g}' for time in times)}"
+        *asked, first, last = told_apart((*times, low, high))
+        what = f"{f'`{argument}`' if argument else 'time'} {' '.join(asked)}"
         found = "reaches" if any(low <= time <= high for time in times) else "lies"
-        raise RangeError(f"{', '.join(self.source)}: {what} {found} outside the record, {low:g} to {high:g}{more}")
+        raise RangeError(f"{', '.join(self.source)}: {what} {found} outside the record, {first} to {last}{more}")
 
     def energy_at(self, time: float, argument: str = "") -> float:
         """Energy at ``time``, linear between the states; RangeError outside the record, naming the ``argument``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from d2rpick.histories.digits import above, as_read, not_after, not_before, window_as_read
+from d2rpick.histories.digits import above, as_read, not_after, not_before, told_apart, window_as_read
 
 TIMES = st.floats(-1e9, 1e9).filter(lambda time: not 0 < abs(time) < 1e-290)
 
@@ -34,3 +34,9 @@ def test_a_window_that_is_read_lies_in_the_window(start: float, length: float) -
 def test_what_is_above_a_limit_reads_as_above_it(limit: float, more: float) -> None:
     value = limit + more
     assert value == limit or limit < float(above(value, limit)) <= value * (1 + 5e-3)
+
+
+@given(st.lists(TIMES.map(abs), min_size=2, max_size=4), st.floats(0, 1e-6))
+def test_numbers_that_differ_read_apart(numbers: list[float], off: float) -> None:
+    numbers = [*numbers, numbers[0] * (1 + off)]
+    assert len({*told_apart(numbers)}) == len({*numbers})
