@@ -17,11 +17,10 @@ import numpy as np
 
 from d2rpick.choice.margin import Margin, margin_before_contact
 from d2rpick.choice.of_run import Reference, suggest_of
-from d2rpick.choice.suggest_td import bounds, flights_of
+from d2rpick.choice.suggest_td import bounds, flights_of, last_td
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.energy_alone import round_off
-from d2rpick.histories.digits import not_after, sum_as_read
 from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.measures import run_time_share
 
@@ -248,8 +247,8 @@ def _asked(
     own = settings.after is not None and row.start <= settings.after <= row.end
     asked = settings if own else replace(settings, after=None)
     # the energy alone may show no end of the flight to the td in it: the margin is kept from the one that is listed
-    latest = not_after(sum_as_read(row.end, -row.margin.time)) if row.margin.time else row.end
-    answer = suggest_of(reference, (row.start, latest), asked, since=landed, fits=fits)
+    window = row.start, last_td(row.end, row.margin.time)
+    answer = suggest_of(reference, window, asked, since=landed, fits=fits)
     known = answer.situation.flight
     row = replace(row, answer=answer)
     if known.start is not None and (known.start < row.start or answer.recommended):

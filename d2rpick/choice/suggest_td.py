@@ -55,8 +55,9 @@ def suggest_in_longest_flight(history: History, settings: Settings) -> Suggestio
 def longest_flight(
     history: History, settings: Settings, fits: Fits | None = None, *, otherwise: tuple[float, float] | None = None
 ) -> tuple[float, float]:
-    """Give the longest flight as a window within the record [time].
+    """Give the longest flight as a window for td within the record [time].
 
+    The energy alone may show no end of the flight to the td in it: then the margin is kept from the one that was found.
     ``otherwise`` is given where nothing shows a flight; without it that is a RangeError.
     """
     flights = flights_of(history, settings, fits)
@@ -65,7 +66,15 @@ def longest_flight(
     if not flights:
         found = f"{', '.join(history.source)}: nothing in the record shows a flight, in which td could be chosen"
         raise RangeError(f"{found}; give `td`, and the end of the load as `after` where it is known")
-    return max((bounds(history, flight) for flight in flights), key=lambda one: one[1] - one[0])
+    windows = [(bounds(history, flight), flight) for flight in flights]
+    (start, end), longest = max(windows, key=lambda one: one[0][1] - one[0][0])
+    latest = last_td(end, margin_before_contact(history, longest, settings.margin).time)
+    return start, latest if longest.source == "energy" and latest > start else end
+
+
+def last_td(end: float, margin: float) -> float:
+    """Give the last td, as it is read, that keeps a margin from the end of a flight [time]."""
+    return not_after(sum_as_read(end, -margin)) if margin else end
 
 
 def flights_of(history: History, settings: Settings, fits: Fits | None = None) -> tuple[Flight, ...]:

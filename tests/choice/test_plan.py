@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice import explored
@@ -234,6 +234,7 @@ def bouncing(seed: int, folder: Path) -> list[str]:
 
 @settings(max_examples=20)
 @given(seed=st.integers(0, 100_000))
+@example(seed=204)  # at the end of this flight the energy shows none
 def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     """The energy shows another beginning of the flight to each td; a window began before the flight of its row."""
     reference, asked = read(bouncing(seed, tmp_path_factory.getbasetemp())), Settings(replay=False)
