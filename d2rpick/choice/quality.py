@@ -78,16 +78,21 @@ def _of_record(situation: Situation) -> list[str]:
     return found
 
 
+def _is_loose(best: Candidate) -> bool:
+    """Whether the lock-in error may be above what is good, as far as tr is known."""
+    if best.tr_high is None or best.timing_tolerance is None:
+        return False
+    return TOLERATED_GROWTH * (best.tr_high - best.tr) > _MOST_GOOD * best.timing_tolerance
+
+
 def _fair(situation: Situation, best: Candidate) -> list[str]:
     found = []
     if best.residual is None:
         found.append("the sign of the deformation is unknown")
     elif best.residual > _MOST_GOOD:
         found.append(f"the vibration after td is off by {best.residual:.0%}")
-    elif best.tr_high is not None and best.timing_tolerance is not None:
-        grown = TOLERATED_GROWTH * (best.tr_high - best.tr) / best.timing_tolerance if best.timing_tolerance else np.inf
-        if grown > _MOST_GOOD:
-            found.append("tr is not known well enough for its timing tolerance")
+    elif _is_loose(best):
+        found.append("tr is not known well enough for its timing tolerance")
     if best.residual_high is not None and best.residual_high > _MOST_FAIR:
         found.append(f"with a further mode hidden in the record it may be off by {best.residual_high:.0%}")
     if not situation.flight.certain:

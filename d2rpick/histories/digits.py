@@ -54,7 +54,7 @@ def not_before(time: float) -> float:
     (0.100053, 0.25)
     """
     read = as_read(time)
-    return read if read >= time else _stepped(read, 1)
+    return read if read >= time else _next(read)
 
 
 def not_after(time: float) -> float:
@@ -65,8 +65,7 @@ def not_after(time: float) -> float:
     >>> not_after(0.1986539), not_after(0.25)
     (0.198653, 0.25)
     """
-    read = as_read(time)
-    return read if read <= time else _stepped(read, -1)
+    return -not_before(-time)
 
 
 def window_as_read(start: float, end: float) -> str:
@@ -107,7 +106,7 @@ def above(value: float, limit: float) -> str:
     return next((text for text in texts if float(text) > limit), repr(float(value)))
 
 
-def _stepped(read: float, steps: int) -> float:
-    """Go on by some units of the last digit that is read."""
+def _next(read: float) -> float:
+    """Go on by a unit of the last digit that is read."""
     mantissa, _, exponent = f"{read:.{_DIGITS - 1}e}".partition("e")
-    return float(f"{int(mantissa.replace('.', '')) + steps}e{int(exponent) - _DIGITS + 1}")
+    return float(f"{int(mantissa.replace('.', '')) + 1}e{int(exponent) - _DIGITS + 1}")

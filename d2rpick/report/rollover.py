@@ -10,7 +10,7 @@ from d2rpick.report.keys import of_warnings
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Sequence
 
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.warnings import Caution
@@ -18,19 +18,10 @@ if TYPE_CHECKING:
     from d2rpick.models.rollover.scan import Outcome
 
 SCHEMA = "d2rpick/rollover/1"
-# Of each run, in JSON and as columns.
-_OUTCOME: Final[Mapping[str, Callable[[Outcome], float]]] = {
-    "tr": lambda one: one.tr,
-    "energy": lambda one: one.energy,
-    "energy_ratio": lambda one: one.energy_ratio,
-    "roll_error": lambda one: one.roll_error,
-    "x_error": lambda one: one.x_error,
-    "z_error": lambda one: one.z_error,
-    "omega_error": lambda one: one.omega_error,
-    "lost_energy": lambda one: one.lost_energy,
-    "mean_ratio": lambda one: one.mean_ratio,
-}
-_COLUMNS = tuple(_OUTCOME)
+# Of each run, in JSON and as columns: written down, for these names are promised.
+_COLUMNS: Final = (
+    "tr", "energy", "energy_ratio", "roll_error", "x_error", "z_error", "omega_error", "lost_energy", "mean_ratio"
+)  # fmt: skip
 
 
 class Scan(NamedTuple):
@@ -97,7 +88,7 @@ def as_json(scan: Scan, command: Sequence[str]) -> str:
 
 
 def _of_outcome(one: Outcome) -> dict[str, float]:
-    return {key: read(one) for key, read in _OUTCOME.items()}
+    return {key: getattr(one, key) for key in _COLUMNS}
 
 
 def _recommended(answer: Suggestion) -> float | None:
