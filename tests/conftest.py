@@ -66,7 +66,6 @@ def replace(module: ModuleType, **values: Any) -> None:
 
 # What a fit is does not depend on who asks; the tests of the fits themselves call them where they are defined.
 replace(examine, identify=remembered(identify), identify_several=remembered(identify_several))
-replace(momentum, Remembered=Misfits)
 # Pages explore few td: what they show of each is the same.
 replace(explored, _STEPS=5, _LEAST=5)
 # Most tests read what they have just written: that no write is under way is sure without waiting for it.

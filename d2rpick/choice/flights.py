@@ -41,7 +41,8 @@ def find_flights(history: History, settings: Settings = _PLAIN, fits: Fits | Non
     seen = all_seen(history)
     if seen:
         return tuple(
-            Flight(one.start, one.end if one.end_seen else None, source, one.parts, one.damping) for source, one in seen
+            Flight(one.start, one.end if one.end_seen else None, source, one.parts, one.damping, gravity=one.gravity)
+            for source, one in seen
         )
     found: list[Flight] = []
     fits = Fits() if fits is None else fits

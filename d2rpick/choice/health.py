@@ -41,6 +41,8 @@ _SMALL_PART = 0.01
 # Where the run has hardly any energy yet, a small error is a large ratio (Altair, Radioss FAQ on the energy error): the
 # ratio counts where its reference exceeds a tenth of its peak, so that the tenth allowed is 1 % of that peak or more.
 _COUNTING_REFERENCE = 0.1
+# Codes of what says nothing of parts whose own momentum is that of free flight.
+OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 
 @dataclass(frozen=True)

@@ -131,7 +131,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
     balance = balance_of(run, history.parts, td)
     if balance is None:
         return answer
-    from d2rpick.choice.health import assess, cautions_of_health  # not above: plain tables do without it
+    from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_health  # not above: plain tables do without it
 
     if isinstance(answer, Verdict):
         start: float | None = answer.candidate.tr
@@ -140,7 +140,17 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
     health = assess(balance, window, locked, td)
-    return answer._replace(health=health, cautions=answer.cautions + tuple(cautions_of_health(health)))
+    cautions = tuple(cautions_of_health(health))
+    flight = answer.situation.flight
+    if (
+        window
+        and flight.by_parts
+        and flight.start is not None
+        and flight.start <= window[0]
+        and answer.situation.in_flight
+    ):
+        cautions = tuple(one for one in cautions if one.code not in OF_THE_MODEL)
+    return answer._replace(health=health, cautions=answer.cautions + cautions)
 
 
 def _comparison(verdict: Verdict, run: Run, switched: Reference) -> Comparison:

@@ -24,6 +24,7 @@ _MOST_FAIR, _MOST_GOOD = 0.5, 0.2
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
 _BAND: Final = 0.25
 _NOT_CERTAIN: Final = "the flight is not certain"
+_UNKNOWN_LOAD: Final = "kinetic and internal energy change together, by gravity or by another load"
 
 
 class Quality(NamedTuple):
@@ -43,8 +44,11 @@ def quality_of(situation: Situation, best: Candidate, expected: Expectation | No
 
     ``expected`` is what the energy alone tells of the time after td, None on another basis.
     """
+    flight = situation.flight
+    if flight.unknown_load:
+        return Quality("poor", (_UNKNOWN_LOAD, *(() if situation.at_rest else _poor(situation, best, expected))))
     if situation.at_rest:
-        return Quality("good") if situation.flight.certain else Quality("fair", (_NOT_CERTAIN,))
+        return Quality("good") if flight.certain else Quality("fair", (_NOT_CERTAIN,))
     poor = tuple(_poor(situation, best, expected))
     if poor:
         return Quality("poor", poor)

@@ -125,7 +125,8 @@ def switched_history(
         for a, b in more
     ]
     if absent:
-        whole = tuple(one for one in history.momenta if one.parts is None)
+        # energies of solids are garbage while they are rigid: nothing but the momentum is asked whether the model flies
+        whole = tuple(replace(one, flying=one.chosen) for one in history.momenta if one.parts is None)
         history = replace(history, evidence=Given(whole, history.balance))
     return history, tuple(sorted((*done, *more))), tuple(cautions)
 

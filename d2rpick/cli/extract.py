@@ -68,9 +68,10 @@ def _of_model(history: History) -> dict[str, Samples]:
 
 
 def _momentum(history: History) -> dict[str, Samples]:
-    """Columns of the momentum by which the flight is seen: of the parts that fly together longest, or the chosen ones.
+    """Columns of the momentum by which the flight is seen, with its mass: of what flies longest, or the chosen parts.
 
-    Nothing where it is not written, or at other times than the energy.
+    Where only the velocity of the model is known, columns of that; nothing where neither is written at the times of the
+    energy.
     """
     import numpy as np
 
@@ -79,9 +80,12 @@ def _momentum(history: History) -> dict[str, Samples]:
     asked = [one for one in to_be_asked(history.momenta) if np.array_equal(one.time, history.time)]
     if not asked:
         return {}
-    momenta = next((one for one in asked if all_flights(one)), asked[0])
-    flights, members = all_flights(momenta), momenta.chosen
+    momenta = next((one for one in asked if all_flights(one, history.balance)), asked[0])
+    flights, members = all_flights(momenta, history.balance), momenta.chosen
     if flights and momenta.parts:
         longest = max(flights, key=lambda flight: flight.end - flight.start)
         members = tuple(momenta.parts.index(part) for part in longest.parts or momenta.parts)
-    return dict(zip(("x_momentum", "y_momentum", "z_momentum"), momenta.of(members).T.copy(), strict=True))
+    mass = momenta.mass(members)
+    name = "velocity" if mass == 1.0 else "momentum"
+    columns = {f"{axis}_{name}": column for axis, column in zip("xyz", momenta.of(members).T.copy(), strict=True)}
+    return columns | ({"mass": np.full(history.time.shape, mass)} if mass > 0 and name == "momentum" else {})

@@ -7,10 +7,10 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from d2rpick.flight.window import FEWEST, FreeFlight, Remembered, lasting_window
+from d2rpick.flight.window import FEWEST, Constant, FreeFlight, Remembered, lasting_window
 
 if TYPE_CHECKING:
-    from d2rpick.histories.history import Balance, Samples
+    from d2rpick.histories.history import Balance
 
 # A contact energy that never exceeds its printed digits by this factor shows no contact at all.
 _VISIBLE = 100
@@ -34,7 +34,7 @@ def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     if energy is None or not time[0] <= td <= time[-1]:
         return None
     if balance not in _LAWS:
-        _LAWS[balance] = Remembered(_Constant(time, energy))
+        _LAWS[balance] = Remembered(Constant(time, energy[:, np.newaxis]))
     window = lasting_window(_LAWS[balance], td, float(np.ptp(energy)), _noise(balance))
     if window is None or (window[0] == 0 and balance.external_work is None):
         return None
@@ -46,14 +46,3 @@ def _noise(balance: Balance) -> float:
     """What the printed digits leave open [energy]."""
     assert balance.sliding is not None
     return balance.precision.quantum(float(np.abs(balance.sliding).max())) / 2
-
-
-class _Constant:
-    """One quantity that does not change, a `Law`."""
-
-    def __init__(self, time: Samples, values: Samples) -> None:
-        self.time, self.values = time, values
-
-    def misfit(self, first: int, last: int) -> float:
-        """Half the range between two states."""
-        return float(np.ptp(self.values[min(first, last) : max(first, last) + 1])) / 2

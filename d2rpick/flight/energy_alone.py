@@ -27,6 +27,8 @@ _WAIT: Final = 1 / 3
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
 # The level is the mean over this share of the quiet time; it changes where it leaves its band, widened by its width.
 _LEVEL: Final = 1 / 8
+# A landing is seen against this share of the time before it, in which the energy has turned so often.
+_KNOWN, _SWINGS = 3 / 4, 4
 
 
 # Below a millionth of the largest energy of the run, energy is round-off: single precision keeps seven digits.
@@ -57,6 +59,28 @@ def quiet_time(history: History, td: float) -> QuietTime | None:
     settled = _last_push(history, _last_excursion(history, settled, td), td)
     changes = [time for time in (_burst(history, settled, td), _change_of_level(history, settled, td)) if time]
     return QuietTime(settled + _WAIT * (td - settled), min(changes, default=None), settled)
+
+
+def landing_after(history: History, start: float) -> float | None:
+    """Give the first time after ``start`` [time] at which the energy bursts out of what it was before, or None.
+
+    It is held against the first three quarters of the time since ``start``, and must exceed their band by its width: no
+    vibration goes so far beyond what it has done for so long.
+    """
+    inside = history.time >= start
+    time, energy = history.time[inside], history.energy[inside]
+    if time.size < FEWEST:
+        return None
+    known = np.searchsorted(time, start + _KNOWN * (time - start), side="right") - 1
+    top, bottom = np.maximum.accumulate(energy)[known], np.minimum.accumulate(energy)[known]
+    turns = np.searchsorted(history.turns, time[known]) - np.searchsorted(history.turns, start)
+    long_enough = (turns >= _SWINGS) & (time - start >= SHORTEST * (history.time[-1] - history.time[0]))
+    beyond = np.flatnonzero(long_enough & (energy > 2 * top - bottom))
+    if not beyond.size:
+        return None
+    first = int(beyond[0])
+    rising = np.flatnonzero(energy[: first + 1] <= top[first] + _BAND_RESERVE * (top[first] - bottom[first]))
+    return float(time[rising[-1] + 1])
 
 
 def end_of_load(history: History, td: float) -> float | None:

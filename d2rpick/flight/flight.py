@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from functools import cache, partial
+from math import isnan, nan
 from typing import TYPE_CHECKING, Final, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from d2rpick.flight.energy_alone import quiet_time
-from d2rpick.flight.window import all_windows, marks
+from d2rpick.flight.energy_alone import landing_after, quiet_time
+from d2rpick.flight.level import moves_as_a_whole, settled_from
+from d2rpick.flight.window import SHORTEST, all_windows, marks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -20,9 +22,13 @@ if TYPE_CHECKING:
 
 # Where a flight may be known from, best first.
 SOURCES: Final = ("given", "momentum", "contact-energy", "energy-balance", "oscillator", "energy", None)
+_SURE: Final = ("given", "momentum", "oscillator")
+_BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # In free flight no load works.  An energy that is off by 4 % is a deformation that is off by 0.02, within which two
 # candidates count as equally good.
 MOST_WORK: Final = 0.04
+# So often an energy that keeps its level turns at least, or it does not change.
+_LEAST_TURNS: Final = 4
 # What must show every flight that a better source shows: a contact of any part is a contact.
 _AGREEING: Final = ("contact-energy",)
 # Ends of a flight by two sources are the same within this share of it, or so many output intervals.
@@ -35,8 +41,9 @@ class Flight(NamedTuple):
     Where nothing flies at td, it is the last flight before td, or else the first after it, and ``refusal`` says what
     shows that.  ``source`` tells how the start was found, one of `SOURCES`.  ``parts`` are those that were seen to
     fly together, None where the momentum did not tell, or told it of the whole model.  ``damping`` is alpha of their
-    momentum [1/time], 0 where it did not tell.  ``doubts`` say which sources contradict each other.  Of the energy
-    alone: ``settled`` is when it had settled, from there to ``start`` is given up for safety.
+    momentum [1/time], ``gravity`` what was taken for gravity [length/time^2], both as of `FreeFlight`.  ``doubts`` say
+    which sources contradict each other.  Of the energy alone: ``settled`` is when it had settled, from there to
+    ``start`` is given up for safety.  ``described``: one oscillator describes the energy in it.
     """
 
     start: float | None
@@ -47,11 +54,28 @@ class Flight(NamedTuple):
     refusal: str | None = None
     doubts: tuple[str, ...] = ()
     settled: float | None = None
+    gravity: float = 0.0
+    described: bool = False
+
+    @property
+    def by_parts(self) -> bool:
+        """Whether the momentum of its parts shows it: contacts and loads that the model has elsewhere do not count."""
+        return self.source == "momentum" and self.parts is not None
+
+    @property
+    def unknown_load(self) -> bool:
+        """Whether energies alone show it, while a load acts that may be gravity, or a pull, or friction."""
+        return isnan(self.gravity) and self.source in (*_BY_ENERGIES, "energy")
 
     @property
     def certain(self) -> bool:
-        """Whether more than the level of the energy shows it."""
-        return self.source not in ("energy", None)
+        """Whether nothing but free flight looks like that.
+
+        A fixed rigid wall does no work and has no contact energy: without the momentum, only an oscillator that swings
+        on tells a flight from a crash into it.
+        """
+        sure = self.source in _SURE or (self.described and self.source in _BY_ENERGIES)
+        return sure and not isnan(self.gravity)
 
 
 class Witness(NamedTuple):
@@ -114,19 +138,58 @@ def find_flight(history: History, td: float, after: float | None, seen: Seen, sp
     oscillator describes.
     """
     if seen.flight:
-        first, last, parts, end_seen, damping = seen.flight
+        first, last, parts, end_seen, damping, gravity = seen.flight
         given = after is not None and not (seen.refusal and first > td)
         start, source = (after, "given") if given else (first, seen.source)
-        return Flight(start, last if end_seen else None, source, parts, damping, seen.refusal, seen.doubts)
+        if given and start is not None and start >= last:
+            landed = f"the {_spoken(seen.source)} shows that the flight had ended at {last:.6g}, before `after`"
+            return Flight(None, None, None, refusal=seen.refusal or landed, doubts=seen.doubts)
+        end = last if end_seen else None
+        return Flight(
+            start, end, source, parts, damping, seen.refusal, seen.doubts, gravity=gravity, described=span is not None
+        )
     if after is not None:
-        end = span.end if span and span.end < history.time[-1] and not seen.refusal else None
-        return Flight(after, end, "given", refusal=seen.refusal, doubts=seen.doubts)
+        ends = [
+            span.end if span and span.end < history.time[-1] else None,
+            None if span else landing_after(history, after),
+        ]
+        end = min(filter(None, ends), default=None)
+        return Flight(after, None if seen.refusal else end, "given", refusal=seen.refusal, doubts=seen.doubts)
     if seen.refusal:
         return Flight(None, None, None, refusal=seen.refusal, doubts=seen.doubts)
+    quiet = None if span else quiet_time(history, td)
+    found = span or quiet
+    if found is None:
+        return Flight(None, None, None)
+    end = found.end if found.end is not None and found.end < history.time[-1] else None
+    refusal = _fed(history, found.start, td if quiet else found.end or td)
+    if refusal:
+        return Flight(None, None, None, refusal=refusal)
     if span:
-        return Flight(span.start, span.end if span.end < history.time[-1] else None, "oscillator")
-    quiet = quiet_time(history, td)
-    return Flight(quiet.start, quiet.end, "energy", settled=quiet.settled) if quiet else Flight(None, None, None)
+        return Flight(found.start, end, "oscillator", described=True)
+    known = history.balance is not None and history.balance.kinetic_and_internal is not None
+    return Flight(found.start, end, "energy", settled=quiet.settled if quiet else None, gravity=nan if known else 0.0)
+
+
+def _fed(history: History, start: float, end: float) -> str | None:
+    """Say so when kinetic and internal energy together change, or nothing moves but the vibration, as in no flight."""
+    balance, energy = history.balance, history.mean_energy(start, end)
+    if balance is None or energy is None or balance.kinetic_and_internal is None:
+        return None
+    turns = int(np.count_nonzero((history.turns > start) & (history.turns < end)))
+    if turns < _LEAST_TURNS and float(np.ptp(history.between(start, end)[1])) > MOST_WORK * energy:
+        return f"from {start:.6g} to {end:.6g} the internal energy turns {turns} times: too few to tell a flight by it"
+    from d2rpick.flight.work import change_of_balance
+
+    change = change_of_balance(balance, start, end)
+    if change is not None and change > MOST_WORK * max(energy, 0.0):
+        found = f"kinetic and internal energy together change by {change:.3g} from {start:.6g} to {end:.6g}"
+        return f"{found}, at a mean internal energy of {energy:.3g}: a load works there"
+    if not moves_as_a_whole(balance, start, end):
+        return (
+            f"from {start:.6g} to {end:.6g} there is no more kinetic energy than that of the vibration: it does not fly"
+        )
+    return None
 
 
 def seen_flight(history: History, td: float) -> Seen:
@@ -140,7 +203,7 @@ def seen_flight(history: History, td: float) -> Seen:
         flight = witness.holding(td)
         if flight:
             found.append((witness.source, flight))
-        elif (not found or witness.source in _AGREEING) and witness.counts():
+        elif (not found or _may_deny(witness, found[0][1])) and witness.counts():
             doubts = _contradicting(found, witness, td)
             return _nearest(witness, td, _no_flight(witness.source, td), doubts)
     known = _CONFIRMED.setdefault(history, {})
@@ -156,7 +219,7 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
         kept, flights = [], witness.flights()
         for flight in flights:
             middle = (flight.start + flight.end) / 2
-            others = [(one.source, one.around(middle)) for one in asked[place + 1 :] if one.source in _AGREEING]
+            others = [(one.source, one.around(middle)) for one in asked[place + 1 :] if _may_deny(one, flight)]
             if not all(other for _, other in others):
                 continue
             found = [(witness.source, flight), *((source, other) for source, other in others if other)]
@@ -166,6 +229,14 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
         if flights or witness.decisive:
             return tuple(kept)
     return ()
+
+
+def _may_deny(witness: Witness, flight: FreeFlight) -> bool:
+    """Whether a source may deny a flight that a better one shows.
+
+    What parts touch while their own momentum is that of free flight is each other, or others touch something.
+    """
+    return witness.source in _AGREEING and flight.parts is None
 
 
 def witnesses(history: History) -> tuple[Witness, ...]:
@@ -180,8 +251,8 @@ def _witnesses(history: History) -> Iterator[Witness]:
         from d2rpick.flight import momentum
 
         momenta = momentum.to_be_asked(history.momenta)
-        around = partial(_first, momenta)
-        decisive = any(one.parts is not None and momentum.tells(one) for one in momenta)
+        around = partial(_first, history, momenta)
+        decisive = any(momentum.tells(one) for one in momenta)
         yield Witness.of("momentum", momenta[0].time, around, decisive=decisive)
     balance = history.balance
     if balance is None:
@@ -189,18 +260,46 @@ def _witnesses(history: History) -> Iterator[Witness]:
     from d2rpick.flight import contact_energy, work
 
     if contact_energy.shows_contacts(balance):
-        around = partial(contact_energy.plateau_around, balance)
+        plateau = partial(contact_energy.plateau_around, balance)
+        around = plateau if history.momenta else partial(_level_around, history, plateau)
         yield Witness.of("contact-energy", balance.time, around, decisive=False)
     if work.can_tell(balance):
         worked = balance.external_work is not None and bool(np.ptp(balance.external_work))
-        yield Witness.of("energy-balance", balance.time, partial(work.balanced_around, balance), decisive=worked)
+        around = partial(_level_around, history, partial(work.balanced_around, balance))
+        yield Witness.of("energy-balance", balance.time, around, decisive=worked)
 
 
-def _first(momenta: Sequence[Momenta], td: float) -> FreeFlight | None:
+def _first(history: History, momenta: Sequence[Momenta], td: float) -> FreeFlight | None:
     """Give the flight by the momentum of the parts, or else of the whole model."""
     from d2rpick.flight.momentum import flight_around
 
-    return next(filter(None, (flight_around(one, td) for one in momenta)), None)
+    for one in momenta:
+        found = flight_around(one, td, history.balance)
+        if found:
+            return found if one.parts is not None or one.flying else _keeping_level(history, found)
+    return None
+
+
+def _level_around(history: History, around: Callable[[float], FreeFlight | None], td: float) -> FreeFlight | None:
+    """Give the flight around td of a source that does not see a wall that does no work."""
+    found = _keeping_level(history, around(td))
+    balance = history.balance
+    return found if found and balance and moves_as_a_whole(balance, found.start, found.end) else None
+
+
+def _keeping_level(history: History, flight: FreeFlight | None) -> FreeFlight | None:
+    """Give what of a flight of the whole model the internal energy keeps its level in, or None."""
+    if flight is None:
+        return None
+    balance, whole, time, energy = history.balance, None, history.time, history.energy
+    if balance and balance.kinetic is not None and balance.internal is not None:
+        whole = np.interp(time, balance.time, balance.kinetic + balance.internal)
+        if history.parts is not None:
+            energy = np.interp(time, balance.time, balance.internal)
+    start = settled_from(time, energy, whole, flight.start, flight.end)
+    if start is None or flight.end - start < SHORTEST * (time[-1] - time[0]):
+        return None
+    return flight._replace(start=start)
 
 
 def _nearest(witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]) -> Seen:
@@ -215,8 +314,8 @@ def _no_flight(source: str, td: float) -> str:
     return f"the {_spoken(source)} shows no free flight at td = {td:.6g}"
 
 
-def _spoken(source: str) -> str:
-    return source.replace("-", " ")
+def _spoken(source: str | None) -> str:
+    return str(source).replace("-", " ")
 
 
 def _contradicting(found: list[tuple[str, FreeFlight]], witness: Witness, td: float) -> tuple[str, ...]:
@@ -233,7 +332,7 @@ def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> See
     doubts = []
     room = max(_SAME * (end - start), _SAME_STATES * history.step)
     for other, flight in found[1:]:
-        if other not in _AGREEING:
+        if other not in _AGREEING or best.parts is not None:
             continue
         if abs(flight.start - best.start) > room or abs(flight.end - best.end) > room:
             one, two = (f"{f.start:.6g} to {f.end:.6g} by the {_spoken(n)}" for n, f in (found[0], (other, flight)))

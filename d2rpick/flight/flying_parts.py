@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.flight.flight import all_seen
-from d2rpick.histories.history import Given
+from d2rpick.flight.momentum import all_flights
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from d2rpick.flight.window import FreeFlight
-    from d2rpick.histories.history import History, Part
+    from d2rpick.histories.history import Part
     from d2rpick.histories.run import Run
     from d2rpick.histories.selection import Selection
 
@@ -62,33 +60,25 @@ def deformable_parts(run: Run) -> tuple[Part, ...]:
 
 
 def flying_parts(run: Run) -> tuple[Part, ...]:
-    """Give the deformable parts that fly together in the longest flight; FormatError where momenta do not tell.
+    """Give the deformable parts that fly together; FormatError where momenta do not tell.
 
-    All of them are tried first.  Where these do not fly, as with a driven sled among them, each is asked which others
-    fly with it, that with the most energy first.
+    Of all sets that fly, the one with the largest product of mass and time counts: a loose tyre may fly for longer than
+    the car, which is what is to be switched.  All parts are tried first, then each that is in no set yet.
     """
     deformable = deformable_parts(run)
-    for chosen in (deformable, *((part,) for part in _by_energy(run, deformable))):
-        found = [one for one in _flights(run, chosen) if one.parts]
-        if found:
-            longest = max(found, key=lambda one: one.end - one.start)
-            members = {part.id for part in longest.parts or ()}
-            return tuple(part for part in deformable if part.id in members)
-    raise FormatError(f"{run.name}: no momenta show which parts fly together; name the parts to be switched")
-
-
-def _by_energy(run: Run, parts: tuple[Part, ...]) -> Iterator[Part]:
-    highest = run.part_energies(parts).max(axis=0)
-    yield from (parts[i] for i in np.argsort(-highest).tolist())
-
-
-def _flights(run: Run, chosen: tuple[Part, ...]) -> list[FreeFlight]:
-    """Flights by the momenta of parts alone."""
-    from d2rpick.histories.selection import Selection
-
-    history: History = run.history(Selection(parts=tuple(str(part.id) for part in chosen)))
-    own = tuple(one for one in history.momenta if one.parts is not None)
-    return [flight for _, flight in all_seen(replace(history, evidence=Given(own)))]
+    momenta = next((one for one in run.momenta(deformable, None) if one.parts), None)
+    found: list[FreeFlight] = []
+    if momenta:
+        for part, place in zip(deformable, momenta.chosen, strict=True):
+            if not any(part in (flight.parts or ()) for flight in found):
+                found += all_flights(momenta.choosing((place,)))
+        found += all_flights(momenta)
+    if not found or momenta is None:
+        raise FormatError(f"{run.name}: no momenta show which parts fly together; name the parts to be switched")
+    masses = np.ones(len(run.parts)) if momenta.masses is None else np.nan_to_num(momenta.masses)
+    mass = dict(zip(run.parts, masses.tolist(), strict=True))
+    best = max(found, key=lambda one: (one.end - one.start) * sum(mass[part] for part in one.parts or ()))
+    return tuple(part for part in deformable if part in (best.parts or ()))
 
 
 def asks_for_recommended(parts: Sequence[str], run: Run) -> bool:

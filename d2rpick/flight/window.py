@@ -14,8 +14,10 @@ if TYPE_CHECKING:
 # Misfit that free flight may leave at first, as a share of the range over the record: contact shows at once.
 TOLERANCE = 1e-3
 # Any smooth motion obeys a law for a moment; what is left of it there grows with the cube of time or faster.  At a
-# tenth of the tolerance such a moment shrinks by the cube root, free flight hardly does: the limit lies halfway.
-_TIGHTER = 0.1
+# tenth of the tolerance such a moment shrinks by the cube root, free flight hardly does: the limit lies halfway.  A
+# load that fades smoothly shrinks the window too, but no more once the limit lies below what is left of it.  So the
+# limit is lowered, tenth by tenth, down to what the numbers resolve, as long as the window that was found stays.
+_TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
 # No window is shorter than this share of the record, or holds fewer states.
 SHORTEST, FEWEST = 0.05, 12
 # The misfit of the middle of a window, without this share at each end, is that of free flight itself.  The window may
@@ -34,7 +36,8 @@ class FreeFlight(NamedTuple):
     """Window [time] in which ``parts`` fly freely together; None for parts: the whole model.
 
     ``end_seen`` is False where the record ends while it still flies.  ``damping`` is alpha, by which the momentum
-    decays there [1/time].
+    decays there [1/time]; ``gravity`` the acceleration that was taken for gravity, 0 where there is none, NaN where
+    nothing but its constancy shows it [length/time^2].
     """
 
     start: float
@@ -42,6 +45,7 @@ class FreeFlight(NamedTuple):
     parts: tuple[Part, ...] | None
     end_seen: bool
     damping: float = 0.0
+    gravity: float = 0.0
 
 
 class Law(Protocol):
@@ -53,6 +57,17 @@ class Law(Protocol):
 
     def misfit(self, first: int, last: int) -> float:
         """Largest deviation of the states ``first`` to ``last``, in any order, from the law that suits them best."""
+
+
+class Constant:
+    """Quantities (n, k) that do not change, a `Law`."""
+
+    def __init__(self, time: Samples, values: Samples) -> None:
+        self.time, self.values = time, values
+
+    def misfit(self, first: int, last: int) -> float:
+        """Half the largest range between two states [unit of the values]."""
+        return float(np.ptp(self.values[min(first, last) : max(first, last) + 1], axis=0).max()) / 2
 
 
 class Remembered:
@@ -75,7 +90,9 @@ class Remembered:
         return self._misfits[window]
 
 
-def lasting_window(law: Law, td: float, extent: float, noise: float) -> tuple[int, int] | None:
+def lasting_window(
+    law: Law, td: float, extent: float, noise: float, *, fades: bool = False, enough: float = 0.0
+) -> tuple[int, int] | None:
     """Find the states around ``td`` that obey the law and go on doing so when it is taken strictly.
 
     Parameters
@@ -85,6 +102,10 @@ def lasting_window(law: Law, td: float, extent: float, noise: float) -> tuple[in
         [time]
     extent, noise : float
         Range over the record, and what printed digits leave open, in the unit of the misfit.
+    fades : bool
+        Go on to finer limits: a load that fades smoothly shows at these only.
+    enough : float
+        Share of the range that a window may leave although it goes on to shrink.
 
     Returns
     -------
@@ -93,15 +114,55 @@ def lasting_window(law: Law, td: float, extent: float, noise: float) -> tuple[in
     """
     time = law.time
     at = min(int(np.searchsorted(time, td)), time.size - 1)
-    room, strict = TOLERANCE * extent + noise, _TIGHTER * TOLERANCE * extent + noise
-    window = longest_window(law, at, room)
-    length = _length(time, window)
-    if not _long_enough(time, window):
+    limit, own = TOLERANCE * extent, max(noise, _ROUND_OFF * extent)
+    found = _converged(law, at, limit, own if fades else limit, noise, enough * extent)
+    if found is None:
         return None
-    if _length(time, longest_window(law, at, strict)) < (1 + np.cbrt(strict / room)) / 2 * length:
-        return None
-    first, last = _tightened(law, window, max(noise, _ROUND_OFF * extent), room)
+    window, room, from_start = found
+    first, last = _tightened(law, window, own, room)
+    if first == 1 and from_start:
+        first = 0  # a solver may write the first state before its first step, with what belongs half a step earlier
     return (first, last) if time[first] <= td <= time[last] and _long_enough(time, (first, last)) else None
+
+
+def _converged(
+    law: Law, at: int, limit: float, finest: float, noise: float, enough: float
+) -> tuple[tuple[int, int], float, bool] | None:
+    """Find the window around the state ``at`` that hardly shrinks at a tenth of the limit; None where it does.
+
+    The limit is lowered as long as it is above ``finest``; from ``enough`` on a window may shrink on one side.  Given with
+    the window are the room that it leaves, and whether it began with the record at first.
+    """
+    time, room, found = law.time, limit + noise, None
+    window = longest_window(law, at, room)
+    from_start, kept = window[0] == 0, None
+    while _long_enough(time, window):
+        strict = _TIGHTER * limit + noise
+        finer = longest_window(law, at, strict)
+        if enough:  # what fades is steady at one end
+            ends = (longest_window(law, end, strict) for end in window)
+            finer = max(finer, *ends, key=lambda one: _length(time, one))
+        share = _length(time, finer) / _length(time, window)
+        if found and share < _STAYS:
+            break
+        lasts = share >= (1 + np.cbrt(strict / room)) / 2
+        if not _TIGHTER * limit >= finest:
+            return (window, room, from_start) if lasts else found or kept
+        if (
+            limit <= enough
+            and _fading(window, finer)
+            and (kept is None or 2 * _length(time, window) >= _length(time, kept[0]))
+        ):
+            kept = window, room, from_start
+        window, limit, room, at = finer, _TIGHTER * limit, strict, (finer[0] + finer[1]) // 2
+        found = (window, room, from_start) if lasts else None
+    return found or kept
+
+
+def _fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
+    """Whether a window shrinks on one side only, as where a load fades there and a contact or the record ends it."""
+    moved = min(abs(finer[0] - window[0]), abs(finer[1] - window[1]))
+    return moved <= _STANDS * (window[1] - window[0])
 
 
 def longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
@@ -153,7 +214,7 @@ def _tightened(law: Law, window: tuple[int, int], noise: float, loose: float) ->
     by which the window was found, and still reaches farther, a state of a contact at the edge of ``loose`` had stopped
     the search on the other side.
     """
-    start, room = window[0], 0.0
+    room = 0.0
     for _ in range(_MOST_SHRINKS):
         first, last = window
         inset = round(_ENDS * (last - first))
@@ -164,9 +225,7 @@ def _tightened(law: Law, window: tuple[int, int], noise: float, loose: float) ->
         if tighter == window:
             break
         window = tighter
-    window = _without_what_is_hidden(law, window, room)
-    # a solver may write the first state before its first step, with what belongs half a step earlier
-    return (0 if window[0] == 1 and start == 0 else window[0]), window[1]
+    return _without_what_is_hidden(law, window, room)
 
 
 def _without_what_is_hidden(law: Law, window: tuple[int, int], room: float) -> tuple[int, int]:

@@ -30,6 +30,9 @@ _SLOW: Final = 1e-2
 # Mass so found is a bound already; a table may hold the kinetic energy of the chosen parts only, and a load that works
 # like gravity without moving the model exceeds it by orders of magnitude.
 _MASS_ERROR: Final = 2.0
+# Momentum changes by half the share of the kinetic energy that is gained or lost along the motion.  A loss of this much
+# of it is told from that by friction.
+_LITTLE, _MUCH = 5e-3, 0.5
 # One for each record: it is asked about many td.
 _LAWS: Final[WeakKeyDictionary[Balance, Remembered]] = WeakKeyDictionary()
 
@@ -103,6 +106,23 @@ def can_tell(balance: Balance) -> bool:
     return balance.time.size >= FEWEST and bool(_terms(balance))
 
 
+def change_of_balance(balance: Balance, start: float, end: float) -> float | None:
+    """Largest change of kinetic and internal energy in a window that neither gravity nor damping explains [energy].
+
+    What printed digits leave open is not counted.  None where one of them is not written.
+    """
+    whole = balance.kinetic_and_internal
+    if whole is None:
+        return None
+    inside = window(balance.time, start, end)
+    kinetic = None if balance.kinetic is None else balance.kinetic[inside]
+    law = _Parabola(balance.time[inside], whole[inside][:, np.newaxis], kinetic)
+    rest = law.misfit(0, law.time.size - 1)
+    return max(
+        0.0, rest - balance.precision.quantum(float(np.abs(whole).max())) - _OWN_ERROR * float(np.ptp(whole[inside]))
+    )
+
+
 def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     """Find the window around ``td`` [time] in which energy changes by gravity and damping only, or None.
 
@@ -124,7 +144,26 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     if window is None:
         return None
     first, last = window
-    return FreeFlight(float(time[first]), float(time[last]), None, last < time.size - 1)
+    start, end = float(time[first]), float(time[last])
+    unknown = _unexplained(balance, first, last)
+    return FreeFlight(start, end, None, last < time.size - 1, gravity=np.nan if unknown else 0.0)
+
+
+def _unexplained(balance: Balance, first: int, last: int) -> bool:
+    """Whether energies change in a window as under a constant load, which may be gravity, a pull or friction.
+
+    What they lose by damping falls off with the kinetic energy, which shows when much of it is gone.
+    """
+    whole, kinetic = balance.kinetic_and_internal, balance.kinetic
+    if whole is None or kinetic is None:
+        return False
+    states = slice(first, last + 1)
+    largest = float(kinetic[states].max())
+    spent = -integral(balance.time[states], kinetic[states])
+    rest, _ = _least_squares(whole[states], [np.ones(last - first + 1)], [spent] if spent.any() else [])
+    lost = float(whole[first] - whole[last])
+    bent = float(np.ptp(rest)) / largest if largest > 0 else 0.0
+    return not (bent <= _LITTLE and lost <= _LITTLE * largest) and not (bent <= _OWN_ERROR and lost >= _MUCH * largest)
 
 
 def _terms(balance: Balance) -> list[Samples]:
@@ -132,9 +171,9 @@ def _terms(balance: Balance) -> list[Samples]:
     found = []
     if balance.external_work is not None:
         found.append(balance.external_work)
-    if balance.kinetic is not None and balance.internal is not None:
-        hourglass = 0.0 if balance.hourglass is None else balance.hourglass
-        found.append(balance.kinetic + balance.internal + hourglass)
+    whole = balance.kinetic_and_internal
+    if whole is not None:
+        found.append(whole)
     return [term for term in found if np.ptp(term) > 0]
 
 

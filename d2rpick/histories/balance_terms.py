@@ -36,9 +36,10 @@ _JUDGED: Final = frozenset(
 )
 _TOTAL_INTERNAL: Final = ("ietotal", "totalinternalenergy")
 # Of the centre of mass of the model; a planar one has two of the three.  The last are any names of these quantities.
+_MOMENTA: Final = ("xmomentum", "ymomentum", "zmomentum")
 _VELOCITIES: Final = (
     ("globalxvelocity", "globalyvelocity", "globalzvelocity"),
-    ("xmomentum", "ymomentum", "zmomentum"),
+    _MOMENTA,
     ("xvelocity", "yvelocity", "zvelocity"),
 )
 
@@ -78,10 +79,14 @@ def terms_of(run: Files) -> Balance | None:
 
 
 class Velocity(NamedTuple):
-    """Velocity of the centre of mass, up to a factor, shape (n, 3), and how finely it was printed."""
+    """Velocity of the centre of mass times a ``mass``, shape (n, 3), and how finely it was printed.
+
+    The mass is 1 of a velocity, NaN of a momentum whose mass is not known.
+    """
 
     values: Samples
     precision: Precision
+    mass: float
 
 
 def velocity_of(database: Legs) -> Velocity | None:
@@ -94,7 +99,10 @@ def velocity_of(database: Legs) -> Velocity | None:
     except FormatError:
         return None
     values = columns.velocity()
-    return None if values is None else Velocity(values, database.precisions(columns.used)[1])
+    if values is None:
+        return None
+    precision = database.precisions(columns.used)[1]
+    return Velocity(values, precision, columns.mass(values) if columns.momentum else 1.0)
 
 
 def _whole(run: Files) -> Legs | None:
@@ -132,6 +140,16 @@ class _Columns:
         self._names = {normalised(name): name for name in reversed(database.channels)}
         self._names |= {normalised(quantity): name for quantity, name in database.quantities.items()}
         self.used: list[str] = []
+        self.momentum = False  # whether the velocity that was read is a momentum
+
+    def mass(self, momentum: Samples) -> float:
+        """Give the mass of the model: as written, or the least that has this momentum (n, 3) at its kinetic energy."""
+        written, kinetic = self.first("mass", "totalmass"), self.first(*_NAMES["kinetic"])
+        if written is not None:
+            return float(np.median(written))
+        if kinetic is None or not (kinetic > 0).any():
+            return float("nan")
+        return float((np.sum(momentum**2, axis=1)[kinetic > 0] / (2 * kinetic[kinetic > 0])).max())
 
     def first(self, *names: str) -> Samples | None:
         """Give the first of these columns that is there."""
@@ -144,6 +162,7 @@ class _Columns:
             columns = [self.first(axis) for axis in axes]
             known = [column for column in columns if column is not None]
             if len(known) > 1:
+                self.momentum = axes == _MOMENTA
                 still = np.zeros_like(known[0])
                 return np.stack([still if column is None else column for column in columns], axis=1)
         return None

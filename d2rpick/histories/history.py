@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from d2rpick.histories.digits import told_apart
 from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Hashable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 # in quotes: numpy.typing costs start-up
 Samples: TypeAlias = "NDArray[np.float64]"
 
+# Parts slower than this share of the fastest stand still: single precision leaves them a speed.
+_STILL: Final = 1e-6
 # Nobody means a time in this first share of a record: a number that lies there in another unit was given in this one.
 _NEVER_MEANT: Final = 0.01
 
@@ -77,7 +79,9 @@ class Momenta:
     """Momentum of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); None for parts: the whole model.
 
     ``precision`` is that of the printed numbers; ``chosen`` are the indices of the parts to switch, ``flying``
-    those of the set that is known to fly together, if it is.
+    those of the set that is known to fly together, if it is.  ``masses`` of shape (parts,), NaN where unknown; None
+    where none are, 1 where velocities stand for momenta [mass].  ``known``: what was found of sets of parts: the same
+    few are asked for at many times.
     """
 
     time: Samples
@@ -86,18 +90,36 @@ class Momenta:
     precision: Precision
     chosen: tuple[int, ...]
     flying: tuple[int, ...] | None = None
+    masses: Samples | None = None
+    known: dict[Hashable, Any] = field(default_factory=dict, init=False)
+
+    def choosing(self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None) -> Momenta:
+        """Give the same momenta with other parts to switch; what was found of them stays ``known``."""
+        made = replace(self, chosen=chosen, flying=flying)
+        object.__setattr__(made, "known", self.known)
+        return made
 
     def of(self, members: Sequence[int]) -> Samples:
         """Sum over the parts with these indices, shape (n, 3), read-only."""
-        key = tuple(members)
-        if key not in self._sums:
-            self._sums[key] = _frozen(self.values[:, list(members)].sum(axis=1))
-        return self._sums[key]
+        key = "sum", tuple(members)
+        if key not in self.known:
+            self.known[key] = _frozen(self.values[:, list(members)].sum(axis=1))
+        sums: Samples = self.known[key]
+        return sums
 
     def noise(self, members: Sequence[int]) -> float:
         """What the printed digits of these parts leave open in their sum [momentum]."""
         largest = np.abs(np.stack(self._bounds))[:, list(members)].max(axis=(0, 2), initial=0.0)
         return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
+
+    def mass(self, members: Sequence[int]) -> float:
+        """Mass of those of the parts with these indices that ever move, NaN where one is unknown [mass]."""
+        if self.masses is None:
+            return float("nan")
+        largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]
+        masses = self.masses[list(members)]
+        speeds = np.divide(largest, masses, out=np.zeros(masses.shape), where=masses > 0)
+        return float(masses[~(speeds <= _STILL * speeds.max(initial=0.0))].sum())
 
     def change(self, members: Sequence[int]) -> float:
         """Largest range that a component of one of these parts has over the record [momentum]."""
@@ -119,10 +141,6 @@ class Momenta:
     def _bounds(self) -> tuple[Samples, Samples]:
         """Lowest and highest value of each component over the record, shape (parts, 3) [momentum]."""
         return self.values.min(axis=0), self.values.max(axis=0)
-
-    @cached_property
-    def _sums(self) -> dict[tuple[int, ...], Samples]:
-        return {}  # the same few sets are asked for at many times
 
 
 class Track(NamedTuple):
@@ -157,6 +175,13 @@ class Balance:
     velocity: Samples | None = None
     hourglass_of_parts: tuple[tuple[Part, float, float], ...] = ()
     precision: Precision = EXACT
+
+    @cached_property
+    def kinetic_and_internal(self) -> Samples | None:
+        """Kinetic and internal energy together, with that of hourglassing, of shape (n,); None where one is unknown."""
+        if self.kinetic is None or self.internal is None:
+            return None
+        return self.kinetic + self.internal + (0.0 if self.hourglass is None else self.hourglass)
 
 
 class FlightEvidence(Protocol):

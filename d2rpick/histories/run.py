@@ -73,7 +73,7 @@ class Run:
             ids = [part.id for part in of_parts.parts]
             members = tuple(ids.index(part.id) for part in chosen or of_parts.parts)
             known = tuple(ids.index(part.id) for part in flying) if flying else None
-            of_parts = replace(of_parts, chosen=members, flying=known)
+            of_parts = of_parts.choosing(members, known)
         return tuple(one for one in (of_parts, of_whole) if one)
 
     @cached_property
@@ -86,7 +86,8 @@ class Run:
             values = np.stack([holder.part_channel(axis, [part.id for part in holder.parts]) for axis in _AXES], axis=2)
         except FormatError:
             return None  # it cannot say what flies together
-        return Momenta(holder.part_time, values, holder.parts, holder.precisions(())[1], ())
+        precision = holder.precisions(())[1]
+        return Momenta(holder.part_time, values, holder.parts, precision, (), masses=self._least_masses(values, holder))
 
     @cached_property
     def masses(self) -> Samples | None:
@@ -94,19 +95,34 @@ class Run:
 
         As written, or momentum over velocity along the axis with most momentum; None where neither is.
         """
-        momenta = self._part_momenta
-        if momenta is None or momenta.parts is None:
-            return None
+        momenta, holder = self._part_momenta, self._with_parts()
+        return self._masses(momenta.values, holder) if momenta and holder else None
+
+    def _masses(self, momenta: Samples, holder: Legs) -> Samples | None:
         with suppress(FormatError):
-            return np.median(self._of_holder("mass", momenta.parts), axis=0)
-        axis = int(np.abs(momenta.values).sum(axis=(0, 1)).argmax())
+            return np.median(self._of_holder("mass", holder.parts), axis=0)
+        axis = int(np.abs(momenta).sum(axis=(0, 1)).argmax())
         try:
-            velocity, momentum = self._of_holder(_VELOCITIES[axis], momenta.parts), momenta.values[:, :, axis]
+            velocity, momentum = self._of_holder(_VELOCITIES[axis], holder.parts), momenta[:, :, axis]
         except FormatError:
             return None
         square, product = (velocity**2).sum(axis=0), (velocity * momentum).sum(axis=0)
         massless = ~momentum.any(axis=0) & ~velocity.any(axis=0)
         return np.where(massless, 0.0, np.divide(product, square, out=np.full(square.shape, np.nan), where=square > 0))
+
+    def _least_masses(self, momenta: Samples, holder: Legs) -> Samples | None:
+        """Masses of the parts; of a part that writes none, the least that has its momentum at its kinetic energy."""
+        masses = self._masses(momenta, holder)
+        ids = [part.id for part in holder.parts]
+        if masses is None or not np.isnan(masses).any():
+            return masses
+        try:
+            kinetic = holder.part_channel("kinetic_energy", ids)
+        except FormatError:
+            return masses
+        squares = np.sum(momenta**2, axis=2)
+        least = np.divide(squares, 2 * kinetic, out=np.zeros(squares.shape), where=kinetic > 0).max(axis=0)
+        return np.where(np.isnan(masses), least, masses)
 
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
@@ -116,7 +132,8 @@ class Run:
         for database in self.databases:
             velocity = velocity_of(database) if database.channels else None
             if velocity:
-                return Momenta(database.time, velocity.values[:, np.newaxis], None, velocity.precision, (0,))
+                values, mass = velocity.values[:, np.newaxis], np.array([velocity.mass])
+                return Momenta(database.time, values, None, velocity.precision, (0,), masses=mass)
         return None
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:

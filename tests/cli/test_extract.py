@@ -166,7 +166,9 @@ def test_a_channel_of_an_unusual_name_is_named(tmp_path: Path) -> None:
     file.write_text(UNUSUAL)
     named = [f"--channel={axis}_momentum=M{number}" for number, axis in enumerate("xyz", 1)]
     text = run("extract", *named, "--channel", "kinetic-energy=3", str(file)).stdout
-    assert text.startswith("time,internal_energy,kinetic_energy,x_momentum,y_momentum,z_momentum\n0.0,0.0,0.0,1.0,2.0,")
+    assert text.startswith(
+        "time,internal_energy,kinetic_energy,x_momentum,y_momentum,z_momentum,mass\n0.0,0.0,0.0,1.0,2.0,"
+    )
 
 
 @pytest.mark.parametrize(
@@ -190,7 +192,7 @@ def test_without_a_file_csv_goes_to_standard_output_and_notes_do_not(tmp_path: P
     file = tmp_path / "matsum"
     run(*REPLAY, "-o", str(file))
     result = run("extract", str(file))
-    assert result.stdout.startswith("time,internal_energy,x_momentum,y_momentum,z_momentum\n0.0,0.0,")
+    assert result.stdout.startswith("time,internal_energy,x_momentum,y_momentum,z_momentum,mass\n0.0,0.0,")
     assert "the energies of all parts were added" in result.stderr
     assert run("extract", "-q", str(file)).stderr == ""
     hdf5 = run("extract", "--write-as", "hdf5", "-q", str(file))

@@ -79,7 +79,7 @@ def test_the_next_contact_ends_the_flight(td: float) -> None:
 def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown_end() -> None:
     span, fit = described_span(paper.history(), paper.TD, Span(0.0, 0.15))
     assert span == Span(0.0, 0.15)
-    assert examine(paper.history(), paper.TD, Settings()).flight == Flight(0.0, None, "oscillator")
+    assert examine(paper.history(), paper.TD, Settings()).flight == Flight(0.0, None, "oscillator", described=True)
     assert fit.mode is not None
     assert fit.mode.omega == pytest.approx(paper.OMEGA_2, rel=1e-10)
 
