@@ -14,7 +14,7 @@ from d2rpick.histories.history import Balance, Part, Precision
 from d2rpick.histories.opening import open_run
 from d2rpick.report.health import measures_of
 from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run
-from tests.shared import shared
+from tests.computed import stored
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -146,32 +146,11 @@ def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> 
 
 @pytest.mark.parametrize("name", ["oscillator_referenceT01.gz", "chain_referenceT01.gz"])
 def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
-    run_of = open_run([str(shared(f"openradioss/{name}"))])
+    run_of = open_run([stored(name)])
     health = assess(balance_of(run_of, run_of.parts) or Balance(TIME), (0.013, 0.064))
     assert health.window_work is not None
     assert health.window_work < 1e-3
     assert not list(cautions_of_health(health))
-
-
-@pytest.mark.parametrize(
-    ("name", "known", "expected"),
-    [
-        ("PILLARS-LSDyna__Bolt_B_Explicit-glstat", {"hourglass_share": 0.0}, {"energy-ratio", "sliding"}),
-        ("Crimping__results-glstat.head16000", {"hourglass_share": 0.0082211}, {"sliding"}),
-        ("Masters-Project__Steel_Explicit-glstat.head16000", {"hourglass_share": None, "sliding_share": 0.0}, set()),
-        ("lasso-python__sph_models-R12_2_1-binout", {"energy_ratio_min": 0.950303}, set()),
-        ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01", {"part_hourglass_share": 0.0574625}, set()),
-        # of its names only two are sure
-        ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01.csv", {"hourglass_share": None}, set()),
-        ("OpenRadioss__miniqa-onefile_rad-reference-CRA2AV4T01", {}, {"hourglass", "part-hourglass"}),
-    ],
-)
-def test_each_solver_s_names_are_found(name: str, known: dict[str, float | None], expected: set[str]) -> None:
-    run_of = open_run([str(shared(f"real/histories/{name}"))])
-    health = assess(balance_of(run_of, run_of.parts) or Balance(TIME))
-    for key, value in known.items():
-        assert getattr(health, key) == (value and pytest.approx(value, rel=1e-4))
-    assert {caution.code for caution in cautions_of_health(health)} == expected
 
 
 def test_suggest_and_info_tell_the_health() -> None:
