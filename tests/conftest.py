@@ -23,6 +23,8 @@ from d2rpick.flight.window import Remembered
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.identify import Identification, identify, identify_several
 
+pytest_plugins = ["tests.alone"]
+
 # A busy machine is no finding.
 settings.register_profile("d2rpick", deadline=None)
 settings.load_profile("d2rpick")
