@@ -27,11 +27,11 @@ _OURS = (tempfile.gettempdir(), sys.prefix, sys.base_prefix, *filter(None, sys.p
 
 
 class _Watch:
-    """What was opened beside the clone, and whether the test that runs may do so."""
+    """What was opened beside the clone, and whether that is free: while pytest itself reads and reports, it is."""
 
     def __init__(self) -> None:
         self.opened: list[str] = []
-        self.free = False
+        self.free = True
 
     def __call__(self, event: str, args: tuple[Any, ...]) -> None:
         if self.free or event not in _EVENTS:
@@ -59,13 +59,23 @@ def is_beside(name: str, root: Path = ROOT) -> bool:
 
 
 @pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, Any, Any]:
+    """Watch the modules of the tests."""
+    WATCH.free = False
+    try:
+        return (yield)
+    finally:
+        WATCH.free = True
+
+
+@pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
-    """Let a test of files of others read them."""
+    """Watch a test, but for one of files of others."""
     WATCH.free = item.get_closest_marker("real") is not None
     try:
         return (yield)
     finally:
-        WATCH.free = False
+        WATCH.free = True
 
 
 @pytest.hookimpl(wrapper=True)

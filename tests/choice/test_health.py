@@ -15,8 +15,11 @@ from d2rpick.histories.opening import open_run
 from d2rpick.report.health import measures_of
 from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run
 from tests.computed import stored
+from tests.made_t01 import t01, value
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from d2rpick.histories.history import Samples
 
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
@@ -81,6 +84,26 @@ def test_what_the_files_do_not_have_is_unknown_and_not_zero(term: str, measures:
     health = assess(replace(HEALTHY, **{term: None}), WINDOW)  # type: ignore[arg-type]
     assert [getattr(health, name) for name in measures] == [None] * len(measures)
     assert [getattr(assess(HEALTHY, WINDOW), name) for name in measures].count(None) == 0
+
+
+def test_a_window_of_too_few_states_is_not_judged() -> None:
+    few, enough = (0.2, 0.2 + 4.5 / 200), (0.2, 0.2 + 5.5 / 200)
+    reason = "the window holds 5 states: at least 6 are needed to tell a load from gravity"
+    assert assess(HEALTHY, few).window_reason == reason
+    assert [one.message for one in cautions_of_health(assess(HEALTHY, few))] == [reason]
+    assert warned(HEALTHY, few) == ["window-not-judged"]
+    assert "window-not-judged" not in warned(HEALTHY, enough)
+    assert "window-not-judged" not in warned(replace(HEALTHY, external_work=None), few)
+
+
+def test_a_term_with_a_state_that_is_no_number_is_unknown(tmp_path: Path) -> None:
+    written, nan = np.array(value(3, 0, 12), ">f4").tobytes(), np.array(np.nan, ">f4").tobytes()
+    for name, content in (("whole", bytes(t01(8).data)), ("damaged", bytes(t01(8).data).replace(written, nan))):
+        (tmp_path / f"{name}T01").write_bytes(content)
+        run_of = open_run([str(tmp_path / f"{name}T01")])
+        balance = balance_of(run_of, run_of.parts)
+        assert balance is not None
+        assert (balance.hourglass is None, balance.kinetic is None) == (name == "damaged", False)
 
 
 def test_nothing_known_is_nothing_said() -> None:

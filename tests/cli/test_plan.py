@@ -157,6 +157,8 @@ def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
     asked = ("--part", "flying", "--tr", "0", "--td", "0.27")
     told = run("verify", "-q", *asked, file).stdout.splitlines()[0]
     assert told.endswith("by the energy level alone: tr lies in the flight, and nothing vibrates there")
+    chosen = run("suggest", "-q", "--part", "flying", "--td", "0.27", file).stdout
+    assert "keeps        everything: nothing vibrates in the flight up to td" in chosen
     card = run("card", "-q", "--part", "1", *asked[2:], "--solver", "ls-dyna", "--history", file).stdout
     assert "at-rest: nothing vibrates" in card
     assert "evel error" not in card

@@ -241,6 +241,16 @@ def test_parts_at_rest_do_not_fly() -> None:
     assert flight_around(replace(momenta, values=0 * momenta.values), TD) is None
 
 
+def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:
+    """Its momentum is constant, but nothing."""
+    light = flown(trip())
+    braked = np.zeros((light.time.size, 1, 3))
+    braked[:, 0, 0] = np.where(light.time < 0.1, 50 + 50 * np.cos(np.pi * light.time / 0.1), 0.0)
+    momenta = Momenta(light.time, printed(braked.ravel(), 5).reshape(braked.shape), PARTS[:1], Precision(5), (0,))
+    assert flight_around(momenta, TD) is None
+    assert flight_around(replace(momenta, values=momenta.values + 5.0), TD)
+
+
 def test_a_load_may_hide_behind_the_coarse_digits_of_a_heavy_part() -> None:
     light = flown(trip(), digits=5)
     train = np.broadcast_to([1.2345e9, 0.0, 0.0], (light.time.size, 1, 3))

@@ -103,6 +103,13 @@ def test_rigid_elements_of_the_car_are_those_that_the_solver_put_off(tmp_path: P
         }
 
 
+def test_an_include_that_is_absent_is_told(tmp_path: Path) -> None:
+    text = f"{nodes(4)}/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{PROPS}#include absent.inc\n"
+    found = inventory(tmp_path, text)
+    assert not found.complete
+    assert any("absent.inc was not read" in note for note in found.notes)
+
+
 def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> None:
     text = f"{BEGIN}{PROPS}/PART/1\na\n{wide(1, 1)}{nodes(8)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{wide(2, 3, 4, 5, 6)}"
     deck = tmp_path / "TEST_0000.rad"

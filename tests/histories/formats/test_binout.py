@@ -60,6 +60,13 @@ def test_any_style_gives_the_numbers_that_were_written(style: Style, relative: b
     assert energies.tolist() == [[values("internal_energy", state, id_) for id_ in (3, 7)] for state in late]
 
 
+def test_a_branch_that_is_written_seldom_keeps_its_states() -> None:
+    """Between two of its states those of the other branch repeat."""
+    run = opened(made_binout(range(1, 301), matsum_every=100))
+    assert run.time.tolist() == expected("time", range(1, 301))
+    assert run.part_time.tolist() == expected("time", (100, 200, 300))
+
+
 def test_metadata() -> None:
     run = opened(made_binout([1], parts=(7, 3), titles={3: "box", 9: "unused", 7: "step"}))
     assert [(part.id, part.title) for part in run.parts] == [(7, "step"), (3, "box")]
