@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 
 FOREIGN = str(REAL / "glstat")
 HOME, TEMPORARY = Path("/home/one"), Path(tempfile.gettempdir())
-SWALLOWED = f"""
+SWALLOWED = """
 import pytest
 from contextlib import suppress
 
 def test_swallowed():
     with suppress(BaseException):
-        open({FOREIGN!r})
+        open(FOREIGN)
 
 @pytest.mark.real
 def test_free():
     with suppress(OSError):
-        open({FOREIGN!r})
+        open(FOREIGN)
 """
 
 
@@ -88,13 +88,17 @@ def pytest_of(*args: str, **environment: str) -> subprocess.CompletedProcess[str
 
 
 def test_a_test_that_swallows_the_error_fails_and_one_of_files_of_others_is_free(tmp_path: Path) -> None:
-    (tmp_path / "test_swallowed.py").write_text(SWALLOWED)
-    (tmp_path / "test_imported.py").write_text(f"open({FOREIGN!r})")
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = real\n")
-    found = pytest_of("--continue-on-collection-errors", str(tmp_path))
+    suite, others = tmp_path / "suite", tmp_path / "others"
+    suite.mkdir()
+    others.mkdir()
+    foreign = str(others / "glstat")
+    (suite / "test_swallowed.py").write_text(SWALLOWED.replace("FOREIGN", repr(foreign)))
+    (suite / "test_imported.py").write_text(f"open({foreign!r})")
+    (suite / "pytest.ini").write_text("[pytest]\nmarkers = real\n")
+    found = pytest_of("--continue-on-collection-errors", str(suite), D2RPICK_REAL=str(others))
     assert found.returncode == 1, found.stdout
     assert "ERROR collecting test_imported.py" in found.stdout
-    assert f"opened beside the clone: {FOREIGN}" in found.stdout
+    assert f"opened beside the clone: {foreign}" in found.stdout
     assert "2 passed, 2 errors" in found.stdout
 
 

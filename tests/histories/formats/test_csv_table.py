@@ -14,11 +14,9 @@ from d2rpick.histories.formats import csv_table, table_values
 from d2rpick.histories.formats.layout import split
 from d2rpick.histories.history import EXACT, Precision
 from d2rpick.histories.opening import Selection
-from tests.reading import history_of, read_history, states_of
+from tests.reading import history_of, states_of
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from d2rpick.histories.history import History
 
 TIMES = [0.0, 0.25, 0.625]
@@ -219,10 +217,9 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
         read(text, *asked)
 
 
-def test_a_time_history_of_radioss_as_text_is_refused_with_what_to_do(tmp_path: Path) -> None:
-    (tmp_path / "RUNT01").write_text("ZZZZZEOR      84\n      3041a title\nZZZZZEOR      80\n")
-    with pytest.raises(FormatError, match="RUNT01: a time history of Radioss as text, which is not read; let the run"):
-        read_history([str(tmp_path / "RUNT01")])
+def test_a_time_history_of_radioss_as_text_is_refused_with_what_to_do() -> None:
+    with pytest.raises(FormatError, match="table: a time history of Radioss as text, which is not read; let the run"):
+        read("ZZZZZEOR      84\n      3041a title\nZZZZZEOR      80\n")
 
 
 @pytest.mark.parametrize(
