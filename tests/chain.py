@@ -7,8 +7,8 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from d2rpick.histories.opening import Selection
+from tests.computed import results, stored
 from tests.reading import read_history
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History
@@ -20,12 +20,12 @@ TD_PEAK, TD_LATE = 0.13505, 0.238
 def history(*energies: str) -> History:
     """Record of the run without switching, by default with the energies of both springs."""
     energies = energies or ("IE_spring1_J", "IE_spring2_J")
-    return read_history([str(shared("openradioss/chain_ref.csv"))], Selection(energy=energies))
+    return read_history([stored("chain_ref.csv.gz")], Selection(energy=energies))
 
 
 @cache
 def scan() -> tuple[dict[str, float], ...]:
     """Switched runs: times, true signs of both springs, and the computed residual."""
     names = ("tr_s", "td_s", "sign1", "sign2", "R_sim")
-    with shared("openradioss/chain_scan.csv").open(encoding="ascii") as lines:
+    with results("chain_scan.csv").open(encoding="ascii") as lines:
         return tuple({name: float(row[name]) for name in names} for row in csv.DictReader(lines))

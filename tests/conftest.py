@@ -71,6 +71,8 @@ replace(explored, _STEPS=5, _LEAST=5)
 # Most tests read what they have just written: that no write is under way is sure without waiting for it.
 replace(file_state, PAUSE=0.0)
 
+pytest_plugins = ["tests.alone"]
+
 # Looking for garbage as often as Python does by itself takes a tenth of the time of all tests.
 gc.set_threshold(20_000, 20, 50)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.histories.history import History
-from tests.shared import shared
+from tests.command import ROLLOVER
 
 if TYPE_CHECKING:
     from d2rpick.choice.suggest import Suggestion
@@ -22,7 +22,7 @@ def of(energy: np.ndarray, time: np.ndarray) -> History:
 
 
 def rollover() -> History:
-    table = np.genfromtxt(shared("openradioss/rollover_ref.csv"), delimiter=",", names=True)
+    table = np.genfromtxt(ROLLOVER, delimiter=",", names=True)
     return of(table["boxIE_J"], table["time_s"])
 
 

@@ -71,6 +71,17 @@ def pandas_values_block(file: h5py.File) -> None:
     file["run/_i_table/index/sorted"] = np.arange(9.0)
 
 
+def pandas_frame(file: h5py.File) -> None:
+    """The "fixed" store: an index, and a block of columns of each type."""
+    file.create_group("run")
+    file["run"].attrs["pandas_type"], file["run"].attrs["nblocks"] = np.bytes_(b"frame"), 2
+    file["run/axis1"] = TIME
+    file["run/axis1"].attrs["name"] = np.bytes_(b"time")
+    file["run/block0_items"] = np.array([b"kinetic_energy", b"internal_energy"])
+    file["run/block0_values"] = np.column_stack([KINETIC, ENERGY])
+    file["run/block1_items"], file["run/block1_values"] = np.array([b"note"]), np.full((4, 1), b"x")
+
+
 def pandas_series(file: h5py.File) -> None:
     file["internal_energy/index"], file["internal_energy/values"] = TIME, ENERGY
     file["internal_energy"].attrs["pandas_type"] = np.bytes_(b"series")
@@ -90,6 +101,6 @@ LAYOUTS = {
     write.__name__: write
     for write in (
         plain, columns_upright, matrix, matrix_across, compound, h5md, matlab, pandas_values_block,
-        pandas_series, lasso,
+        pandas_frame, pandas_series, lasso,
     )
 }  # fmt: skip

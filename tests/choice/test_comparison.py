@@ -11,9 +11,9 @@ import pytest
 from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
 from d2rpick.errors import RangeError
 from d2rpick.histories.history import History, Track
-from tests.command import ENERGY, OSCILLATOR, answer, run
+from tests.command import BOX, ENERGY, OSCILLATOR, ROLLOVER, answer, run
+from tests.computed import results, stored
 from tests.json_schemas import check_by_schema
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,12 +22,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 TR, TD = 0.0135867, 0.0687534
-ROLLOVER = ("verify", "--tr", "0.1", "--td", "0.37", "--part", "box")
+VERIFY = ("verify", "--tr", "0.1", "--td", "0.37", "--part", "box")
+LEGS = stored("rollover_r100_T0*.gz")
 
 
 def scan(run_name: str) -> dict[str, float]:
     """Row of the table in which the solver's runs were evaluated when they were computed."""
-    table = np.genfromtxt(shared("openradioss/rollover_scan.csv"), delimiter=",", names=True, dtype=None)
+    table = np.genfromtxt(results("rollover_scan.csv"), delimiter=",", names=True, dtype=None)
     assert table.dtype.names
     (row,) = table[table["run"].astype(str) == run_name]
     return {name: float(row[name]) for name in table.dtype.names[1:]}
@@ -35,8 +36,7 @@ def scan(run_name: str) -> dict[str, float]:
 
 def rollover(*options: str) -> dict[str, Any]:
     """Answer of verify for the rollover switched at 100 ms, its three legs given by a glob."""
-    reference, legs = (shared(f"openradioss/rollover_{name}") for name in ("referenceT01.gz", "r100_T01.gz"))
-    return answer(*ROLLOVER, str(reference), "--switched", str(legs).replace("T01", "T0*"), *options)
+    return answer(*VERIFY, BOX, "--switched", LEGS, *options)
 
 
 # A rollover, computed by a solver whose rigid parts report neither kinetic energy nor momentum.
@@ -48,13 +48,14 @@ def test_a_switched_rollover_flies_as_its_reference_with_less_vibration() -> Non
     switched = found["switched"]
     assert [name[-6:] for name in switched["source"]] == ["T01.gz", "T02.gz", "T03.gz"]
     assert switched["energy_frozen"] == pytest.approx(expected["IEfrozen_J"], rel=1e-5)
-    assert switched["energy_td"] == pytest.approx(1.7492, abs=1e-4)
+    # between two of every tenth state; of all of them 1.7492
+    assert switched["energy_td"] == pytest.approx(1.7515, abs=1e-4)
     assert switched["energy_ratio"] == switched["energy_frozen"] / switched["energy_td"]
     # that table's means reach to 380 ms and were taken of every tenth state; contact is at 381.9 ms
     assert switched["mean_after"] == pytest.approx(expected["IEmean_td_to_380ms_J"], rel=0.01)
     assert switched["mean_after_reference"] == pytest.approx(expected["IEmean_ref_J"], rel=0.06)
     assert switched["spread_after"] < switched["spread_after_reference"]
-    assert switched["end"] == pytest.approx(0.3819, abs=1e-4)
+    assert switched["end"] == pytest.approx(0.3819, abs=5e-4)  # a state each 0.5 ms
     assert switched["momentum_error"] < 1e-6
     # of the centre at td, in mm; the largest distance afterwards is no smaller
     at_td = np.hypot(expected["dx_td_mm"], expected["dz_td_mm"]) / 1e3
@@ -63,11 +64,10 @@ def test_a_switched_rollover_flies_as_its_reference_with_less_vibration() -> Non
 
 
 def test_the_table_sets_the_switched_run_beside_the_reference() -> None:
-    reference, legs = (str(shared(f"openradioss/rollover_{name}")) for name in ("referenceT01.gz", "r100_T01.gz"))
-    result = run(*ROLLOVER, reference, "--switched", legs.replace("T01", "T0*"))
+    result = run(*VERIFY, BOX, "--switched", LEGS)
     lines = [line.split() for line in result.stdout.splitlines()]
-    assert ["energy", "right", "after", "td", "1.45057", "1.74924"] in lines
-    assert ["largest", "displacement", "after", "td", "0.000135"] in lines
+    assert ["energy", "right", "after", "td", "1.45057", "1.75145"] in lines
+    assert ["largest", "displacement", "after", "td", "0.000134"] in lines
     assert result.exit_code == 0
 
 
@@ -76,37 +76,33 @@ def test_the_table_sets_the_switched_run_beside_the_reference() -> None:
     [
         (("0.2", "0.37"), "is rigid from 0.1 to 0.370008 by its energy, not from tr 0.2"),
         (("0.1", "0.36"), "not from tr 0.1 to td 0.36"),
-        (("0.2", "0.37"), "is not that of the reference at tr 0.2"),
+        (("0.18", "0.37"), "is not that of the reference at tr 0.18"),
     ],
 )
 def test_a_run_that_was_switched_at_other_times_is_an_objection(pair: tuple[str, str], said: str) -> None:
-    reference, legs = (str(shared(f"openradioss/rollover_{name}")) for name in ("referenceT01.gz", "r100_T01.gz"))
-    options = ("verify", "--tr", pair[0], "--td", pair[1], "--part", "box", reference, "--switched")
-    found = answer(*options, legs.replace("T01", "T0*"))
+    found = answer("verify", "--tr", pair[0], "--td", pair[1], "--part", "box", BOX, "--switched", LEGS)
     assert found["verified"] is False
     assert any(said in reason for reason in found["reasons"])
 
 
 def test_a_run_that_was_never_rigid_is_an_objection() -> None:
-    reference = str(shared("openradioss/rollover_referenceT01.gz"))
-    found = answer(*ROLLOVER, reference, "--switched", reference)
+    found = answer(*VERIFY, BOX, "--switched", BOX)
     assert found["verified"] is False
     assert any("does not stand still" in reason for reason in found["reasons"])
 
 
 def test_the_energy_that_was_locked_in_is_judged() -> None:
-    reference, other = (str(shared(f"openradioss/rollover_{name}.csv")) for name in ("ref", "r20"))
-    found = answer("verify", "--tr", "0.02", "--td", "0.37", "--energy", "boxIE_J", reference, "--switched", other)
+    pair = ("--tr", "0.02", "--td", "0.37", "--energy", "boxIE_J")
+    found = answer("verify", *pair, ROLLOVER, "--switched", stored("rollover_r20.csv.gz"))
     assert found["verified"] is False
     assert any("locked in, 11.1" in reason for reason in found["reasons"])
 
 
 def test_all_files_behind_the_option_are_of_the_switched_run() -> None:
-    reference, legs = (str(shared(f"openradioss/rollover_{name}")) for name in ("referenceT01.gz", "r100_T01.gz"))
-    spread = [legs.replace("T01", leg) for leg in ("T01", "T02", "T03")]
-    found = answer(*ROLLOVER, reference, "--switched", *spread)
+    spread = [LEGS.replace("*", leg) for leg in "123"]
+    found = answer(*VERIFY, BOX, "--switched", *spread)
     assert found["switched"]["source"] == spread
-    assert found["history"]["source"] == [reference]
+    assert found["history"]["source"] == [BOX]
 
 
 # The floating oscillator of the paper, computed by a solver, as tables without momentum.
@@ -117,10 +113,8 @@ def test_all_files_behind_the_option_are_of_the_switched_run() -> None:
     [("13_64", 0.013, 0.064, 1.143063), ("6_80", 0.006, 0.080, 140.262), ("13p587_68p753", TR, TD, 6.07041)],
 )
 def test_a_switched_table_is_compared_by_its_energy(name: str, tr: float, td: float, frozen: float) -> None:
-    reference, other = (shared(f"openradioss/oscillator_{which}.csv") for which in ("ref", f"d2r_{name}"))
-    found = answer(
-        *("verify", "--tr", str(tr), "--td", str(td), "--energy", "IE_J"), str(reference), "--switched", str(other)
-    )
+    reference, other = (stored(f"oscillator_{which}.csv.gz") for which in ("ref", f"d2r_{name}"))
+    found = answer(*("verify", "--tr", str(tr), "--td", str(td), "--energy", "IE_J"), reference, "--switched", other)
     check_by_schema(found)
     switched = found["switched"]
     assert switched["energy_frozen"] == pytest.approx(frozen, rel=1e-9)

@@ -14,9 +14,12 @@ from d2rpick.histories.history import Balance, Part, Precision
 from d2rpick.histories.opening import open_run
 from d2rpick.report.health import measures_of
 from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run
-from tests.shared import shared
+from tests.computed import stored
+from tests.made_t01 import t01, value
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from d2rpick.histories.history import Samples
 
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
@@ -83,6 +86,26 @@ def test_what_the_files_do_not_have_is_unknown_and_not_zero(term: str, measures:
     assert [getattr(assess(HEALTHY, WINDOW), name) for name in measures].count(None) == 0
 
 
+def test_a_window_of_too_few_states_is_not_judged() -> None:
+    few, enough = (0.2, 0.2 + 4.5 / 200), (0.2, 0.2 + 5.5 / 200)
+    reason = "the window holds 5 states: at least 6 are needed to tell a load from gravity"
+    assert assess(HEALTHY, few).window_reason == reason
+    assert [one.message for one in cautions_of_health(assess(HEALTHY, few))] == [reason]
+    assert warned(HEALTHY, few) == ["window-not-judged"]
+    assert "window-not-judged" not in warned(HEALTHY, enough)
+    assert "window-not-judged" not in warned(replace(HEALTHY, external_work=None), few)
+
+
+def test_a_term_with_a_state_that_is_no_number_is_unknown(tmp_path: Path) -> None:
+    written, nan = np.array(value(3, 0, 12), ">f4").tobytes(), np.array(np.nan, ">f4").tobytes()
+    for name, content in (("whole", bytes(t01(8).data)), ("damaged", bytes(t01(8).data).replace(written, nan))):
+        (tmp_path / f"{name}T01").write_bytes(content)
+        run_of = open_run([str(tmp_path / f"{name}T01")])
+        balance = balance_of(run_of, run_of.parts)
+        assert balance is not None
+        assert (balance.hourglass is None, balance.kinetic is None) == (name == "damaged", False)
+
+
 def test_nothing_known_is_nothing_said() -> None:
     assert assess(Balance(TIME)) == Health()
 
@@ -146,32 +169,11 @@ def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> 
 
 @pytest.mark.parametrize("name", ["oscillator_referenceT01.gz", "chain_referenceT01.gz"])
 def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
-    run_of = open_run([str(shared(f"openradioss/{name}"))])
+    run_of = open_run([stored(name)])
     health = assess(balance_of(run_of, run_of.parts) or Balance(TIME), (0.013, 0.064))
     assert health.window_work is not None
     assert health.window_work < 1e-3
     assert not list(cautions_of_health(health))
-
-
-@pytest.mark.parametrize(
-    ("name", "known", "expected"),
-    [
-        ("PILLARS-LSDyna__Bolt_B_Explicit-glstat", {"hourglass_share": 0.0}, {"energy-ratio", "sliding"}),
-        ("Crimping__results-glstat.head16000", {"hourglass_share": 0.0082211}, {"sliding"}),
-        ("Masters-Project__Steel_Explicit-glstat.head16000", {"hourglass_share": None, "sliding_share": 0.0}, set()),
-        ("lasso-python__sph_models-R12_2_1-binout", {"energy_ratio_min": 0.950303}, set()),
-        ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01", {"part_hourglass_share": 0.0574625}, set()),
-        # of its names only two are sure
-        ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01.csv", {"hourglass_share": None}, set()),
-        ("OpenRadioss__miniqa-onefile_rad-reference-CRA2AV4T01", {}, {"hourglass", "part-hourglass"}),
-    ],
-)
-def test_each_solver_s_names_are_found(name: str, known: dict[str, float | None], expected: set[str]) -> None:
-    run_of = open_run([str(shared(f"real/histories/{name}"))])
-    health = assess(balance_of(run_of, run_of.parts) or Balance(TIME))
-    for key, value in known.items():
-        assert getattr(health, key) == (value and pytest.approx(value, rel=1e-4))
-    assert {caution.code for caution in cautions_of_health(health)} == expected
 
 
 def test_suggest_and_info_tell_the_health() -> None:

@@ -12,22 +12,22 @@ from d2rpick.choice.rigid_parts import rigid_parts
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.switched_run import switched_history
 from d2rpick.histories.opening import Selection, open_run
-from tests.shared import shared
+from tests.computed import stored
 
 if TYPE_CHECKING:
     from d2rpick.choice.verify import Verdict
 
-FOLDER = "openradioss/car_drop"
 TR, TD = 0.0496, 0.1464
 
 
 def legs(run: str) -> list[str]:
-    return [str(shared(f"{FOLDER}/switched/{run}_T0{leg}.gz")) for leg in (1, 2, 3)]
+    """Legs of a run; until tr all runs are alike."""
+    return [stored(name) for name in ("car_all_T01.gz", f"{run}_T02.gz", f"{run}_T03.gz")]
 
 
 @cache
 def reference(*parts: str) -> Reference:
-    return read([str(shared(f"{FOLDER}/carT01.gz"))], Selection(parts=parts))
+    return read([stored("carT01.gz")], Selection(parts=parts))
 
 
 def compared(run: str, *parts: str) -> Verdict:

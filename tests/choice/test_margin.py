@@ -15,7 +15,7 @@ from d2rpick.choice.margin import SHARE, landing_spread, margin_before_contact
 from d2rpick.choice.of_run import read
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta
-from tests.shared import shared
+from tests.computed import results, stored
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -67,13 +67,13 @@ def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
 
 def landings(name: str, column: str) -> Iterator[tuple[str, float]]:
     """Name of each computed run, and a number of it."""
-    with shared(f"openradioss/car_drop/{name}").open() as file:
+    with results(name).open() as file:
         yield from ((row["run"], float(row[column] or "nan")) for row in csv.DictReader(file))
 
 
 def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     """All that were switched in the flight and back before the contact."""
-    history = read([str(shared("openradioss/car_drop/carT01.gz"))]).history
+    history = read([stored("carT01.gz")]).history
     flight = find_flights(history)[-1]
     margin = margin_before_contact(history, flight)
     starts, ends = dict(landings("car_runs.csv", "tr_s")), dict(landings("car_runs.csv", "td_s"))
@@ -91,7 +91,7 @@ def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     ("run", "column", "end"), [("drop2_w2", "dland4_ms", 0.4196), ("drop2_w3", "dland7_ms", 0.5966)]
 )
 def test_the_landings_of_the_switched_box_lie_within_the_margin(run: str, column: str, end: float) -> None:
-    history = read([str(shared("openradioss/car_drop/drop2T01.gz"))]).history
+    history = read([stored("drop2T01.gz")]).history
     (flight,) = (one for one in find_flights(history) if one.end == pytest.approx(end, abs=1e-3))
     moved = abs(dict(landings("drop2_runs.csv", column))[run]) / 1e3
     assert 1e-3 < moved < margin_before_contact(history, flight).time

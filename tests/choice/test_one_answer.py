@@ -22,10 +22,10 @@ from d2rpick.histories.opening import Selection
 from d2rpick.report.suggestion import acceptable
 from d2rpick.rules.judgement import faults_of
 from tests.choice.test_same_answers import made
-from tests.command import run
+from tests.command import BOX, run
+from tests.computed import stored
 from tests.drops import drop, written
 from tests.energies import codes, of
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -135,9 +135,9 @@ def test_the_last_td_that_is_named_lies_in_the_flight(box: Reference, margin: fl
     assert suggest(box.history, float(found[1]), asked).recommended
 
 
-@pytest.mark.parametrize("file", ["rollover_r100_T01.gz", "rollover_referenceT01.gz", "car_drop/drop2T01.gz"])
+@pytest.mark.parametrize("file", [stored("rollover_r100_T01.gz"), BOX, stored("drop2T01.gz")])
 def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
-    history = read([str(shared(f"openradioss/{file}"))]).history
+    history = read([file]).history
     listed = all_seen(history)
     assert listed
     for source, flight in listed:

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from d2rpick.histories.writing import TABLE_WRITERS
-from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.command import BOX, ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
 from tests.json_schemas import check_by_schema
-from tests.shared import shared
 
 REPLAY = ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4")
 FORMATS = ("table", "json", "csv", "markdown")
@@ -69,7 +68,7 @@ def test_info_tells_version_parts_and_flight_of_a_matsum(matsum: Path) -> None:
 
 
 def test_info_lists_all_flights_of_the_parts_asked_for() -> None:
-    found = info("--part", "box", str(shared("openradioss/rollover_referenceT01.gz")))
+    found = info("--part", "box", BOX)
     first, second = found["flights"]
     assert [part["title"] for part in first["parts"]] == ["box", "step"]
     assert 0.087 <= first["start"] <= 0.093
@@ -169,7 +168,7 @@ def test_every_format_tells_the_same(matsum: Path) -> None:
 
 
 def test_csv_is_one_row_under_the_keys_of_json() -> None:
-    source = str(shared("openradioss/rollover_referenceT01.gz"))
+    source = BOX
     found = info("--part", "box", source)
     (row,) = csv.DictReader(io.StringIO(run("info", "-f", "csv", "--part", "box", source).stdout))
     assert set(found) - {"schema", "tool_version", "command", "warnings", "sampling"} == {

@@ -19,14 +19,14 @@ from d2rpick.errors import FormatError
 from d2rpick.histories.opening import open_run
 from d2rpick.vibration.measures import run_time_share
 from tests.command import ROOT
+from tests.computed import starter, stored
 from tests.sample_deck import DECK
-from tests.shared import shared, shared_bytes
+from tests.text_files import matsum_text
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
-CAR = "openradioss/car_drop/"
 
 
 def asked(history: str, deck: str | None = None, **more: object) -> Parts:
@@ -118,8 +118,9 @@ def test_a_deck_of_another_run_is_noticed(tmp_path: Path) -> None:
         recommended_parts(open_run([BOX]), Settings(), CostModel(read_inventory(str(tmp_path / "main.k"))))
 
 
-def test_parts_of_a_run_in_which_nothing_deforms_are_listed() -> None:
-    found = asked(str(shared("real/histories/dyna_pladebuk__Plade_300_150_4-BB-binout")))
+def test_parts_of_a_run_in_which_nothing_deforms_are_listed(tmp_path: Path) -> None:
+    (tmp_path / "matsum").write_bytes(matsum_text([0.0], [1, 2, 3], np.zeros((1, 3))))
+    found = asked(str(tmp_path / "matsum"))
     assert len(found.rows) == 3
     assert {row.verdict for row in found.rows} == {"keep"}
     assert found.facts.reason
@@ -137,8 +138,8 @@ def test_the_step_grows_by_what_stays_deformable() -> None:
 @pytest.fixture(scope="module")
 def car(tmp_path_factory: pytest.TempPathFactory) -> Parts:
     deck = tmp_path_factory.mktemp("car") / "CAR_0000.rad"
-    deck.write_bytes(shared_bytes(f"{CAR}decks/CAR_0000.rad.gz"))
-    return asked(str(shared(f"{CAR}carT01.gz")), str(deck), given=[12, 13, 14], times=(0.0496, 0.1464))
+    deck.write_bytes(starter("CAR"))
+    return asked(stored("carT01.gz"), str(deck), given=[12, 13, 14], times=(0.0496, 0.1464))
 
 
 def test_verdicts_on_the_car(car: Parts) -> None:

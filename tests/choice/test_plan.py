@@ -16,8 +16,8 @@ from d2rpick.choice.plan import Plan, plan_of
 from d2rpick.choice.settings import Settings
 from d2rpick.errors import RangeError
 from d2rpick.histories.opening import Selection
+from tests.computed import stored
 from tests.drops import drop, written
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,7 +37,7 @@ def plan(reference: Reference) -> Plan:
 
 
 def real(name: str) -> Reference:
-    return read([str(shared(f"openradioss/car_drop/{name}"))])
+    return read([stored(name)])
 
 
 def statuses(plan: Plan) -> list[str]:
@@ -181,7 +181,7 @@ def test_the_flights_and_windows_of_the_computed_box() -> None:
 
 def test_a_landing_while_rigid_is_told() -> None:
     """Three windows planned from one reference: the third landed 5.4 ms early, while it was rigid."""
-    legs = [str(shared(f"openradioss/car_drop/switched/drop2_w123_T0{leg}.gz")) for leg in range(1, 7)]
+    legs = [stored(f"drop2_w123_T0{leg}.gz") for leg in range(1, 7)]
     done = [(0.0, 0.2838), (0.3654, 0.4176), (0.5046, 0.5946)]
     found = plan_of(read(legs), PLAIN, done=done, before=real("drop2T01.gz"))
     moved = [row.done.moved for row in found.rows if row.done]
@@ -197,7 +197,7 @@ def test_a_landing_while_rigid_is_told() -> None:
 
 
 def test_the_switched_car_landed_as_computed() -> None:
-    legs = [str(shared(f"openradioss/car_drop/switched/car_all_T0{leg}.gz")) for leg in range(1, 4)]
+    legs = [stored(f"car_all_T0{leg}.gz") for leg in range(1, 4)]
     found = plan_of(read(legs), PLAIN, done=[(0.0496, 0.1464)], before=real("carT01.gz"))
     (moved,) = (row.done.moved for row in found.rows if row.done)
     assert moved == pytest.approx(0.5e-3, abs=1.5e-4)
@@ -269,7 +269,7 @@ def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(
 
 @pytest.fixture(scope="module")
 def car() -> Reference:
-    return read([str(shared("openradioss/car_drop/carT01.gz"))], Selection(parts=("1-14",)))
+    return read([stored("carT01.gz")], Selection(parts=("1-14",)))
 
 
 def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(car: Reference) -> None:
@@ -305,4 +305,4 @@ def test_a_window_of_more_than_half_the_longest_comes_first() -> None:
     """One after the other both are had with one more run; DROP2: 0.071 and then 0.091."""
     found = plan_of(real("drop2T01.gz"), PLAIN)
     assert statuses(found) == ["supported", "left-out", "supported", "re-plan", "re-plan", "left-out", "re-plan"]
-    assert found.rows[4].rigid_time == pytest.approx(0.0906, abs=1e-4)
+    assert found.rows[4].rigid_time == pytest.approx(0.0906, abs=4e-4)  # a state each 0.4 ms

@@ -16,8 +16,8 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
 from d2rpick.report.suggestion import as_table
+from tests.computed import stored
 from tests.records import ENERGY, TIME, vibration
-from tests.shared import shared
 
 RECORD = History(TIME, ENERGY, ("paper",), "made", "E")
 
@@ -128,7 +128,7 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
 
 def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
     """Late in a damped record the level is so low that the misfit of the oscillator moves the crossing by much."""
-    history = read([str(shared("openradioss/oscillator_referenceT01.gz"))]).history
+    history = read([stored("oscillator_referenceT01.gz")]).history
     early, late = (suggest(history, td, Settings()) for td in (0.068753, 0.144191))
     for answer, wanted in ((early, "good"), (late, "fair")):
         best, quality = answer.chosen, answer.quality

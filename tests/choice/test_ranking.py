@@ -21,8 +21,8 @@ from d2rpick.choice.verify import verify
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.fits import Fits
 from tests import paper
+from tests.computed import stored
 from tests.energies import codes, rollover
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History
@@ -76,7 +76,7 @@ def test_the_order_of_candidates(some: list[tuple[float, float, int, bool]]) -> 
 
 @cache
 def car(parts: str) -> History:
-    return read([str(shared("openradioss/car_drop/carT01.gz"))], Selection(parts=(parts,))).history
+    return read([stored("carT01.gz")], Selection(parts=(parts,))).history
 
 
 @pytest.mark.parametrize("parts", ["1-17", "1-14"])

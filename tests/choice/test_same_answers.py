@@ -14,7 +14,7 @@ from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
 from d2rpick.histories.selection import Selection
 from tests.command import ROOT
-from tests.shared import shared
+from tests.computed import stored
 
 if TYPE_CHECKING:
     from d2rpick.choice.suggest import Suggestion
@@ -32,18 +32,17 @@ SAMPLES = {
     "planar box, binout": ("rollover_box.binout", Selection(parts=("box",))),
     "planar box, T01": ("rollover_boxT01", Selection(parts=("box",))),
 }
-# Computed by a solver, not part of the repository.
+# Computed by a solver, in tests/data.
 COMPUTED = {
     "chain": ("chain_referenceT01.gz", Selection(parts=("spring1", "spring2"))),
     "oscillator": ("oscillator_referenceT01.gz", Selection()),
-    "oscillator S1": ("oscillator_S1_ref.csv", Selection(energy=("IE_J",))),
-    "oscillator S2": ("oscillator_S2_ref.csv", Selection(energy=("IE_J",))),
-    "oscillator S4": ("oscillator_S4_ref.csv", Selection(energy=("IE_J",))),
-    "load L1": ("load_L1_ref.csv", Selection(energy=("IE_spring1_J",))),
-    "load L3": ("load_L3_ref.csv", Selection(energy=("IE_spring1_J",))),
-    "shell rollover": ("rollover_referenceT01.gz", Selection(parts=("box",))),
-    "car": ("car_drop/carT01.gz", Selection(parts=("flying",))),
-    "falling box": ("car_drop/drop2T01.gz", Selection(parts=("flying",))),
+    "oscillator S1": ("oscillator_S1_ref.csv.gz", Selection(energy=("IE_J",))),
+    "oscillator S2": ("oscillator_S2_ref.csv.gz", Selection(energy=("IE_J",))),
+    "oscillator S4": ("oscillator_S4_ref.csv.gz", Selection(energy=("IE_J",))),
+    "load L1": ("load_L1_ref.csv.gz", Selection(energy=("IE_spring1_J",))),
+    "load L3": ("load_L3_ref.csv.gz", Selection(energy=("IE_spring1_J",))),
+    "car": ("carT01.gz", Selection(parts=("flying",))),
+    "falling box": ("drop2T01.gz", Selection(parts=("flying",))),
 }
 # Frequencies in the record and shares of their energies, and noise [of the highest energy].
 MADE = {
@@ -73,7 +72,7 @@ def answer(name: str, td: float | tuple[float, float], **asked: float | bool) ->
         return suggest_of(read([str(ROOT / "sample_data" / file)], selection), td, settings)
     if name in COMPUTED:
         file, selection = COMPUTED[name]
-        return suggest_of(read([str(shared(f"openradioss/{file}"))], selection), td, settings)
+        return suggest_of(read([stored(file)], selection), td, settings)
     return suggest_in_window(made(name), td, settings) if isinstance(td, tuple) else suggest(made(name), td, settings)
 
 
@@ -168,11 +167,11 @@ OLD: list[tuple[str, float | tuple[float, float], dict[str, float | bool], str]]
     ("planar box, T01", 0.37, {},
      "energy | 0.0970312 0.37 - | +-1.6e-04 | 0.0970312 0.37 - | 35/30 | 0.099 0.10055 0.123 | 0.087-0.37"),
     ("chain", 0.13505, {},
-     ("parts | 0.080835 0.13505 0.065 | +-8.3e-06 | 0.080835 0.135048 0.065 | "
-      "22/4 | 0.0791032 0.135047 0.135048 | ")),
+     ("parts | 0.080832 0.13505 0.065 | +-9.9e-05 | 0.080832 0.135048 0.065 | "
+      "17/4 | 0.0791032 0.135047 0.135048 | ")),
     ("chain", (0.1, 0.2), {},
-     ("parts | 0.080835 0.135048 0.065 | +-8.3e-06 | 0.080835 0.135048 0.065 | "
-      "20/2 | 0.0791032 0.0784121 0.0457039 | ")),
+     ("parts | 0.080832 0.135048 0.065 | +-9.9e-05 | 0.080832 0.135048 0.065 | "
+      "15/2 | 0.0791032 0.0457038 0.026053 | ")),
     ("oscillator", 0.064, {},
      ("oscillator | 0.0128856 0.064 0.957 | +-1.9e-05 | 0.0135875 0.068753 0.000 | "
       "10/4 | 0.0247256 0.0383106 0.0495077 | ")),
@@ -191,17 +190,17 @@ OLD: list[tuple[str, float | tuple[float, float], dict[str, float | bool], str]]
     ("load L3", 0.092, {"after": 0.025},
      ("oscillator | 0.0295712 0.092 1.000 | +-7.0e-05 | 0.0264349 0.0982559 0.000 | "
       "11/5 | 0.0419653 0.0546049 0.0669832 | ")),
-    ("shell rollover", 0.37, {},
-     ("energy | 0.090925 0.37 - | +-1.6e-06 | 0.0926503 0.368955 - | "
-      "434/429 | 0.092423 0.0926503 0.0928588 | 0.090851-0.1094; 0.10994-0.1309; 0.13184-0.17524")),
+    ("shell box, parts", (0.25, 0.37), {},
+     ("energy | 0.0965008 0.367002 - | +-2.8e-04 | 0.0965008 0.367002 - | "
+      "224/213 | 0.105003 0.123358 0.124003 | 0.091005-0.099843; 0.10006-0.10066; 0.10266-0.10911")),
     ("car", 0.1464, {},
      ("energy | 0.0385932 0.1464 - | +-1.6e-05 | 0.0386669 0.146717 - | "
       "404/288 | 0.0387039 0.0388894 0.0394147 | 0.03851-0.1464")),
     ("falling box", 0.414, {},
-     ("energy | 0.3434 0.414 - | +-1.1e-04 | 0.3434 0.414006 - | "
-      "157/124 | 0.343602 0.344005 0.353185 | 0.3394-0.33982; 0.34151-0.34914")),
+     ("energy | 0.344005 0.414 - | +-1.0e-04 | 0.344005 0.414006 - | "
+      "116/87 | 0.353181 0.353204 0.353231 | 0.3396-0.33981; 0.34153-0.34913")),
     ("falling box", 0.27, {},
-     "energy | 0 0.27 - | +-2.5e-05 | 0 0.269805 - | 1/1 |  | 0-0.27"),
+     "energy | 0 0.27 - | +-2.4e-05 | 0 0.270007 - | 1/1 |  | 0-0.27"),
 ]
 # fmt: on
 

@@ -23,7 +23,7 @@ from d2rpick.models.rollover.run import simulate
 from d2rpick.report.suggestion import outlook
 from tests import chain, paper
 from tests.command import ENERGY, ROLLOVER, answer, run
-from tests.shared import shared
+from tests.computed import results, stored
 
 if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
@@ -187,7 +187,7 @@ def test_the_record_ends_before_the_flight_of_an_oscillator_is_left() -> None:
 def test_the_means_of_the_computed_rollover_lie_between_the_expected_ones() -> None:
     """Above what comes back if all of the energy vibrates, and about what is expected if a part of it is at rest."""
     history = rollover()
-    table = np.genfromtxt(shared("openradioss/rollover_scan.csv"), delimiter=",", names=True, dtype=None, encoding=None)
+    table = np.genfromtxt(results("rollover_scan.csv"), delimiter=",", names=True, dtype=None, encoding=None)
     situation = suggest(history, 0.37, PLAIN).situation
     flying = table[table["tr_s"] > 0.0885]
     computed = flying["IEmean_td_to_380ms_J"] / flying["IEmean_ref_J"]
@@ -200,9 +200,9 @@ def test_the_means_of_the_computed_rollover_lie_between_the_expected_ones() -> N
 
 def test_the_means_of_the_computed_car_are_expected() -> None:
     """Shells and beams until the landing; 96 % were stated for all parts, springs among them, for 89 % computed."""
-    history = read([str(shared("openradioss/car_drop/carT01.gz"))], Selection(parts=("1-17",))).history
+    history = read([stored("carT01.gz")], Selection(parts=("1-17",))).history
     situation = examine(history, 0.1464, PLAIN)
-    with shared("openradioss/car_drop/car_runs.csv").open() as table:
+    with results("car_runs.csv").open() as table:
         rows = [row for row in csv.DictReader(table) if row["run"].startswith(("car_a", "car_b_all", "car_full"))]
     flying = [row for row in rows if float(row["tr_s"]) > 0.0386]
     assert len(flying) == 12

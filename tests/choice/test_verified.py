@@ -15,7 +15,7 @@ from d2rpick.choice.suggest import Pair, suggest
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
-from tests.shared import shared
+from tests.computed import stored
 
 LIMITS = st.none() | st.floats(0.0, 1.2)
 OPTIONS = st.builds(
@@ -69,7 +69,7 @@ def test_what_is_chosen_in_a_window_is_verified(history: History, low: float, as
 
 @pytest.mark.parametrize("td", [0.72, 0.8, 0.87])
 def test_a_better_td_that_does_not_verify_is_not_named(td: float) -> None:
-    history = read([str(shared("faults/better_td_unverified.csv"))]).history
+    history = read([stored("faults/better_td_unverified.csv")]).history
     assert holds(history, suggest(history, td, Settings()).better_pair, Settings())
 
 

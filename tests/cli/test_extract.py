@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.histories.writing import TABLE_WRITERS, format_of
+from tests.command import BOX as ROLLOVER_T01
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, run
 from tests.reading import read_history
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History
@@ -76,7 +76,7 @@ def test_any_numbers_read_back_bit_for_bit(
 
 
 def test_several_parts_have_a_column_each_beside_their_sum(tmp_path: Path) -> None:
-    source, file = str(shared("openradioss/rollover_referenceT01.gz")), tmp_path / "parts.h5"
+    source, file = ROLLOVER_T01, tmp_path / "parts.h5"
     text = run("extract", "--part", "box,step", source).stdout
     head, *rows = csv.reader(io.StringIO(text))
     assert head[:4] == ["time", "internal_energy", "part_1", "part_2"]
@@ -91,7 +91,7 @@ def test_several_parts_have_a_column_each_beside_their_sum(tmp_path: Path) -> No
 
 
 def test_one_part_needs_no_column_beside_the_energy() -> None:
-    source = str(shared("openradioss/rollover_referenceT01.gz"))
+    source = ROLLOVER_T01
     assert run("extract", "--part", "box", source).stdout.startswith("time,internal_energy,kinetic_energy,")
 
 

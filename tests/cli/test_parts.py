@@ -11,10 +11,10 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.history import EXACT, Given, History, Momenta, Part
+from tests.command import BOX as ROLLOVER_T01
 from tests.command import OSCILLATOR, answer, codes, run
 from tests.json_schemas import check_by_schema
 from tests.records import ENERGY, TIME
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,7 +25,7 @@ BOX, STEP, SLED = ({"id": i, "title": title} for i, title in enumerate(("box", "
 def rolling(*options: str, command: str = "suggest") -> dict[str, Any]:
     """Answer for the computed rollover at td = 0.37, held against its schema."""
     tr = ("--tr", "0.1") if command == "verify" else ()
-    found = answer(command, "--td", "0.37", *tr, *options, str(shared("openradioss/rollover_referenceT01.gz")))
+    found = answer(command, "--td", "0.37", *tr, *options, ROLLOVER_T01)
     check_by_schema(found)
     return found
 
@@ -74,12 +74,12 @@ def test_a_given_start_keeps_the_end_that_the_momentum_shows() -> None:
 
 
 def test_td_behind_the_contact_that_the_momentum_shows_is_no_free_flight() -> None:
-    source = str(shared("openradioss/rollover_referenceT01.gz"))
+    source = ROLLOVER_T01
     found = answer("suggest", "--td", "0.3822", "--part", "box", source)
     assert found["flight"]["end"] == pytest.approx(0.3819, abs=1e-3)
     assert found["recommended"] is None
     (message,) = (w["message"] for w in found["warnings"] if w["code"] == "no-free-flight")
-    assert "no free flight at td = 0.3822; the nearest flight lasts from 0.0908" in message
+    assert "no free flight at td = 0.3822; the nearest flight lasts from 0.0910" in message
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_td_behind_the_contact_that_the_momentum_shows_is_no_free_flight() -> No
     ],
 )
 def test_parts_that_are_not_there_are_named_with_those_that_are(options: tuple[str, ...], says: list[str]) -> None:
-    result = run("suggest", "--td", "0.37", *options, str(shared("openradioss/rollover_referenceT01.gz")))
+    result = run("suggest", "--td", "0.37", *options, ROLLOVER_T01)
     assert (result.exit_code, result.stdout) == (2, "")
     assert [word for word in says if word.lower() not in result.stderr.lower()] == []
 

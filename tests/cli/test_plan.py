@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 from typing import TYPE_CHECKING
 
@@ -10,9 +9,9 @@ import pytest
 
 from d2rpick.choice.plan import plan_of
 from tests.command import BOX, ENERGY, answer, run
+from tests.computed import starter, stored
 from tests.drops import drop, written
 from tests.json_schemas import check_by_schema
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -84,7 +83,7 @@ def csv_rows(text: str) -> list[dict[str, object]]:
 
 def test_a_poor_window_is_called_poor() -> None:
     """A level that matches is not all: most of the vibration may be kinetic at td."""
-    box = str(shared("openradioss/car_drop/drop2T01.gz"))
+    box = stored("drop2T01.gz")
     found = answer("plan", "--part", "all", box)
     rows = [row for row in found["windows"] if row["status"] == "supported"]
     assert [row["quality"] for row in rows] == ["good", "poor"]
@@ -154,10 +153,12 @@ def test_one_oscillator_is_one_flight() -> None:
 
 
 def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
-    file = str(shared("openradioss/car_drop/drop2T01.gz"))
+    file = stored("drop2T01.gz")
     asked = ("--part", "flying", "--tr", "0", "--td", "0.27")
     told = run("verify", "-q", *asked, file).stdout.splitlines()[0]
     assert told.endswith("by the energy level alone: tr lies in the flight, and nothing vibrates there")
+    chosen = run("suggest", "-q", "--part", "flying", "--td", "0.27", file).stdout
+    assert "keeps        everything: nothing vibrates in the flight up to td" in chosen
     card = run("card", "-q", "--part", "1", *asked[2:], "--solver", "ls-dyna", "--history", file).stdout
     assert "at-rest: nothing vibrates" in card
     assert "evel error" not in card
@@ -212,10 +213,10 @@ def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(tmp_path: Path
     """Of the falling box; its first fall is free, so that the run itself stands for one that is switched there."""
     name, node = "DROP2", "535"
     deck = tmp_path / f"{name}_0000.rad"
-    deck.write_bytes(gzip.decompress(shared("openradioss/car_drop/decks/DROP2_0000.rad.gz").read_bytes()))
+    deck.write_bytes(starter("DROP2"))
     engine = f"/RUN/{name}/1\n0.7\n/VERS/2022\n/DT\n0.9 0.0\n/RBODY/OFF\n{node}\n/TFILE/4\n0.0002\n"
     (tmp_path / f"{name}_0001.rad").write_text(engine)
-    history, done = str(shared("openradioss/car_drop/drop2T01.gz")), tmp_path / "done.txt"
+    history, done = stored("drop2T01.gz"), tmp_path / "done.txt"
     done.write_text("0.0 0.277\n")
     args = ("plan", "-q", "--part", "all", "--node", node, "--deck", str(deck), "--write-deck")
     for folder, more in ((tmp_path / "a", ()), (tmp_path / "b", ("--done", str(done)))):

@@ -12,9 +12,9 @@ from d2rpick.choice.settings import Settings
 from d2rpick.cli.deck_cost import model_of
 from d2rpick.histories.selection import Selection
 from tests.command import answer, run
+from tests.computed import starter, stored
 from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
-from tests.shared import shared, shared_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,12 +24,12 @@ ONE_BODY = "the parts become one rigid body"
 
 
 def car() -> str:
-    return str(shared("openradioss/car_drop/carT01.gz"))
+    return stored("carT01.gz")
 
 
 def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(tmp_path: Path) -> None:
     deck = tmp_path / "CAR_0000.rad"
-    deck.write_bytes(shared_bytes("openradioss/car_drop/decks/CAR_0000.rad.gz"))
+    deck.write_bytes(starter("CAR"))
     model = model_of({"deck": str(deck), "weights": None})
     silent: Any = SimpleNamespace(springs=(), parts=())
     assert model is not None
@@ -88,7 +88,7 @@ def test_plan_gives_it_for_every_window() -> None:
 @pytest.fixture(scope="module")
 def deck(tmp_path_factory: pytest.TempPathFactory) -> str:
     file = tmp_path_factory.mktemp("car") / "CAR_0000.rad"
-    file.write_bytes(shared_bytes("openradioss/car_drop/decks/CAR_0000.rad.gz"))
+    file.write_bytes(starter("CAR"))
     return str(file)
 
 

@@ -114,6 +114,7 @@ def transform(offsets: str = "", rest: str = "", factors: str = "") -> str:
 CARDS = {"cards.k": THERE + BACK}
 INCLUDES = {
     "beside": ("*INCLUDE\ncards.k\n", CARDS, WINDOW),
+    "names between blank lines": ("*INCLUDE\n\nother.k\n   \ncards.k\n", CARDS | {"other.k": "*NODE\n"}, WINDOW),
     "several names": ("*INCLUDE\nother.k\ncards.k\n", CARDS | {"other.k": "*NODE\n"}, WINDOW),
     "name over two lines": ("*INCLUDE\nsub/long_ +\nname.k\n", {"sub/long_name.k": THERE + BACK}, WINDOW),
     "backslashes": ("*INCLUDE\nsub\\cards.k\n", {"sub/cards.k": THERE + BACK}, WINDOW),

@@ -16,7 +16,7 @@ from d2rpick.flight.flight import Flight, find_flight, seen_flight
 from d2rpick.flight.position_error import MOST_OF_PATH, Drift
 from d2rpick.histories.history import History, Part
 from d2rpick.histories.opening import Selection
-from tests.shared import shared
+from tests.computed import results, stored
 
 TIME = np.linspace(0.0, 1.0, 11)
 
@@ -74,13 +74,13 @@ def test_the_limit_is_that_of_the_bodies_whose_parts_move() -> None:
 
 @cache
 def car(parts: str) -> tuple[History, Flight]:
-    history = read([str(shared("openradioss/car_drop/carT01.gz"))], Selection(parts=(parts,))).history
+    history = read([stored("carT01.gz")], Selection(parts=(parts,))).history
     return history, find_flight(history, 0.14, None, seen_flight(history, 0.14), None)
 
 
 def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> None:
     """Six bodies: the solver found the car 0.16 mm off; taken for one body it would be 1.8 mm."""
-    with shared("openradioss/car_drop/car_runs.csv").open() as table:
+    with results("car_runs.csv").open() as table:
         (run,) = [row for row in csv.DictReader(table) if row["run"] == "car_b_heavy"]
     tr, td = np.array([float(run["tr_s"])]), float(run["td_s"])
     alone = bodies_in_flight(*car("12-14"), told((12,), (13,), (14,)))

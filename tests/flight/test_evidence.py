@@ -23,16 +23,17 @@ from d2rpick.histories.selection import Selection
 from d2rpick.models.rollover.files import WRITERS
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import simulate
-from tests.command import ENERGY, ROLLOVER, answer, codes, run
+from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, run
+from tests.computed import columns, stored
 from tests.json_schemas import check_by_schema
 from tests.sample_box import t01
-from tests.shared import columns, shared
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
 MILLISECOND = 1e-3
+CAR, DROP = stored("carT01.gz"), stored("drop2T01.gz")
 
 
 class Rolled(NamedTuple):
@@ -159,53 +160,34 @@ def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(rolle
 
 
 def history_of(source: str, *parts: str) -> History:
-    return open_run([str(shared(source))]).history(Selection(parts=parts))
+    return open_run([source]).history(Selection(parts=parts))
 
 
 @pytest.mark.parametrize(
     ("source", "parts", "flights"),
     [
-        ("rollover_referenceT01.gz", ("box",), [(0.0908, 0.3819)]),
-        ("car_drop/carT01.gz", (), [(0.0118, 0.0281), (0.0385, 0.1504)]),
-        ("car_drop/drop2T01.gz", (), [(0.0, 0.2858), (0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)]),
+        (BOX, ("box",), [(0.0908, 0.3819)]),
+        (CAR, (), [(0.0118, 0.0281), (0.0385, 0.1504)]),
+        (DROP, (), [(0.0, 0.2858), (0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)]),
     ],
 )
 def test_all_flights_of_runs_of_a_solver_are_found(
     source: str, parts: tuple[str, ...], flights: list[tuple[float, float]]
 ) -> None:
-    found = [(f.start, f.end) for f in find_flights(history_of(f"openradioss/{source}", *parts)) if f.start is not None]
+    found = [(f.start, f.end) for f in find_flights(history_of(source, *parts)) if f.start is not None]
     for start, end in flights:
         assert [one for one in found if abs(one[0] - start) <= 5e-4 and abs((one[1] or np.inf) - end) <= 5e-4]
 
 
 def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
-    history = history_of("openradioss/car_drop/carT01.gz")
+    history = history_of(CAR)
     flight = examine(history, 0.146, Settings(replay=False)).flight
     assert flight.start is not None
     assert 0.0385 <= flight.start <= 0.0390
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "LOIS-LOI38-DMAFNLIN-input_44-isolid_1-reference-DMAFNLINT01",
-        "INTERF-INT_2-pl_dam_ilev-reference-PLREG41BT01",
-        "RESSORT-couple-reference-TYPE8MT01",
-        "RESSORT-kjoint2-reference-JOINTT01",
-    ],
-)
-def test_a_driven_model_does_not_fly(name: str) -> None:
-    history = history_of(f"real/more-histories/OpenRadioss__miniqa-{name}")
-    assert find_flights(history, Settings(replay=False)) == ()
-    for share in (0.25, 0.5, 0.75):
-        td = float(history.time[0] + share * np.ptp(history.time))
-        found = suggest(history, td, Settings(replay=False))
-        assert found.recommended is None
-        assert not verify(history, td / 2, td, Settings(replay=False)).verified
-
-
 def test_in_a_free_fall_there_is_nothing_to_match() -> None:
-    history = history_of("openradioss/car_drop/drop2T01.gz")
+    history = history_of(DROP)
     found = suggest(history, 0.2838, Settings())
     assert found.recommended
     assert (found.recommended.tr, found.candidates[0].kind) == (0.0, "start")
@@ -221,16 +203,16 @@ def test_in_a_free_fall_there_is_nothing_to_match() -> None:
 @pytest.mark.parametrize(
     ("source", "energy", "start", "end"),
     [
-        ("rollover_ref.csv", "boxIE_J", 0.0908, 0.3819),
-        ("load_L1_ref.csv", "IE_J", 0.0200, 0.1),
-        ("load_L3_ref.csv", "IE_J", 0.0235, 0.1),
+        (ROLLOVER, "boxIE_J", 0.0908, 0.3819),
+        (stored("load_L1_ref.csv.gz"), "IE_J", 0.0200, 0.1),
+        (stored("load_L3_ref.csv.gz"), "IE_J", 0.0235, 0.1),
     ],
 )
 @pytest.mark.parametrize("share", [0.5, 0.7, 0.9, 0.97])
 def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
     source: str, energy: str, start: float, end: float, share: float
 ) -> None:
-    time, values = columns(f"openradioss/{source}", energy)
+    time, values = columns(source, energy)
     quiet = quiet_time(History(time, values, (source,), "csv", energy), start + share * (end - start))
     assert quiet is None or quiet.start >= start
 
@@ -238,7 +220,7 @@ def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
 @pytest.mark.parametrize("part", ["bottom", "walls", "lid", "springs"])
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.85, 0.95, 0.98])
 def test_the_energy_alone_of_a_tumbling_box_never_begins_before_an_impact(part: str, share: float) -> None:
-    whole = history_of("openradioss/car_drop/drop2T01.gz", part)
+    whole = history_of(DROP, part)
     history = History(whole.time, whole.energy, ("drop",), "csv", "E")
     for start, end in ((0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)):
         quiet = quiet_time(history, start + share * (end - start))
@@ -265,7 +247,7 @@ def test_what_stays_of_a_contact_energy_is_no_flight_where_a_load_of_another_kin
 
 
 def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_do_not_count() -> None:
-    found = history_of("openradioss/rollover_referenceT01.gz", "box")
+    found = history_of(BOX, "box")
     assert found.balance
     longer = np.minimum(found.time, 0.15) + np.maximum(found.time - 0.3819, 0.0)
     balance = Balance(found.time, sliding=longer, external_work=found.balance.external_work)

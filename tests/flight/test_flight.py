@@ -18,7 +18,8 @@ from d2rpick.histories.history import History
 from d2rpick.vibration.equivalent import to_mode
 from d2rpick.vibration.span import Span, described_span
 from tests import paper
-from tests.shared import shared
+from tests.command import ROLLOVER
+from tests.computed import stored
 
 PERIOD = 2 * np.pi / paper.OMEGA_2
 
@@ -48,7 +49,7 @@ def loaded(*, alpha: float = 50.0, noise: float = 0.0, seed: int = 0, contact: f
 
 
 def rollover() -> History:
-    table = np.genfromtxt(shared("openradioss/rollover_ref.csv"), delimiter=",", names=True)
+    table = np.genfromtxt(ROLLOVER, delimiter=",", names=True)
     return History(table["time_s"], table["boxIE_J"], source=("rollover",), format="csv", channel="boxIE_J")
 
 
@@ -87,7 +88,7 @@ def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown
 @pytest.mark.parametrize(("name", "end_of_load"), [("load_L1_ref", 0.0200), ("load_L3_ref", 0.0235)])
 @pytest.mark.parametrize("td", [0.064, 0.08])
 def test_loads_computed_by_a_solver(name: str, end_of_load: float, td: float) -> None:
-    table = np.genfromtxt(shared(f"openradioss/{name}.csv"), delimiter=",", names=True)
+    table = np.genfromtxt(stored(f"{name}.csv.gz"), delimiter=",", names=True)
     history = History(table["time_s"], table["IE_J"], source=(name,), format="csv", channel="IE_J")
     flight = examine(history, td, Settings()).flight
     assert flight.source == "oscillator"

@@ -12,7 +12,7 @@ from d2rpick.errors import FormatError
 from d2rpick.flight.flying_parts import deformable_parts, flying_parts, with_parts_by_number
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import BOX, ENERGY, GLSTAT, answer, run
-from tests.shared import shared
+from tests.computed import stored
 
 if TYPE_CHECKING:
     from d2rpick.histories.opening import Run
@@ -34,7 +34,7 @@ def test_the_box_and_the_step_on_it_fly_and_the_sled_does_not() -> None:
 
 
 def test_all_parts_of_the_car_fly_but_the_ground() -> None:
-    car = opened(str(shared("openradioss/car_drop/carT01.gz")))
+    car = opened(stored("carT01.gz"))
     everything = titles(car, flying=False)
     assert "ground" not in everything
     assert len(everything) == 17

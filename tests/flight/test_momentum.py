@@ -15,9 +15,9 @@ from d2rpick.flight.momentum import all_flights, flight_around, flight_of
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.history import EXACT, Momenta, Part, Precision
 from d2rpick.histories.opening import open_run
-from tests.command import answer
+from tests.command import BOX, answer
+from tests.computed import stored
 from tests.records import printed
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -244,6 +244,16 @@ def test_parts_at_rest_do_not_fly() -> None:
     assert flight_around(replace(momenta, values=0 * momenta.values), TD) is None
 
 
+def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:
+    """Its momentum is constant, but nothing."""
+    light = flown(trip())
+    braked = np.zeros((light.time.size, 1, 3))
+    braked[:, 0, 0] = np.where(light.time < 0.1, 50 + 50 * np.cos(np.pi * light.time / 0.1), 0.0)
+    momenta = Momenta(light.time, printed(braked.ravel(), 5).reshape(braked.shape), PARTS[:1], Precision(5), (0,))
+    assert flight_around(momenta, TD) is None
+    assert flight_around(replace(momenta, values=momenta.values + 5.0), TD)
+
+
 def test_a_load_may_hide_behind_the_coarse_digits_of_a_heavy_part() -> None:
     light = flown(trip(), digits=5)
     train = np.broadcast_to([1.2345e9, 0.0, 0.0], (light.time.size, 1, 3))
@@ -262,7 +272,7 @@ def test_digits_that_do_not_resolve_a_thousandth_of_the_change_tell_nothing() ->
 
 
 def test_on_the_rollover_box_and_step_fly_from_the_end_of_the_trip_to_the_ground() -> None:
-    found = answer("suggest", "--td", "0.37", "--part", "box", str(shared("openradioss/rollover_referenceT01.gz")))
+    found = answer("suggest", "--td", "0.37", "--part", "box", BOX)
     flight = found["flight"]
     assert flight["source"] == "momentum"
     assert [part["title"] for part in flight["parts"]] == ["box", "step"]
@@ -273,19 +283,19 @@ def test_on_the_rollover_box_and_step_fly_from_the_end_of_the_trip_to_the_ground
 
 
 def test_on_the_rollover_the_box_alone_does_not_fly() -> None:
-    run = open_run([str(shared("openradioss/rollover_referenceT01.gz"))])
+    run = open_run([BOX])
     (momenta,) = (one for one in run.momenta(run.parts[:1], None) if one.parts)
     assert [flight_of(momenta, (0,), td) for td in np.linspace(0.1, 0.38, 15)] == [None] * 15
 
 
 def test_masses_that_are_no_parts_fly_by_the_momentum_of_the_whole_model() -> None:
-    found = answer("suggest", "--td", "0.238", "--part", "1-2", str(shared("openradioss/chain_referenceT01.gz")))
+    found = answer("suggest", "--td", "0.238", "--part", "1-2", stored("chain_referenceT01.gz"))
     assert found["flight"] == {"start": 0.0, "end": None, "source": "momentum", "certain": True, "parts": None}
 
 
 @pytest.mark.parametrize(("run", "start"), [("L1", 0.0200), ("L3", 0.0235)])
 def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(run: str, start: float) -> None:
-    table = np.genfromtxt(shared(f"openradioss/load_{run}_ref.csv"), delimiter=",", names=True)
+    table = np.genfromtxt(stored(f"load_{run}_ref.csv.gz"), delimiter=",", names=True)
     values = np.zeros((table.size, 1, 3))
     values[:, 0, 0] = table["momentum_x_solver"]
     found = flight_around(Momenta(table["time_s"], values, None, Precision(7), chosen=(0,)), 0.1)

@@ -16,7 +16,7 @@ from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.histories.history import EXACT, Momenta, Part
 from d2rpick.histories.opening import Selection
-from tests.shared import shared
+from tests.computed import results, stored
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -128,7 +128,7 @@ def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
 
 @cache
 def solved(name: str, parts: str) -> Reference:
-    return read([str(shared(f"openradioss/car_drop/{name}"))], Selection(parts=(parts,)))
+    return read([stored(name)], Selection(parts=(parts,)))
 
 
 def errors(name: str, parts: str, flight: tuple[float, float], tr: list[float], td: float) -> Samples:
@@ -143,7 +143,7 @@ def errors(name: str, parts: str, flight: tuple[float, float], tr: list[float], 
 
 def test_the_car_is_as_far_off_as_computed() -> None:
     """All switched runs in flight: centre of twelve nodes of the body, within 30 % or 1 mm, seen over 1 to 7.5 mm."""
-    with shared("openradioss/car_drop/car_runs.csv").open() as table:
+    with results("car_runs.csv").open() as table:
         rows = [
             row for row in csv.DictReader(table) if row["run"].startswith(("car_a", "car_b_all", "car_td", "car_f"))
         ]

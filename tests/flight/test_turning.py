@@ -19,7 +19,7 @@ from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.histories.history import EXACT, Momenta, Part
 from d2rpick.histories.opening import Selection
-from tests.shared import shared, shared_bytes
+from tests.computed import results, starter, stored
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -169,9 +169,9 @@ def test_what_flies_with_a_body_holds_it() -> None:
 def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(tmp_path: Path) -> None:
     """Centre and orientation of twelve nodes of the body: within 30 % or 1 mm, and 30 % or 0.1 degrees."""
     deck = tmp_path / "CAR_0000.rad"
-    deck.write_bytes(shared_bytes("openradioss/car_drop/decks/CAR_0000.rad.gz"))
+    deck.write_bytes(starter("CAR"))
     where = Placement(read_inventory(str(deck)))
-    with shared("openradioss/car_drop/car_runs.csv").open() as table:
+    with results("car_runs.csv").open() as table:
         rows = [row for row in csv.DictReader(table) if row["run"].startswith(("car_a", "car_b", "car_f", "car_td"))]
     sets = {"car_b_notfirst": ("1-2", "4-14"), "car_b_stopped": ("1", "4", "5", "7", "11")}
     judged = 0
@@ -188,7 +188,7 @@ def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(tmp_
 
 @cache
 def of_the_car(parts: tuple[str, ...], where: Placement) -> Drift:
-    history = read([str(shared("openradioss/car_drop/carT01.gz"))], Selection(parts=parts)).history
+    history = read([stored("carT01.gz")], Selection(parts=parts)).history
     found = drift_in_flight(history, find_flight(history, 0.14, None, seen_flight(history, 0.14), None), None, where)
     assert found is not None
     return found

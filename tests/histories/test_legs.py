@@ -8,7 +8,7 @@ import pytest
 
 from d2rpick.histories.legs import later_legs
 from tests.command import run
-from tests.shared import shared
+from tests.computed import stored
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,7 +33,7 @@ def test_legs_are_files_of_the_same_name_with_a_higher_number(
 
 
 def test_a_td_that_only_a_later_leg_reaches_names_it() -> None:
-    first = str(shared("openradioss/rollover_r100_T01.gz"))
+    first = stored("rollover_r100_T01.gz")
     result = run("suggest", "--td", "0.4", "--part", "box", first)
     assert result.exit_code == 2
     assert first.replace("T01", "T02") in result.stderr

@@ -9,7 +9,6 @@ import pytest
 
 from d2rpick.histories.opening import Selection, open_run
 from tests.made_t01 import MadePart, t01, value
-from tests.shared import shared
 from tests.text_files import matsum_head, matsum_part
 
 if TYPE_CHECKING:
@@ -52,9 +51,3 @@ def test_of_a_time_history_they_are_written(tmp_path: Path) -> None:
     assert masses(tmp_path / "ENERGYT01") is None
     (tmp_path / "MOTIONT01").write_bytes(t01(3, (MadePart(3, "box", codes=(1, 3, 4, 5)),)).data)
     assert masses(tmp_path / "MOTIONT01") is None
-
-
-def test_a_binout_has_the_velocities_too() -> None:
-    found = masses(shared("real/histories/lasso-python__sph_models-R12_2_1-binout"))
-    assert found is not None
-    assert found.shape == (2,)

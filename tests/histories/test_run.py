@@ -22,11 +22,11 @@ from d2rpick.histories.opening import (
     reader,
 )
 from d2rpick.histories.source import Source
+from tests.computed import stored
 from tests.made_binout import binout as made_binout
 from tests.made_binout import values
 from tests.made_t01 import MadePart, t01
 from tests.reading import history_of, read_history, run_of, states_of
-from tests.shared import shared
 from tests.text_files import HEAD, glstat_text, matsum_text
 
 if TYPE_CHECKING:
@@ -130,32 +130,7 @@ def test_a_column_that_a_leg_lacks_is_refused() -> None:
         history_of(csv_table, "time,IE,x\n0,1,2\n1,2,3\n", "time,heat,x\n2,1,2\n3,2,3\n")
 
 
-def test_real_legs() -> None:
-    """th_to_csv gives 50 states to 2.451106 and 50 from 2.50147; of the fluid 69, 69 and 552."""
-    stem = "real/histories/OpenRadioss__miniqa-{}T0{}"
-    crash = open_run([str(shared(stem.format("RESTART-cra2-reference-CRA2V44", n))) for n in (2, 1)])
-    history = crash.history(Selection())
-    assert (history.time.size, history.notes) == (100, ())
-    assert history.time[[49, 50]] == pytest.approx([2.451106, 2.50147], rel=1e-6)
-    assert history.energy[[49, 50]] == pytest.approx([146200.3, 148146.4], rel=1e-6)
-    fluid = open_run([str(shared(stem.format("FLUIDE_NEW-EBCS-INIV-reference-INIV", n))) for n in (1, 2, 3)])
-    assert fluid.history(Selection()).time.size == 690
-
-
 # Companions.
-
-
-def test_glstat_and_matsum_of_one_run_are_joined_by_their_printed_times() -> None:
-    """94 of the 1001 times are printed alike, in six and in five digits."""
-    stem = "real/histories/PILLARS-LSDyna__Bolt_B_Explicit-"
-    run = open_run([str(shared(f"{stem}{kind}")) for kind in ("matsum", "glstat")])
-    assert run.notes == ()
-    whole, bolt = run.history(Selection()), run.history(Selection(parts=("bolt", "110-120")))
-    assert (whole.format, whole.channel, whole.time.size) == ("glstat + matsum", "internal energy", 1001)
-    assert bolt.channel == "internal energy of Bolt, Bolt Head, Bolt Nut"
-    assert bolt.energy[-1] == pytest.approx(34.151 + 6.2484 + 6.1190, rel=1e-12)
-    every = run.part_energies(run.parts).sum(axis=1)
-    assert np.abs(every - whole.energy).max() < 6.1e-4
 
 
 def test_companions_of_other_times_are_doubted() -> None:
@@ -303,5 +278,5 @@ def test_packed_data_that_ends_early_is_read_as_far_as_it_goes(tmp_path: Path, s
 
 
 def test_a_long_gap_between_legs_is_told() -> None:
-    legs = [str(shared(f"openradioss/rollover_r100_{leg}.gz")) for leg in ("T01", "T03")]
+    legs = [stored(f"rollover_r100_{leg}.gz") for leg in ("T01", "T03")]
     assert any("no states between 0.0999564 and 0.370008" in note for note in open_run(legs).history(Selection()).notes)

@@ -13,7 +13,7 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import Part, Samples
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.histories.springs import spring_energy, springs_among
-from tests.shared import shared
+from tests.computed import stored
 
 TIME = np.linspace(0.0, 1.0, 50)
 PARTS = tuple(Part(i + 1, f"part {i + 1}") for i in range(4))
@@ -59,13 +59,13 @@ def test_springs_that_have_all_of_the_energy_are_what_there_is() -> None:
     assert spring_energy(Made(ENERGIES.sum(axis=1))) is None  # type: ignore[arg-type]
 
 
-CAR = "openradioss/car_drop/carT01.gz"
+CAR = stored("carT01.gz")
 
 
 def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
-    run = open_run([str(shared(CAR))], Selection())
+    run = open_run([CAR], Selection())
     assert [part.title for part in run.springs] == ["mounts", "suspension", "latches"]
-    whole, parts, body = (read([str(shared(CAR))], Selection(parts=p)).history for p in ((), ("1-17",), ("1-14",)))
+    whole, parts, body = (read([CAR], Selection(parts=p)).history for p in ((), ("1-17",), ("1-14",)))
     assert whole.channel == "internal_energy - spring_energy"
     np.testing.assert_allclose(parts.energy, body.energy)
     np.testing.assert_allclose(whole.energy, body.energy, rtol=1e-5, atol=1e-3)
@@ -78,15 +78,15 @@ def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
 
 
 def test_what_is_asked_for_by_name_is_taken_as_it_is() -> None:
-    named = read([str(shared(CAR))], Selection(energy=("internal_energy",))).history
+    named = read([CAR], Selection(energy=("internal_energy",))).history
     assert named.channel == "internal_energy"
-    only = read([str(shared(CAR))], Selection(parts=("15-17",))).history
-    assert only.energy[-1] == pytest.approx(2281.7, rel=1e-4)
+    only = read([CAR], Selection(parts=("15-17",))).history
+    assert only.energy[-1] == pytest.approx(2407.6, rel=1e-4)
     assert not only.springs
 
 
 def test_parts_that_are_said_to_be_springs_are() -> None:
-    run = open_run([str(shared(CAR))], Selection())
+    run = open_run([CAR], Selection())
     told = run.history(Selection(parts=("12-15",), springs=("15",)))
     assert [part.id for part in told.springs] == [15]
     none = run.history(Selection(parts=("12-15",), springs=()))

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from d2rpick.report import findings as report
 from d2rpick.rules import RULES, Checked, Finding, Severity, check_deck
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, automatic
+from tests.deck.radioss.test_run import place
 from tests.decks import write
 from tests.json_schemas import check_by_schema
-from tests.shared import shared
 
 SCHEMAS = Path(__file__).parents[1] / "schemas"
 BAD = HEAD + PARTS + automatic(1, "0.02", rigid=["1", "2"]) + automatic(2, "0.5", deformable=["1"]) + END
@@ -38,10 +38,10 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
     assert lines[-1] == "1 error, 0 warnings, 1 info in 2 decks"
 
 
-def test_a_card_without_a_window_is_not_passed_over() -> None:
-    deck = shared("real/radioss-decks/BLOCK_0000.rad")  # /RBODY/ON without a main node
-    lines = report.as_table(report.Checks([check_deck(str(deck))], deck.parent)).split("\n")
-    assert lines[:2] == ["BLOCK_0000.rad", "  switching cards that switch nothing"]
+def test_a_card_without_a_window_is_not_passed_over(tmp_path: Path) -> None:
+    deck = place(tmp_path, legs=(("0.2", "/RBODY/ON\n0\n"),))  # without a main node
+    lines = report.as_table(report.Checks([check_deck(deck)], tmp_path)).split("\n")
+    assert lines[:2] == ["box_0000.rad", "  switching cards that switch nothing"]
 
 
 def test_json(results: list[Checked], tmp_path: Path) -> None:

@@ -18,11 +18,10 @@ import pytest
 
 from d2rpick.cli import suggest, typed
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROOT, run
-from tests.shared import shared
+from tests.computed import stored
 
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
 NASTY = '<script>alert("1")</script>&<b>'
-LEGS = ("rollover_referenceT01.gz", "rollover_r100_T01.gz", "rollover_r100_T02.gz", "rollover_r100_T03.gz")
 VOID = {"meta", "br", "hr", "link", "input"}
 
 
@@ -162,7 +161,7 @@ def test_a_pair_that_cannot_be_bettered_is_shown_once(tmp_path: Path) -> None:
 
 
 def test_each_part_and_the_saving_are_told(tmp_path: Path) -> None:
-    chain = str(shared("openradioss/chain_referenceT01.gz"))
+    chain = stored("chain_referenceT01.gz")
     page = page_of(tmp_path, "--td", "0.13505", "--part", "spring1,spring2", "--cost-share", "0.9", chain)
     for text in ("Parts at this pair", "share of the mismatch", "run time", "2 modes"):
         assert text in page.text
@@ -206,7 +205,7 @@ def test_a_file_name_that_is_no_text_is_shown_as_far_as_it_is(tmp_path: Path) ->
 
 
 def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(tmp_path: Path) -> None:
-    source = str(shared("openradioss/chain_ref.csv"))
+    source = stored("chain_ref.csv.gz")
     energies = ("--energy", "IE_spring1_J", "--energy", "IE_spring2_J")
     options = ("--time", "time_s", "--after", "0.01", "--margin", "0.001", "--tolerance", "0.1")
     words = page_of(tmp_path, "--td", "0.13505", *energies, *options, source).last_command()
@@ -266,7 +265,7 @@ def test_options_set_by_the_environment_and_standard_input_are_needed_to_repeat_
 
 def test_a_pair_that_is_not_better_is_not_called_so(tmp_path: Path) -> None:
     springs = ("--energy", "IE_spring1_J", "--energy", "IE_spring2_J")
-    page = page_of(tmp_path, "--td", "0.13505", *springs, str(shared("openradioss/chain_ref.csv")))
+    page = page_of(tmp_path, "--td", "0.13505", *springs, stored("chain_ref.csv.gz"))
     assert "residual0.065" in page.text
     assert "Better pair" not in page.text
 
@@ -293,7 +292,7 @@ def test_a_pair_that_does_not_verify_gets_its_reasons_and_no_card(tmp_path: Path
 
 
 def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> None:
-    reference, *legs = (str(shared(f"openradioss/{name}")) for name in LEGS)
+    reference, *legs = (ROLLOVER_T01, *(stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 2, 3)))
     page = page_of(
         tmp_path, "--tr", "0.1", "--td", "0.37", "--part", "box", reference, "--switched", *legs, command="verify"
     )

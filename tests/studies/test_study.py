@@ -18,9 +18,9 @@ from d2rpick.studies.common import fewest_digits
 from d2rpick.studies.row import OK, StudyRow
 from d2rpick.studies.study import Question, ask, failed, find_runs, summarise
 from tests import variants
-from tests.command import BOX, GLSTAT
+from tests.command import BOX
+from tests.computed import stored
 from tests.reading import read_history
-from tests.shared import SHARED, shared
 
 ASKED = Question(variants.TD, Settings())
 
@@ -101,7 +101,7 @@ def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(tm
 
 @pytest.mark.parametrize("energies", [("IE_spring1_J", "IE_spring2_J"), ("IE_spring1_J",)])
 def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(energies: tuple[str, ...]) -> None:
-    name = str(shared("openradioss/chain_ref.csv"))
+    name = stored("chain_ref.csv.gz")
     question = Question(0.238, Settings(), Selection(energy=energies))
     found = ask(question, name)
     answer = summarise(0.238, [found, found])
@@ -254,11 +254,12 @@ def test_every_match_of_a_pattern_is_a_run_and_what_matches_nothing_stays(
     assert find_runs(["odd[1].csv", "no*", "a"]) == ("odd[1].csv", "no*", "a")
 
 
-def test_real_files_and_samples_are_rows_of_one_study() -> None:
-    folder = shared("real/histories")
-    sources = sorted(str(path) for path in folder.iterdir() if path.is_file())
-    rows = [ask(Question(0.05, Settings()), source) for source in (*sources, GLSTAT, BOX)]
+def test_files_of_all_formats_are_rows_of_one_study() -> None:
+    """One ends before td."""
+    samples = sorted(str(path) for path in Path(BOX).parent.iterdir() if path.is_file())
+    sources = [*samples, *(stored(name) for name in ("chain_ref.csv.gz", "load_L1_ref.csv.gz", "car_all_T01.gz"))]
+    rows = [ask(Question(0.05, Settings()), source) for source in sources]
     answer = summarise(0.05, rows)
-    assert [found.source for found in answer.rows] == [*sources, GLSTAT, BOX]
-    assert {"ok", "unreadable", "out-of-range"} <= {found.status for found in rows}, SHARED
+    assert [found.source for found in answer.rows] == sources
+    assert {"ok", "unreadable", "out-of-range"} <= {found.status for found in rows}
     assert all((found.message is None) == (found.status == OK) for found in rows)

@@ -12,8 +12,9 @@ from scipy.optimize import least_squares
 
 from d2rpick.vibration.identify import Identification, _covariance, identify
 from d2rpick.vibration.one_mode import Mode
+from tests.command import ROLLOVER
+from tests.computed import columns, stored
 from tests.records import ENERGY, MODE, TIME, noisy, printed, vibration
-from tests.shared import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -226,29 +227,29 @@ def test_no_unit_system_is_too_small_or_too_large(scale: float) -> None:
     ],
 )
 def test_oscillators_of_a_real_solver(name: str, omega: float, alpha: float) -> None:
-    _, mode = accepted(*columns(f"openradioss/{name}", "IE_J"))
+    _, mode = accepted(*columns(stored(name), "IE_J"))
     assert mode.omega == pytest.approx(omega, rel=1e-4)
     assert mode.alpha == pytest.approx(alpha, rel=1e-3)
     assert (mode.energy_plastic, mode.preload) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize(("name", "end_of_load"), [("load_L1_ref.csv", 0.0197), ("load_L3_ref.csv", 0.0235)])
+@pytest.mark.parametrize(("name", "end_of_load"), [("load_L1_ref.csv.gz", 0.0197), ("load_L3_ref.csv.gz", 0.0235)])
 def test_a_real_load_is_refused_and_the_flight_after_it_accepted(name: str, end_of_load: float) -> None:
-    time, energy = columns(f"openradioss/{name}", "IE_J")
+    time, energy = columns(stored(name), "IE_J")
     assert "more than" in refused(time, energy)
     flight = time >= end_of_load
     assert accepted(time[flight], energy[flight])[0].misfit == pytest.approx(0.0, abs=1e-3)
 
 
 def test_a_real_rollover_is_refused() -> None:
-    time, energy = columns("openradioss/rollover_ref.csv", "boxIE_J")
+    time, energy = columns(ROLLOVER, "boxIE_J")
     flight = (time >= 0.09) & (time <= 0.37)
     assert "misses the energy by 71%" in refused(time[flight], energy[flight])
 
 
 @pytest.mark.parametrize("channel", ["IE_total_J", "IE_spring1_J", "IE_spring2_J"])
 def test_a_real_chain_of_two_modes_is_refused(channel: str) -> None:
-    assert "more than" in refused(*columns("openradioss/chain_ref.csv", channel))
+    assert "more than" in refused(*columns(stored("chain_ref.csv.gz"), channel))
 
 
 def test_a_parameter_that_changes_next_to_nothing_leaves_no_overflow() -> None:

@@ -16,8 +16,9 @@ from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual
 from d2rpick.vibration.modes import Modes, sum_and_jacobian
 from d2rpick.vibration.one_mode import Mode
 from tests import chain
+from tests.command import ROLLOVER
+from tests.computed import columns
 from tests.records import noisy, printed
-from tests.shared import columns
 
 TIME = np.linspace(0, 6, 1200)
 
@@ -116,7 +117,7 @@ def test_more_modes_are_refused(count: int) -> None:
 
 
 def test_the_rollover_is_refused() -> None:
-    time, energy = columns("openradioss/rollover_ref.csv", "boxIE_J")
+    time, energy = columns(ROLLOVER, "boxIE_J")
     for start, end in ((0.0, 0.45), (0.0884, 0.37), (0.25, 0.37)):
         inside = (time >= start) & (time <= end)
         assert not identify_several(time[inside], energy[inside]).describes_record

@@ -21,8 +21,9 @@ from d2rpick.vibration.envelope import upper_envelope
 from d2rpick.vibration.moments import SUNK, Moment
 from d2rpick.vibration.part_signs import MOST_UNSIGNED, read_parts
 from tests import chain
+from tests.command import BOX
+from tests.computed import stored
 from tests.records import printed
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
@@ -187,7 +188,7 @@ def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
 
 def read_t01() -> History:
     selection = Selection(parts=("spring1,spring2",))
-    return open_run([str(shared("openradioss/chain_referenceT01.gz"))], selection).history(selection)
+    return open_run([stored("chain_referenceT01.gz")], selection).history(selection)
 
 
 @pytest.mark.parametrize("source", ["csv", "T01"])
@@ -227,7 +228,7 @@ def test_the_parts_that_contribute_most_are_named() -> None:
 
 def test_the_rollover_has_no_signs_and_says_why() -> None:
     selection = Selection(parts=("box,step",))
-    run = open_run([str(shared("openradioss/rollover_referenceT01.gz"))], selection)
+    run = open_run([BOX], selection)
     answer = suggest(run.history(selection), 0.37, PLAIN)
     assert answer.situation.basis == "energy"
     best = answer.candidates[0]

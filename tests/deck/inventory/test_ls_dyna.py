@@ -14,7 +14,6 @@ from d2rpick.deck.reader import read_deck
 from d2rpick.errors import DeckError
 from tests.decks import read, write
 from tests.sample_deck import DECK, FLYING, deck, radioss
-from tests.shared import shared
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -210,18 +209,6 @@ def test_counts_and_nodes_agree_with_a_plain_count(
     assert all(found.rigid_nodes([part]) == len(used) for part, used in own.items())
     touching = {part: {other for other in own if other != part and own[other] & own[part]} for part in own}
     assert dict(found.neighbours) == touching
-
-
-def test_real_decks_hold_what_a_plain_count_finds() -> None:
-    text = shared("real/decks/nodes.k").read_text("latin-1").splitlines()
-    plain: Counter[int] = Counter()
-    reading = False
-    for line in text:
-        reading = line.upper().startswith(("*ELEMENT_SHELL", "*ELEMENT_BEAM")) if line.startswith("*") else reading
-        if reading and line[:1] not in "*$" and line.strip():
-            plain[int(line[8:16])] += 1
-    found = ls_dyna.read(read_deck(str(shared("real/decks/nodes.k"))))
-    assert {part: counts.total() for part, counts in found.counts.items()} == plain
 
 
 def test_the_sample_decks_are_what_their_module_writes() -> None:

@@ -11,9 +11,9 @@ import pytest
 from d2rpick.deck.inventory import read_inventory
 from d2rpick.deck.inventory.model import Elements, Inventory
 from d2rpick.deck.inventory.placement import Placement
+from tests.computed import starter
 from tests.deck.inventory import test_ls_dyna as ls_dyna
 from tests.deck.inventory import test_radioss as radioss
-from tests.shared import shared_bytes
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -121,7 +121,7 @@ def test_a_starter_that_moves_its_nodes_places_no_part(tmp_path: Path) -> None:
 
 def test_the_car_lies_where_its_generator_put_it(tmp_path: Path) -> None:
     deck = tmp_path / "CAR_0000.rad"
-    deck.write_bytes(shared_bytes(f"{radioss.CAR}decks/CAR_0000.rad.gz"))
+    deck.write_bytes(starter("CAR"))
     found = Placement(read_inventory(str(deck)))
     np.testing.assert_allclose(found.parts[12].centre, [0.6, 0.0, 0.375], atol=1e-9)  # the engine, 0.6 x 0.6 x 0.45
     np.testing.assert_allclose(found.parts[12].spread, np.diag([0.0281, 0.0281, 0.015]), atol=1e-4)

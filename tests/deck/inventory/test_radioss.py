@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -9,15 +10,12 @@ import pytest
 from d2rpick.deck.inventory import radioss, read_inventory
 from d2rpick.deck.radioss import read_run
 from d2rpick.rules import check_deck
+from tests.computed import starter, stored
 from tests.deck.inventory.test_ls_dyna import counted, row
-from tests.shared import shared, shared_bytes
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from d2rpick.deck.inventory.model import Inventory
 
-CAR = "openradioss/car_drop/"
 BEGIN = "#RADIOSS STARTER\n/BEGIN\nTEST\n      2022         0\n                  kg\n                  kg\n"
 PROPS = (
     "/PROP/SHELL/1\nsh\n        24\n\n"
@@ -89,9 +87,9 @@ def test_what_is_missing_is_said(tmp_path: Path, without: str, complete: bool) -
 
 
 def test_rigid_elements_of_the_car_are_those_that_the_solver_put_off(tmp_path: Path) -> None:
-    (tmp_path / "CAR_0000.rad").write_bytes(shared_bytes(f"{CAR}decks/CAR_0000.rad.gz"))
+    (tmp_path / "CAR_0000.rad").write_bytes(starter("CAR"))
     found = read_inventory(str(tmp_path / "CAR_0000.rad"))
-    head, *rows = (line.split(",") for line in shared_bytes(f"{CAR}car_parts.csv").decode().splitlines())
+    head, *rows = (line.split(",") for line in Path(stored("car_parts.csv")).read_text("ascii").splitlines())
     table = [dict(zip(head, cells, strict=True)) for cells in rows]
     assert {int(one["id"]): int(one["elements"]) for one in table} == {
         part: counts.total() for part, counts in found.counts.items() if part != 18
@@ -105,6 +103,13 @@ def test_rigid_elements_of_the_car_are_those_that_the_solver_put_off(tmp_path: P
         }
 
 
+def test_an_include_that_is_absent_is_told(tmp_path: Path) -> None:
+    text = f"{nodes(4)}/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{PROPS}#include absent.inc\n"
+    found = inventory(tmp_path, text)
+    assert not found.complete
+    assert any("absent.inc was not read" in note for note in found.notes)
+
+
 def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> None:
     text = f"{BEGIN}{PROPS}/PART/1\na\n{wide(1, 1)}{nodes(8)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{wide(2, 3, 4, 5, 6)}"
     deck = tmp_path / "TEST_0000.rad"
@@ -115,10 +120,3 @@ def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> 
         assert [finding.rule for finding in check_deck(str(deck)).findings] == ["D2R011"]
     deck.write_text(f"{text}/END\n")
     assert radioss.read(read_run(str(deck))).complete
-
-
-def test_a_real_deck_is_counted() -> None:
-    found = read_inventory(str(shared("real/radioss-decks/IDEL8_0000.rad")))
-    assert counted(found) == {1: {"solid": 24}, 2: {"shell": 350, "triangle": 8}}
-    assert not found.complete  # one of its includes is absent
-    assert not found.parts[1].section.turns

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from d2rpick.deck.inventory import ls_dyna, radioss
 from d2rpick.deck.inventory.size import masses_and_steps
 from d2rpick.deck.radioss import read_run
+from tests.computed import starter, stored
 from tests.deck.inventory.test_ls_dyna import row
 from tests.decks import read
-from tests.shared import shared_bytes
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 RHO, E, NU = 8000.0, 2.0e11, 0.25
 SPEED = math.sqrt(E / RHO)
@@ -58,9 +55,9 @@ def test_what_is_not_in_the_deck_is_not_guessed(tmp_path: Path, lost: str) -> No
 
 
 def test_masses_of_the_car_are_those_that_the_solver_printed(tmp_path: Path) -> None:
-    (tmp_path / "CAR_0000.rad").write_bytes(shared_bytes("openradioss/car_drop/decks/CAR_0000.rad.gz"))
+    (tmp_path / "CAR_0000.rad").write_bytes(starter("CAR"))
     found = masses_and_steps(radioss.read(read_run(str(tmp_path / "CAR_0000.rad"))))
-    lines = shared_bytes("openradioss/car_drop/car_parts.csv").decode().splitlines()
+    lines = Path(stored("car_parts.csv")).read_text("ascii").splitlines()
     head, *rows = (line.split(",") for line in lines)
     for cells in rows:
         one = dict(zip(head, cells, strict=True))

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from d2rpick.deck.radioss import find_run_windows, read_run, recognises, run_files
 from d2rpick.errors import DeckError
 from d2rpick.rules import RULES, check_deck
+from tests.computed import stored
 from tests.decks import write
 
 EXAMPLE = RULES["D2R401"].passing[0]
@@ -195,3 +196,11 @@ def test_garbage_behind_a_keyword_is_no_crash(garbage: bytes, keyword: bytes) ->
     content = b"/BEGIN\n" + EXAMPLE.deck.encode().replace(b"/END\n", b"") + b"/RUN/x/1\n 1.0\n" + keyword + garbage
     assert recognises(content)
     check_deck("run.rad", content=content)
+
+
+@pytest.mark.parametrize(("name", "nodes"), [("CAR_all", [1808]), ("CAR_heavy", range(1808, 1814))])
+def test_legs_that_were_computed(name: str, nodes: list[int]) -> None:
+    checked = check_deck(stored(f"{name}_0001.rad"))
+    assert checked.findings == ()
+    found = [(window.unit.id, window.tr, window.td) for window in checked.windows]
+    assert found == [(node, 0.0496, 0.1464) for node in nodes]

@@ -19,10 +19,10 @@ from d2rpick.histories.formats import hdf5_damage, hdf5_file
 from d2rpick.histories.formats.hdf5_file import SavedBinout
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
+from tests.computed import stored, unpacked
 from tests.faults import FAULTS, Fault, cases, damage
 from tests.hdf5_files import ENERGY, KINETIC, LAYOUTS, PARTS, TIME, lasso, plain, written
 from tests.reading import history_of
-from tests.shared import shared_bytes
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History
@@ -237,12 +237,12 @@ def test_a_library_that_comes_to_no_end_is_ended(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize("name", ["segfault", "bitflip_silent", "lost_chunk_zeros"])
 def test_damaged_files_that_were_found_are_refused(name: str) -> None:
     with pytest.raises(FormatError, match="damaged"):
-        read(io.BytesIO(shared_bytes(f"faults/hdf5_{name}.h5")))
+        read(io.BytesIO(unpacked(stored(f"faults/hdf5_{name}.h5.gz"))))
 
 
 def test_a_line_end_in_a_name_does_not_break_the_message() -> None:
     with pytest.raises(FormatError, match=r"internal_energ\\n \(21\)"):
-        read(io.BytesIO(shared_bytes("faults/hdf5_newline_in_error.h5")))
+        read(io.BytesIO(unpacked(stored("faults/hdf5_newline_in_error.h5.gz"))))
 
 
 def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:

@@ -7,7 +7,6 @@ import pytest
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.formats import matsum
-from tests.shared import shared_bytes
 from tests.text_files import HEAD, matsum_head, matsum_part, matsum_state, matsum_text
 
 TIMES = [0.0, 0.1, 0.25, 0.3]
@@ -208,31 +207,3 @@ def test_cut_at_every_byte_gives_whole_states_only(lines: int, legend: bool) -> 
         begun = sum(start + 20 < end for start in starts)
         assert begun - 1 <= n <= begun, end
         assert run.complete == (n == begun and not text[:end].rpartition(b"\n")[2].strip()), end
-
-
-def test_each_part_of_a_real_file() -> None:
-    """Numbers cut out of the file by awk: state (from 1), time and the internal energies of the parts."""
-    run = read(shared_bytes("real/histories/PILLARS-LSDyna__Bolt_B_Explicit-matsum"))
-    titles = {
-        10: "Plate 1", 20: "Plate 2", 100: "Bolt", 110: "Bolt Head", 120: "Bolt Nut",
-        101: "Contact Beam Bolt (imp only)", 310: "Contact Beams Plates",
-    }  # fmt: skip
-    assert {part.id: part.title for part in run.parts} == titles
-    internal = run.part_channel("internal_energy", list(titles))
-    assert {state: [run.part_time[state - 1], *internal[state - 1]] for state in (2, 50, 1001)} == {
-        2: [4.8730e-03, 0.0, 0.0, 1.1260e-05, 1.2170e-06, 1.2170e-06, 0.0, 0.0],
-        50: [2.4490e-01, 4.2235, 0.86697, 13.671, 0.94142, 0.92748, 0.0, 0.0],
-        1001: [4.9999, 7.9869, 1.7680, 34.151, 6.2484, 6.1190, 0.0, 0.0],
-    }
-    assert run.part_channel("kinetic_energy", list(titles))[-1].tolist() == [
-        9.9113e-02, 1.0965e-01, 1.5108e-02, 3.3402e-02, 4.0127e-02, 0.0, 0.0,
-    ]  # fmt: skip
-    momentum = [run.part_channel(f"{axis}_momentum", [110])[-1, 0] for axis in "xyz"]
-    assert momentum == [2.1572e-02, -1.5911e-02, 1.7556e-04]
-
-
-def test_titles_of_a_real_file_are_found_by_number() -> None:
-    """Its legend is in another order than its blocks."""
-    run = read(shared_bytes("real/histories/lasso-python__sph_models-R7_1_2-binout.l2a-matsum"))
-    assert [(part.id, part.title) for part in run.parts] == [(1, "null shells for visualization"), (101, "")]
-    assert run.part_channel("internal_energy", [101])[[1, 49, 87], 0].tolist() == [0.0, 2.3528, 2.3516]

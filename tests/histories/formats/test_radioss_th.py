@@ -1,82 +1,32 @@
-"""Radioss T01: every real file against independent readings, and made files of every age."""
+"""Radioss T01: computed runs against other readings, and made files of every age."""
 
 from __future__ import annotations
-
-import csv
-import io
 
 import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
+from tests.command import BOX, ROLLOVER
+from tests.computed import stored, unpacked
 from tests.made_t01 import MadePart, T01Writer, t01, value
-from tests.shared import shared_bytes
-
-HISTORIES = "real/histories/"
-QA = "OpenRadioss__miniqa-"
 
 
 def opened(made: T01Writer | bytes) -> TimeHistory:
     return TimeHistory(bytes(made.data) if isinstance(made, T01Writer) else made, "runT01")
 
 
-# file, states, global variables, parts with variables
-REAL = [
-    (f"{QA}AMS-boxbeam-reference-BOXBEAMT01", 801, 12, [(1, "SHELL2")]),
-    (f"{QA}FLUIDE_NEW-EBCS-INIV-reference-INIVT01", 69, 12, [(2, "Solid part 2"), (3, "Solid part 3")]),
-    (f"{QA}FLUIDE_NEW-EBCS-INIV-reference-INIVT02", 69, 12, [(2, "Solid part 2"), (3, "Solid part 3")]),
-    (f"{QA}FLUIDE_NEW-EBCS-INIV-reference-INIVT03", 552, 12, [(2, "Solid part 2"), (3, "Solid part 3")]),
-    (
-        f"{QA}INTERF-INT_7-igsti-small_boule_igsti-dtmin_02-reference-BOULE1V5T01",
-        3,
-        12,
-        [(1, "BOULE"), (2, "COQUE ARRIERE")],
-    ),
-    (f"{QA}OPTIONS-NEW_BOX_V11-BOX_GRSHEL-reference-FOAM_GRSHELT01", 1, 12, []),
-    (f"{QA}RESTART-cra2-reference-CRA2V44T01", 50, 12, [(1, "PID 1"), (2, "PID 2"), (3, "PID 3")]),
-    (f"{QA}RESTART-cra2-reference-CRA2V44T02", 50, 12, [(1, "PID 1"), (2, "PID 2"), (3, "PID 3")]),
-    (f"{QA}RUPTURE-FAIL_TAB-ELEM_SAMP-reference-1ELEM_SAMPT01", 258, 12, []),
-    (f"{QA}SPH-WavesCompression-reference-CUBCT01", 45, 12, []),
-    (f"{QA}onefile_rad-reference-CRA2AV4T01", 400, 12, [(1, "PID 1"), (2, "PID 2"), (3, "PID 3")]),
-    ("Yasu2019__ASSY_T01", 1, 22, []),
-]
-
-
-@pytest.mark.parametrize(("file", "states", "globals_", "parts"), REAL)
-def test_real_files_have_the_numbers_of_the_solvers_own_converter(
-    file: str, states: int, globals_: int, parts: list[tuple[int, str]]
-) -> None:
-    """th_to_csv prints seven digits of each number, in the order of the file whatever its header says."""
-    run = opened(shared_bytes(HISTORIES + file))
-    assert [(part.id, part.title) for part in run.parts] == parts
-    assert len(run.channels) == globals_
-    assert run.complete
-    text = shared_bytes(f"{HISTORIES}{file}.csv").decode("latin-1")
-    rows = [line.split(",") for line in text.splitlines() if line.count(",") > globals_ and '"' not in line]
-    table = np.array([[float(cell) for cell in row if cell] for row in rows])
-    assert run.time.shape == (states,)
-    np.testing.assert_allclose(run.time, table[:, 0], rtol=1e-6)
-    for place, name in enumerate(run.channels, start=1):
-        np.testing.assert_allclose(run.channel(name), table[:, place], rtol=1e-6)
-    names = next(csv.reader(io.StringIO(text)))
-    for part_id, title in parts:
-        for short, quantity in (("IE", "internal_energy"), ("KE", "kinetic_energy"), ("ZMOM", "z_momentum")):
-            column = names.index(f"{title.ljust(40)}  {short} ") - 3  # the header names 15 globals, there are 12
-            np.testing.assert_allclose(run.part_channel(quantity, [part_id])[:, 0], table[:, column], rtol=1e-6)
-
-
-@pytest.mark.parametrize("name", ["rollover_referenceT01.gz", "rollover_r100_T02.gz", "chain_referenceT01.gz"])
-def test_energies_of_the_parts_add_up_to_that_of_the_model(name: str) -> None:
-    run = opened(shared_bytes(f"openradioss/{name}"))
+@pytest.mark.parametrize("path", [BOX, stored("rollover_r100_T02.gz"), stored("chain_referenceT01.gz")])
+def test_energies_of_the_parts_add_up_to_that_of_the_model(path: str) -> None:
+    run = opened(unpacked(path))
     total = run.part_channel("internal_energy", [part.id for part in run.parts]).sum(axis=1)
     np.testing.assert_allclose(total, run.channel("internal_energy"), atol=1e-6 * total.max())
 
 
 def test_the_rollover_agrees_with_the_table_of_its_makers() -> None:
     """rollover_ref.csv was made apart from these files: seven digits of energies, parts box and step."""
-    run = opened(shared_bytes("openradioss/rollover_referenceT01.gz"))
-    table = np.genfromtxt(io.BytesIO(shared_bytes("openradioss/rollover_ref.csv")), delimiter=",", names=True)
+    run = opened(unpacked(BOX))
+    table = np.genfromtxt(ROLLOVER, delimiter=",", names=True)
     at = np.searchsorted(run.time, table["time_s"] - 1e-7)
     box = run.part_channel("internal_energy", [1])[at, 0]
     close = np.abs(run.time[at] - table["time_s"]) < 2e-6
@@ -85,8 +35,8 @@ def test_the_rollover_agrees_with_the_table_of_its_makers() -> None:
 
 
 def test_legs_follow_one_another() -> None:
-    legs = [opened(shared_bytes(f"openradioss/rollover_r100_T0{leg}.gz")) for leg in (1, 2, 3)]
-    assert [leg.time.size for leg in legs] == [2000, 5400, 1600]
+    legs = [opened(unpacked(stored(f"rollover_r100_T0{leg}.gz"))) for leg in (1, 2, 3)]
+    assert [leg.time.size for leg in legs] == [201, 541, 161]
     assert (np.diff(np.concatenate([leg.time for leg in legs])) > 0).all()
 
 

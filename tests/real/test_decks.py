@@ -7,12 +7,16 @@ or restart cards, a pair by contact force, a disabled card, templates and a docu
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
+from d2rpick.deck.inventory import ls_dyna, read_inventory
+from d2rpick.deck.reader import read_deck
 from d2rpick.errors import DeckError
 from d2rpick.rules import Checked, check_deck
-from tests.shared import shared
+from tests.deck.inventory.test_ls_dyna import counted
+from tests.real.files import real
 
 FOUND: dict[str, dict[str, int]] = {
     "batmac_nail_main.k": {"D2R003": 5, "D2R301": 1},
@@ -42,7 +46,7 @@ OF_RADIOSS = [*EXCERPTS, "radioss/IDEL8_0001.rad", "radioss/IDEL8_0002.rad"]
 
 
 def check(name: str) -> Checked:
-    return check_deck(str(shared(f"real/decks/{name}")))
+    return check_deck(real(f"decks/{name}"))
 
 
 @pytest.mark.parametrize("name", FOUND)
@@ -51,7 +55,7 @@ def test_findings(name: str) -> None:
 
 
 def test_all_decks_are_covered() -> None:
-    folder = shared("real/decks")
+    folder = Path(real("decks"))
     files = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     assert files == FOUND.keys() | set(OF_RADIOSS)
 
@@ -89,7 +93,7 @@ def test_plain_cards_are_rigid_from_the_start(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["IDEL8_0000.rad", "IDEL8_0001.rad", "IDEL8_0002.rad"])
 def test_any_file_of_a_public_run_is_the_run(name: str) -> None:
-    checked = check_deck(str(shared(f"real/radioss-decks/{name}")))
+    checked = check_deck(real(f"radioss-decks/{name}"))
     assert checked.findings == ()
     assert len(checked.files) == 3
     assert {(window.tr, window.td) for window in checked.windows} == {(0.0, 0.05)}
@@ -97,7 +101,7 @@ def test_any_file_of_a_public_run_is_the_run(name: str) -> None:
 
 
 def test_a_public_run_that_switches_nobody() -> None:
-    checked = check_deck(str(shared("real/radioss-decks/BLOCK_0000.rad")))
+    checked = check_deck(real("radioss-decks/BLOCK_0000.rad"))
     assert (checked.findings, checked.windows) == ((), ())
 
 
@@ -109,9 +113,23 @@ def test_legs_without_their_starter_deck_tell_main_nodes() -> None:
     assert checked.findings == ()
 
 
-@pytest.mark.parametrize(("name", "nodes"), [("CAR_all", [1808]), ("CAR_heavy", range(1808, 1814))])
-def test_legs_that_were_computed(name: str, nodes: list[int]) -> None:
-    checked = check_deck(str(shared(f"openradioss/car_drop/decks/{name}_0001.rad")))
-    assert checked.findings == ()
-    found = [(window.unit.id, window.tr, window.td) for window in checked.windows]
-    assert found == [(node, 0.0496, 0.1464) for node in nodes]
+# Elements.
+
+
+def test_real_decks_hold_what_a_plain_count_finds() -> None:
+    text = Path(real("decks/nodes.k")).read_text("latin-1").splitlines()
+    plain: Counter[int] = Counter()
+    reading = False
+    for line in text:
+        reading = line.upper().startswith(("*ELEMENT_SHELL", "*ELEMENT_BEAM")) if line.startswith("*") else reading
+        if reading and line[:1] not in "*$" and line.strip():
+            plain[int(line[8:16])] += 1
+    found = ls_dyna.read(read_deck(real("decks/nodes.k")))
+    assert {part: counts.total() for part, counts in found.counts.items()} == plain
+
+
+def test_a_real_deck_is_counted() -> None:
+    found = read_inventory(real("radioss-decks/IDEL8_0000.rad"))
+    assert counted(found) == {1: {"solid": 24}, 2: {"shell": 350, "triangle": 8}}
+    assert not found.complete  # one of its includes is absent
+    assert not found.parts[1].section.turns

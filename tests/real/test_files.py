@@ -1,8 +1,5 @@
 """Files that solvers really wrote: what is read from each, or why it is refused.
 
-The files are no part of the project.  They are looked for in ``../shared/real`` beside it, or in the folder
-named by D2RPICK_REAL_FILES, which holds ``histories/``; without them these tests are skipped.
-
 Each time the first state, the one in the middle (n // 2, from 0) and the last, read by others:
 
 * glstat by awk: last field of the lines whose columns 2-32 are ``time`` or ``internal energy`` and dots, of the states
@@ -14,7 +11,6 @@ Each time the first state, the one in the middle (n // 2, from 0) and the last, 
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,11 +19,7 @@ import pytest
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection
 from tests.reading import read_history
-
-FOLDER = Path(os.environ.get("D2RPICK_REAL_FILES", Path(__file__).parents[3] / "shared" / "real")) / "histories"
-
-pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no real files in {FOLDER}; set D2RPICK_REAL_FILES")
-
+from tests.real.files import real
 
 LONE = ("2",)  # column or curve of another quantity, taken only when it is asked for
 FLOOR = 1.999999936531045e-20  # 2e-20 in single precision
@@ -251,8 +243,8 @@ def test_read(file: str) -> None:
     expected = READABLE[file]
     if expected.energy:
         with pytest.raises(FormatError, match="by its name not an internal energy"):
-            read_history([str(FOLDER / file)])
-    history = read_history([str(FOLDER / file)], Selection(energy=expected.energy))
+            read_history([real(f"histories/{file}")])
+    history = read_history([real(f"histories/{file}")], Selection(energy=expected.energy))
     assert (history.channel, history.time.size) == (expected.channel, expected.states)
     states = list(zip(history.time.tolist(), history.energy.tolist(), strict=True))
     digits = {"radioss-th": 1e-6, "matsum": 1e-15}.get(history.format, 0.0)  # sums depend on their order
@@ -269,11 +261,11 @@ def test_read(file: str) -> None:
 @pytest.mark.parametrize("file", REFUSED)
 def test_refused(file: str) -> None:
     with pytest.raises(FormatError, match=REFUSED[file]):
-        read_history([str(FOLDER / file)])
+        read_history([real(f"histories/{file}")])
 
 
 def test_no_file_is_left_out() -> None:
-    assert {file.name for file in FOLDER.iterdir()} == {*READABLE, *REFUSED}
+    assert {file.name for file in Path(real("histories")).iterdir()} == {*READABLE, *REFUSED}
 
 
 # Tables among the files beside them, and what is said of each.
@@ -293,13 +285,13 @@ PAIRS = {
 @pytest.mark.parametrize("file", MORE)
 def test_tables_that_hold_no_energy_are_refused(file: str) -> None:
     with pytest.raises(FormatError, match=MORE[file]):
-        read_history([str(FOLDER.with_name("more-histories") / file)])
+        read_history([real(f"more-histories/{file}")])
 
 
 @pytest.mark.parametrize("file", PAIRS)
 def test_pairs_with_a_count_are_read(file: str) -> None:
     states, first, second = PAIRS[file]
-    history = read_history([str(FOLDER.with_name("more-histories") / file)])
+    history = read_history([real(f"more-histories/{file}")])
     assert history.time.size == states
     assert list(zip(history.time[:2].tolist(), history.energy[:2].tolist(), strict=True)) == [first, second]
     assert not history.notes
@@ -308,7 +300,7 @@ def test_pairs_with_a_count_are_read(file: str) -> None:
 
 def test_a_history_whose_part_variables_have_no_code_has_those_of_the_model() -> None:
     file = "OpenRadioss__miniqa-OPTIONS-damp-new_test_v11-reference-FFO25SCBT01"
-    history = read_history([str(FOLDER.with_name("more-histories") / file)])
+    history = read_history([real(f"more-histories/{file}")])
     assert history.time.size == 11
     assert (history.energy[0], history.energy[-1]) == pytest.approx((0.0, 0.001894467), rel=1e-6)
     assert any("no variables of parts 1, 2" in note for note in history.notes)

@@ -1,0 +1,24 @@
+"""Files of others, which solvers really wrote: no part of the project, and all other tests do without them.
+
+This is the only place that knows where they lie: D2RPICK_REAL names the folder, else it is ``../shared/real`` beside
+the clone.  Where it is absent, the tests in this folder are left out (``tests/alone.py``).
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+REAL = Path(os.environ.get("D2RPICK_REAL") or Path(__file__).resolve().parents[3] / "shared" / "real").absolute()
+
+
+def real(name: str) -> str:
+    """Name of a file or folder below that folder, which must be there."""
+    path = REAL / name
+    assert path.exists(), f"{path} is absent"
+    return str(path)
+
+
+def content(name: str) -> bytes:
+    """Content of a history."""
+    return Path(real(f"histories/{name}")).read_bytes()
