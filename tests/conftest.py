@@ -2,7 +2,8 @@
 
 import gc
 import os
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from functools import wraps
 from hashlib import blake2b
 from types import ModuleType
@@ -16,7 +17,6 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 import pytest
 from hypothesis import settings
 
-from d2rpick import file_state
 from d2rpick.choice import examine, explored
 from d2rpick.flight import momentum
 from d2rpick.flight.window import Remembered
@@ -69,8 +69,23 @@ replace(examine, identify=remembered(identify), identify_several=remembered(iden
 replace(momentum, Remembered=Misfits)
 # Pages explore few td: what they show of each is the same.
 replace(explored, _STEPS=5, _LEAST=5)
-# Most tests read what they have just written: that no write is under way is sure without waiting for it.
-replace(file_state, PAUSE=0.0)
+_now = time.time_ns
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _old_files() -> Iterator[None]:
+    """Let all files look old: most tests read what they have just written, and no write of theirs is under way."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(time, "time_ns", lambda: _now() + 3_600_000_000_000)
+        yield
+
+
+@pytest.fixture
+def new_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let files look as new as they are, but make no pause: what is under way in these tests ends by itself."""
+    monkeypatch.setattr(time, "time_ns", _now)
+    monkeypatch.setattr(time, "sleep", lambda _: None)
+
 
 # Looking for garbage as often as Python does by itself takes a tenth of the time of all tests.
 gc.set_threshold(20_000, 20, 50)
