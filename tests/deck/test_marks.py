@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import builtins
 import errno
 import io
+import os
 import re
 import time
+from contextlib import contextmanager
 from threading import Event, current_thread, main_thread
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
@@ -22,6 +25,8 @@ from d2rpick.file_state import FileState
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    from d2rpick.deck.stored import Filling
 
 HEAD = b"-----BEGIN PGP MESSAGE"
 MARK = b"\xef\xbb\xbf"
@@ -77,31 +82,37 @@ def test_pieces_are_whole_lines(file: Path, data: bytes, size: int, start: int, 
     assert all(pieces)
 
 
-def test_a_call_of_the_system_that_gives_less_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+class Sparing(io.FileIO):
+    """A file that gives three bytes at a time."""
+
+    def readinto(self, room: memoryview, /) -> int:  # type: ignore[override]
+        return super().readinto(room[:3])
+
+
+def test_a_call_of_the_system_that_gives_less_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "deck.k"
+    path.write_bytes(b"0123456789")
+    there = on_disk(path, window=1)
     monkeypatch.delattr("os.preadv", raising=False)  # not every system has it
-
-    class Sparing(io.BytesIO):
-        """Gives three bytes at a time."""
-
-        def readinto(self, room: memoryview, /) -> int:  # type: ignore[override]
-            return super().readinto(room[:3])
-
-    there = OnDisk("deck.k", FileState(0, 0, 10, 0, 0, settled=True))
-    file: Any = Sparing(b"0123456789")
-    room = bytearray(8)
-    assert there._fill(file, room, 1, 9) == 8
-    assert bytes(room) == b"12345678"
+    monkeypatch.setattr(builtins, "open", lambda name, mode, **_: Sparing(name, mode))
+    assert there.read(1, 9) == b"12345678"
+    os.truncate(path, 6)
     with pytest.raises(DeckError, match="rewritten"):
-        there._fill(file, room, 5, 12)
+        there.read(1, 9)
 
 
 class Failing(Held):
     """Bytes that a disk gives up to a place."""
 
-    def _fill(self, room: bytearray, begin: int, end: int) -> int:
-        if begin > 300:
-            raise OSError(errno.EIO, "Input/output error")
-        return super()._fill(room, begin, end)
+    @contextmanager
+    def opened(self) -> Iterator[Filling]:
+        def failing(room: bytearray, begin: int, end: int) -> int:
+            if begin > 300:
+                raise OSError(errno.EIO, "Input/output error")
+            return fill(room, begin, end)
+
+        with super().opened() as fill:
+            yield failing
 
 
 def test_what_goes_wrong_in_a_thread_is_said() -> None:
@@ -116,14 +127,19 @@ class Interrupted(Held):
         super().__init__(data)
         self.interrupted, self.searched = Event(), 0
 
-    def _fill(self, room: bytearray, begin: int, end: int) -> int:
-        if current_thread() is main_thread():
-            self.interrupted.set()
-            raise KeyboardInterrupt
-        self.interrupted.wait()
-        time.sleep(0.001)
-        self.searched += 1
-        return super()._fill(room, begin, end)
+    @contextmanager
+    def opened(self) -> Iterator[Filling]:
+        def interrupted(room: bytearray, begin: int, end: int) -> int:
+            if current_thread() is main_thread():
+                self.interrupted.set()
+                raise KeyboardInterrupt
+            self.interrupted.wait()
+            time.sleep(0.001)
+            self.searched += 1
+            return fill(room, begin, end)
+
+        with super().opened() as fill:
+            yield interrupted
 
 
 def test_no_thread_goes_on_where_a_search_is_interrupted() -> None:
