@@ -121,10 +121,15 @@ FORMATS: Final[dict[str, Callable[[Random], bool]]] = {
 
 def case(form: str, seed: int, number: int) -> str:
     """What became of one input: ``read``, ``refused``, or the fault."""
+    return outcome(FORMATS[form], Random(f"{form} {seed} {number}"), number)
+
+
+def outcome(read: Callable[[Random], bool], random: Random, number: int) -> str:
+    """The same of an input that is made from random numbers and read."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            return "read" if FORMATS[form](Random(f"{form} {seed} {number}")) else "refused"
+            return "read" if read(random) else "refused"
         except Exception as error:  # noqa: BLE001  whatever it is, it is a fault
             return f"number {number}: {type(error).__name__}: {' '.join(str(error).split())[:150]}"
 

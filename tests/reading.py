@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.of_run import read
+from d2rpick.histories.content import OnDisk, Portions
 from d2rpick.histories.database import Legs
-from d2rpick.histories.opening import Run, Selection
+from d2rpick.histories.opening import Run, Selection, open_run, open_sources
 from d2rpick.histories.source import Source
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Reader
+
+
+SMALL = Portions(block=256, gap=32, window=64)
 
 
 def run_of(reader: Reader, *contents: bytes | str, selection: Selection | None = None, name: str = "run") -> Run:
@@ -35,6 +41,21 @@ def history_of(
 def read_history(names: Sequence[str], selection: Selection | None = None, input_format: str = "auto") -> History:
     """Read the history that is selected of a run, by default the internal energy."""
     return read(names, selection or Selection(), input_format).history
+
+
+def on_disk(file: Path, portions: Portions = SMALL) -> OnDisk:
+    """Content of a file that stays on its disk and is read in small pieces, however small it is itself."""
+    return OnDisk(str(file), os.open(file, os.O_RDONLY), portions)
+
+
+def run_of_file(file: Path) -> Run:
+    """Open a file, which is held in memory where it is small."""
+    return open_run([str(file)])
+
+
+def run_on_disk(file: Path) -> Run:
+    """Open a file and leave it on its disk."""
+    return open_sources([Source(str(file), on_disk(file))])
 
 
 def states_of(history: History) -> list[tuple[float, float]]:

@@ -161,8 +161,12 @@ def test_ci_runs_the_test_command_of_the_readme() -> None:
 def test_the_jobs_in_the_documentation_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copy(DECK, "main.k")
+    Path("d2rpick").symlink_to(ROOT)  # where the clone lies
+    jobs = "".join(blocks(ALL, "yaml"))
+    assert [Path(name, "pyproject.toml").exists() for name in re.findall(r"pip install (.*)", jobs)] == [True, True]
+    assert [Path(name, ".pre-commit-hooks.yaml").exists() for name in re.findall(r"repo: (.*)", jobs)] == [True]
     shutil.copy(GLSTAT, "glstat")
-    calls = re.findall(r"- (?:run: )?d2rpick (.*)", "".join(blocks(ALL, "yaml")))
+    calls = re.findall(r"- (?:run: )?d2rpick (.*)", jobs)
     assert len(calls) == 2
     assert [run(*shlex.split(call)).exit_code for call in calls] == [1, 1]
     (report,) = re.findall(r"junit: (.*)", ALL)

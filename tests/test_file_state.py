@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick import file_state
 from d2rpick.file_state import settled_state
 
 if TYPE_CHECKING:
@@ -39,7 +38,6 @@ def test_a_file_is_waited_for_as_long_as_it_may_change_unseen(
 ) -> None:
     pauses: list[float] = []
     times = dict.fromkeys(("st_mtime_ns", "st_ctime_ns"), NOW - ago)
-    monkeypatch.setattr(file_state, "PAUSE", 0.05)
     monkeypatch.setattr(time, "sleep", pauses.append)
     monkeypatch.setattr(time, "time_ns", lambda: NOW)
     (tmp_path / "deck.k").touch()

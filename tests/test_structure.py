@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from functools import cache
@@ -38,8 +39,6 @@ LAYERS = (
 )
 # The only modules that may import these.
 RESERVED = {"click": ("cli",), "matplotlib": ("report", "library")}  # library: for types
-
-HEAVY = {"pandas", "scipy", "matplotlib", "h5py", "PIL", "jsonschema", "unittest", "numpy.testing", "numpy.f2py"}
 
 
 def name_of(path: Path) -> str:
@@ -144,62 +143,58 @@ def loaded(*args: str) -> set[str]:
     return set(result.stderr.split())
 
 
-@pytest.mark.parametrize(
-    "args", [("--help",), ("--version",), ("suggest", "--help"), ("explore", "--help"), ("info", "--help")]
-)
-def test_help_and_version_load_no_numbers(args: tuple[str, ...]) -> None:
-    assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.histories.history", "d2rpick.choice.suggest"})
+@cache
+def beside(libraries: str) -> frozenset[str]:
+    """Modules of a process that imports nothing but some libraries."""
+    command = [sys.executable, "-c", f"import sys, {libraries}; print(*sys.modules)"]
+    found = subprocess.run(command, capture_output=True, text=True, check=True, timeout=TIME_LIMIT)
+    return frozenset(found.stdout.split())
+
+
+def share(modules: set[str]) -> float:
+    """How much of the package these of its modules are, by the bytes of their sources."""
+    size = {name: path.stat().st_size for name, path in MODULES.items()}
+    loaded = {name.removeprefix("d2rpick.") for name in modules}
+    return sum(size[name] for name in loaded) / sum(size.values())
+
+
+# What else of the standard library and of numpy costs start-up, and an answer to a plain table does without.
+UNNEEDED = {
+    *("pathlib", "json", "csv", "tempfile", "hashlib", "array", "heapq", "unicodedata", "logging", "subprocess", "xml"),
+    *("concurrent.futures", "multiprocessing", "shutil", "tomllib", "difflib", "zlib", "traceback", "unittest"),
+    *("importlib.metadata", "importlib.resources"),
+    *("numpy.typing", "numpy.polynomial", "numpy.random", "numpy.testing", "numpy.f2py"),
+}
+CARD = ("card", "--tr", "0.02", "--td", "0.09")
 
 
 @pytest.mark.parametrize(
-    "args",
+    ("args", "libraries", "most"),
     [
-        ("check", "-f", "json", DECK),
-        ("rule", "D2R201"),
-        ("card", "--tr", "0.02", "--td", "0.09", "--part", "1"),
-        ("card", "--solver", "radioss", "--tr", "0.02", "--td", "0.09", "--node", "1", "--end", "1"),
+        (("--help",), "click", 0.02),
+        (("--version",), "click", 0.02),
+        *(((command, "--help"), "click", 0.12) for command in ("suggest", "explore", "info")),
+        (("check", "-f", "json", DECK), "click", 0.2),
+        (("rule", "D2R201"), "click", 0.2),
+        ((*CARD, "--part", "1"), "click", 0.12),
+        ((*CARD, "--solver", "radioss", "--node", "1", "--end", "1"), "click", 0.12),
+        (("suggest", "-q", "--td", "0.064", ENERGY), "click, numpy", 0.32),
+        (("suggest", "-q", "--td", "0.064", GLSTAT), "click, numpy", 0.32),
     ],
 )
-def test_decks_and_cards_need_no_numbers_without_a_history(args: tuple[str, ...]) -> None:
-    assert not loaded(*args) & (HEAVY | {"numpy", "d2rpick.histories.history", "d2rpick.choice.suggest"})
+def test_a_command_loads_only_what_its_answer_needs(args: tuple[str, ...], libraries: str, most: float) -> None:
+    """No library but these, and so much of the package at most: a file more is worth a thought."""
+    there = beside(libraries)
+    assert "d2rpick" not in there
+    mine = loaded(*args) - there
+    own = {name for name in mine if folder(name) == "d2rpick"}
+    assert {folder(name) for name in mine - own} <= {*sys.stdlib_module_names, *re.findall(r"\w+", libraries)}
+    assert share(own) <= most
 
 
-@pytest.mark.parametrize("source", [ENERGY, GLSTAT])
-def test_suggest_loads_numpy_but_nothing_heavier(source: str) -> None:
-    modules = loaded("suggest", "-q", "--td", "0.064", source)
-    assert "numpy" in modules
-    assert not modules & HEAVY
-
-
-# What a plain table without parts, momenta or a window of td does without.
-UNNEEDED = {
-    f"d2rpick.{name}"
-    for name in (
-        "choice.suggest_td", "choice.acceptable_windows", "choice.expectation", "vibration.of_parts",
-        "vibration.part_shares", "vibration.part_signs", "vibration.envelope", "vibration.lock_in_profile",
-        "vibration.modes",
-        "vibration.fit_several", "flight.momentum", "choice.health", "choice.judged_card",
-        "deck.printing.common", "report.figures", "report.page", "report.health", "histories.formats.fixed_text",
-        "histories.formats.lsda", "flight.flying_parts", "flight.momentum", "vibration.replay", "vibration.integration",
-        "cli.explorer",
-    )
-} | {
-    "pathlib", "json", "csv", "tempfile", "hashlib", "numpy.typing", "numpy.polynomial", "numpy.random",
-    "array", "heapq", "unicodedata", "logging", "subprocess", "concurrent.futures", "multiprocessing", "shutil",
-    "tomllib", "difflib", "zlib", "importlib.metadata", "importlib.resources", "traceback",
-}  # fmt: skip
-# Each module costs start-up, too: one more is worth a thought.
-MOST_MODULES = 82
-
-
-def test_a_plain_table_loads_only_what_its_answer_needs() -> None:
-    libraries = [sys.executable, "-c", "import sys, numpy, click; print(*sys.modules)"]
-    there = subprocess.run(libraries, capture_output=True, text=True, check=True, timeout=TIME_LIMIT)
-    theirs = set(there.stdout.split())
-    assert "d2rpick" not in theirs
-    mine = loaded("suggest", "--quiet", "--td", "0.064", ENERGY) - theirs
+def test_a_plain_table_needs_little_of_what_python_has() -> None:
+    mine = loaded("suggest", "--quiet", "--td", "0.064", ENERGY) - beside("click, numpy")  # -q costs click difflib
     assert not mine & UNNEEDED
-    assert len([name for name in mine if name.partition(".")[0] == "d2rpick"]) <= MOST_MODULES
 
 
 def printed_by(code: str) -> str:

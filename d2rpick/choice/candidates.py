@@ -247,13 +247,15 @@ def find_candidates(situation: Situation, *, in_flight: bool = False) -> Candida
     return next(candidates_of([situation], in_flight=in_flight))
 
 
-def candidates_of(situations: Sequence[Situation], *, in_flight: bool = False) -> Iterator[Candidates]:
-    """The same of many td of one record, by one set of rules: so many td at once as have few candidates."""
+def candidates_of(
+    situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST
+) -> Iterator[Candidates]:
+    """The same of many td of one record, by one set of rules: at once so many td as have ``most`` candidates."""
     first, together = 0, 1
     while first < len(situations):
         found = _found_together(situations[first : first + together], in_flight=in_flight)
         yield from found
-        first, together = first + together, max(1, _MOST // max(1, *map(len, found)))
+        first, together = first + together, max(1, most // max(1, *map(len, found)))
 
 
 def _found_together(situations: Sequence[Situation], *, in_flight: bool) -> list[Candidates]:

@@ -15,19 +15,20 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from threading import Event
 
-PERIOD: Final = 1.0  # [s] before the first line, and between two
+_PERIOD: Final = 1.0  # [s] before the first line, and between two
 
 
 @contextmanager
-def reading(names: Sequence[str], *, quiet: bool) -> Iterator[None]:
+def reading(names: Sequence[str], *, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
     """Tell on stderr for how many seconds ``names`` have been read, unless ``quiet`` or where no terminal is.
 
-    Nobody knows how long it will take: how much of a file has to be read depends on what is asked of it.
+    ``period``: before the first line, and between two [s].  Nobody knows how long it will take: how much of a file has
+    to be read depends on what is asked of it.
     """
     what = "standard input" if names[0] == "-" else printable(names[0])
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     start = perf_counter()
-    with _telling(lambda seconds: f"reading {what}{more} ... {seconds:.0f} s", quiet=quiet):
+    with _telling(lambda seconds: f"reading {what}{more} ... {seconds:.0f} s", quiet=quiet, period=period):
         yield
     context = click.get_current_context(silent=True)
     if context and context.meta.get("d2rpick.verbose"):
@@ -48,10 +49,10 @@ class Count:
 
 
 @contextmanager
-def counting(total: int, *, quiet: bool) -> Iterator[Count]:
+def counting(total: int, *, quiet: bool, period: float = _PERIOD) -> Iterator[Count]:
     """Tell on stderr how many runs are done and how long the rest will take; the caller counts."""
     count = Count(total)
-    with _telling(count.told, quiet=quiet):
+    with _telling(count.told, quiet=quiet, period=period):
         yield count
 
 
@@ -69,7 +70,7 @@ def _clock(seconds: float) -> str:
 
 
 @contextmanager
-def _telling(say: Callable[[float], str], *, quiet: bool) -> Iterator[None]:
+def _telling(say: Callable[[float], str], *, quiet: bool, period: float) -> Iterator[None]:
     """Show what ``say`` gives for the seconds that have gone by, unless ``quiet`` or where no terminal is."""
     if quiet or sys.stderr is None or not sys.stderr.isatty():
         yield
@@ -77,7 +78,7 @@ def _telling(say: Callable[[float], str], *, quiet: bool) -> Iterator[None]:
     from threading import Event, Thread  # --help does without
 
     done = Event()
-    thread = Thread(target=_tell, args=(say, done), daemon=True)
+    thread = Thread(target=_tell, args=(say, done, period), daemon=True)
     thread.start()
     try:
         yield
@@ -86,12 +87,12 @@ def _telling(say: Callable[[float], str], *, quiet: bool) -> Iterator[None]:
         thread.join()
 
 
-def _tell(say: Callable[[float], str], done: Event) -> None:
+def _tell(say: Callable[[float], str], done: Event, period: float) -> None:
     import shutil
 
     line, seconds = "", 0.0
-    while not done.wait(PERIOD):
-        seconds += PERIOD
+    while not done.wait(period):
+        seconds += period
         room = shutil.get_terminal_size().columns - 1  # a line that wraps could not be erased
         before, line = line, say(seconds)[-room:]
         sys.stderr.write(f"\r{line.ljust(len(before))}")

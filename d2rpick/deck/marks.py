@@ -22,28 +22,33 @@ _ANCHOR: Final = _PGP.index(b"G")  # a letter that mesh data never holds: lookin
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # of UTF-8
 
 
-def find_marks(file: Held | OnDisk) -> Sequence[int]:
-    """Offsets of the ``*`` that begin a line (blanks before it allowed) and of encrypted blocks, ascending."""
-    search = _Search(file)
-    helpers = [Thread(target=search.help) for _ in range(_HELPERS if len(search.pieces) > _ALONE else 0)]
-    for helper in helpers:
-        helper.start()
+def find_marks(
+    file: Held | OnDisk, piece: int = _PIECE, *, alone: int = _ALONE, helpers: int = _HELPERS
+) -> Sequence[int]:
+    """Offsets of the ``*`` that begin a line (blanks before it allowed) and of encrypted blocks, ascending.
+
+    A file of more than ``alone`` pieces of so many bytes is searched by ``helpers`` threads beside this one.
+    """
+    search = _Search(file, piece)
+    threads = [Thread(target=search.help) for _ in range(helpers if len(search.pieces) > alone else 0)]
+    for thread in threads:
+        thread.start()
     try:
         search.go_on()
     finally:
         search.stop()
-        for helper in helpers:
-            helper.join()
+        for thread in threads:
+            thread.join()
     return search.result()
 
 
 class _Search:
     """A search of a file by several threads, each of which takes the next piece that waits."""
 
-    def __init__(self, file: Held | OnDisk) -> None:
-        self._file = file
+    def __init__(self, file: Held | OnDisk, piece: int) -> None:
+        self._file, self._piece = file, piece
         self._first = len(BYTE_ORDER_MARK) if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK else 0
-        self.pieces = range(self._first, file.size, _PIECE)
+        self.pieces = range(self._first, file.size, piece)
         self._room: Callable[[Iterable[int]], MutableSequence[int]] = list if len(self.pieces) == 1 else _compact
         self._waiting: Iterator[int] = iter(self.pieces)
         self._found: dict[int, Sequence[int]] = {}
@@ -51,11 +56,11 @@ class _Search:
     def go_on(self) -> None:
         """Search what waits, all of it in one buffer: fresh memory costs more than what is put into it."""
         found: dict[int, Sequence[int]] = {}
-        piece = bytearray(_LOOKBACK + min(_PIECE, self._file.size))
+        piece = bytearray(_LOOKBACK + min(self._piece, self._file.size))
         with self._file.opened() as fill:
             while (begin := next(self._waiting, None)) is not None:
                 low = max(self._first, begin - _LOOKBACK)
-                size = fill(piece, low, min(begin + _PIECE, self._file.size))
+                size = fill(piece, low, min(begin + self._piece, self._file.size))
                 places = _starred(piece, begin - low, size) + _encrypted(piece, begin - low, size)
                 found[begin] = self._room([low + place for place in sorted(places)]) if places else ()
         self._found |= found  # not before: only now it is sure that the file did not change

@@ -10,15 +10,15 @@ from itertools import islice, zip_longest
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.marks import BYTE_ORDER_MARK, find_marks
-from d2rpick.deck.stored import Held, stored
+from d2rpick.deck.stored import Held, OnDisk, stored
 from d2rpick.errors import DeckError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 STDIN: Final = "-"  # name of what was read from standard input
-_COUNTED: Final = 1 << 18  # bytes in which line ends are counted together
 _PIECE: Final = 4 << 20  # bytes of whole lines that are looked at together
+_COUNTED: Final = 16  # line ends are counted in this part of a piece, which stays in the cache
 _GZIP: Final = b"\x1f\x8b\x08"
 _FIRST: Final = 1 << 16  # bytes in which the first line end is looked for
 _HEAD: Final = 1024  # longest keyword line that is looked at
@@ -29,8 +29,9 @@ _SILENCE = re.compile(r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"
 class SourceFile:
     """One deck file, read as bytes and shown as Latin-1: all that is read of it is of one state of the file.
 
-    ``name`` is the path as messages show it; ``content`` is given for what does not lie in a file.  Line
-    numbers are counted when they are asked for: in a large deck counting costs more than finding the keywords.
+    ``name`` is the path as messages show it; ``content`` is given for what does not lie in a file, or is open already;
+    ``piece`` bytes are looked at together.  Line numbers are counted when they are asked for: in a large deck counting
+    costs more than finding the keywords.
 
     Raises
     ------
@@ -38,9 +39,9 @@ class SourceFile:
         If it cannot be opened; from any method, if the file was rewritten or replaced since then.
     """
 
-    def __init__(self, name: str, content: bytes | None = None) -> None:
-        self.name = name
-        self._file = stored(name) if content is None else Held(content)
+    def __init__(self, name: str, content: bytes | OnDisk | None = None, piece: int = _PIECE) -> None:
+        self.name, self._piece = name, piece
+        self._file = stored(name) if content is None else Held(content) if isinstance(content, bytes) else content
         self._counted = [(0, 1)]  # (offset, number of the line that holds it), ascending
 
     @cached_property
@@ -68,7 +69,7 @@ class SourceFile:
     def pieces(self, start: int, end: int | None = None) -> Iterator[bytes]:
         """Read the bytes from ``start`` to ``end`` or the end of the file in pieces of whole lines."""
         end = min(self._file.size, self._file.size if end is None else end)
-        size = _PIECE
+        size = self._piece
         while start < end:
             piece = self.read(start, min(start + size, end))
             if start + len(piece) < end:
@@ -84,10 +85,10 @@ class SourceFile:
         import hashlib
 
         digest = hashlib.sha256()
-        room = bytearray(min(_PIECE, self._file.size))
+        room = bytearray(min(self._piece, self._file.size))
         with self._file.opened() as fill:
-            for at in range(0, self._file.size, _PIECE):
-                size = fill(room, at, min(at + _PIECE, self._file.size))
+            for at in range(0, self._file.size, self._piece):
+                size = fill(room, at, min(at + self._piece, self._file.size))
                 digest.update(memoryview(room)[:size])
         return digest.hexdigest()
 
@@ -99,10 +100,11 @@ class SourceFile:
         """Return the number of the line, from 1, that holds the byte at ``offset``."""
         known = bisect_right(self._counted, (offset, 1 << 62)) - 1
         position, line = self._counted[known]
-        room = bytearray(min(_COUNTED, max(0, offset - position)))
+        together = -(-self._piece // _COUNTED)
+        room = bytearray(min(together, max(0, offset - position)))
         with self._file.opened() as fill:
-            for at in range(position, offset, _COUNTED):
-                line += room.count(b"\n", 0, fill(room, at, min(at + _COUNTED, offset)))
+            for at in range(position, offset, together):
+                line += room.count(b"\n", 0, fill(room, at, min(at + together, offset)))
         if known == len(self._counted) - 1 and offset > position:
             self._counted.append((offset, line))
         return line

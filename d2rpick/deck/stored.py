@@ -48,11 +48,14 @@ class Held:
 
 
 class OnDisk:
-    """Bytes of a file that are read when they are asked for; DeckError when it is not as it was at first."""
+    """Bytes of a file that are read when they are asked for; DeckError when it is not as it was at first.
 
-    def __init__(self, name: str, state: FileState) -> None:
+    ``window`` bytes are read at a time where few are wanted.
+    """
+
+    def __init__(self, name: str, state: FileState, window: int = _WINDOW) -> None:
         self.size = state.size
-        self._name, self._state = name, state
+        self._name, self._state, self._window = name, state, window
         self._windows: dict[int, bytes] = {}  # by where they begin, the oldest first
 
     def read(self, begin: int, end: int) -> bytes:
@@ -60,11 +63,11 @@ class OnDisk:
         end = min(end, self.size)
         if begin >= end:
             return b""
-        if end - begin > _WINDOW:
+        if end - begin > self._window:
             return self._read(begin, end)
-        low = begin // _WINDOW * _WINDOW
+        low = begin // self._window * self._window
         if end > low + len(window := self._windows.get(low, b"")):
-            window = self._read(low, min(-(-end // _WINDOW) * _WINDOW, self.size))
+            window = self._read(low, min(-(-end // self._window) * self._window, self.size))
             self._windows[low] = window
             if len(self._windows) > _KEPT:
                 del self._windows[next(iter(self._windows))]

@@ -130,8 +130,8 @@ def _converged(
 ) -> tuple[tuple[int, int], float, bool] | None:
     """Find the window around the state ``at`` that hardly shrinks at a tenth of the limit; None where it does.
 
-    The limit is lowered as long as it is above ``finest``; from ``enough`` on a window may shrink on one side.  The window
-    is given with the room that it leaves, and whether it began with the record at first.
+    The limit is lowered as long as it is above ``finest``; from ``enough`` on a window may shrink on one side.  With it
+    come the room that it leaves, and whether it began with the record at first.
     """
     time, room, found = law.time, limit + noise, None
     window = longest_window(law, at, room)

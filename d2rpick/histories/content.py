@@ -11,7 +11,7 @@ import os
 import time
 from functools import cache
 from io import FileIO
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -24,12 +24,20 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Addresses = NDArray[np.int64]
 
-_BLOCK: Final = 1 << 19  # bytes read at a time where many are wanted, a power of 2: they stay in the cache meanwhile
-_NEAR: Final = 1 << 13  # bytes between two that are read together: a call of the system costs more than these
-_WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, mostly behind them
 _HELD: Final = 1 << 24  # a file up to this size is held in memory
 _WORDS: Final = 1 << 13  # summed up at a time: their weights stay in the cache
 _MIX: Final = 0x9E3779B97F4A7C15
+
+
+class Portions(NamedTuple):
+    """How many bytes of a file are read at a time."""
+
+    block: int = 1 << 19  # where many are wanted, a power of 2: they stay in the cache meanwhile
+    gap: int = 1 << 13  # between two that are read together: a call of the system costs more than these
+    window: int = 1 << 16  # where few are wanted: more will be, mostly behind them
+
+
+_PORTIONS: Final = Portions()
 
 
 class Content:
@@ -84,13 +92,15 @@ class OnDisk(Content):
         Name of the file, for messages.
     file : int
         Its descriptor, which is closed with this object.
+    portions : Portions
     """
 
-    def __init__(self, name: str, file: int) -> None:
+    def __init__(self, name: str, file: int, portions: Portions = _PORTIONS) -> None:
         from array import array  # not above: most files are small
         from threading import Lock, local
 
         self._name, self._number = name, file
+        self._block, self._gap, self._window = portions
         self._file = FileIO(file, closefd=False)
         self._seen = FileState.of(self._file)
         self._size = self._seen.size
@@ -120,24 +130,24 @@ class OnDisk(Content):
         begin, end, _ = where.indices(self._size)
         window, first = getattr(self._own, "window", (b"", 0))
         if begin < end and (begin < first or end > first + len(window)):
-            if end - begin > _WINDOW:
+            if end - begin > self._window:
                 return self.view(begin, end).tobytes()
-            window, first = self.view(begin, min(begin + _WINDOW, self._size)).tobytes(), begin
+            window, first = self.view(begin, min(begin + self._window, self._size)).tobytes(), begin
             self._own.window = window, first
         return bytes(window[begin - first : end - first]) if begin < end else b""
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
         """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
-        for at in range(begin, self._size, _NEAR):
-            found = self[at : at + _NEAR + len(wanted) - 1].find(wanted)
+        for at in range(begin, self._size, self._gap):
+            found = self[at : at + self._gap + len(wanted) - 1].find(wanted)
             if found >= 0:
                 return at + found
         return -1
 
     def rfind(self, wanted: bytes, end: int) -> int:
         """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
-        for stop in range(end, 0, -_WINDOW):
-            first = max(0, stop - _WINDOW)
+        for stop in range(end, 0, -self._window):
+            first = max(0, stop - self._window)
             found = self[first:stop].rfind(wanted)
             if found >= 0:
                 return first + found
@@ -171,17 +181,17 @@ class OnDisk(Content):
 
     def _room(self, size: int) -> Bytes:
         """Room for so many bytes, that of few used again and again: fresh memory costs more than reading."""
-        if size > 2 * _BLOCK:
+        if size > 2 * self._block:
             return np.empty(size, np.uint8)
         if not hasattr(self._own, "buffer"):
-            self._own.buffer = np.empty(2 * _BLOCK, np.uint8)
+            self._own.buffer = np.empty(2 * self._block, np.uint8)
         buffer: Bytes = self._own.buffer
         return buffer[:size]
 
     def _in_order(self, addresses: Addresses, width: int) -> Bytes:
         """Read what lies close together in one piece, and what lies alone by itself."""
         found = np.empty((addresses.size, width), np.uint8)
-        apart = (np.diff(addresses) > _NEAR) | (np.diff(addresses & -_BLOCK) > 0)
+        apart = (np.diff(addresses) > self._gap) | (np.diff(addresses & -self._block) > 0)
         firsts = np.flatnonzero(np.append(True, apart)) if addresses.size else np.empty(0, np.int64)
         ends = np.append(firsts[1:], addresses.size)
         several = ends - firsts > 1
@@ -200,8 +210,8 @@ class OnDisk(Content):
             import hashlib
 
             digest = hashlib.sha256()
-            for begin in range(0, self._size, _BLOCK):
-                digest.update(self.view(begin, min(begin + _BLOCK, self._size)).data)
+            for begin in range(0, self._size, self._block):
+                digest.update(self.view(begin, min(begin + self._block, self._size)).data)
             self.check(at_rest_for=COARSE)
             self._digest = digest.hexdigest()
         return self._digest

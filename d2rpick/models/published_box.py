@@ -172,12 +172,11 @@ def variants_of(base: Parameters) -> Iterator[Variant]:
     yield Variant("damping 1 1/s", replace(base, damping=1.0), before=True)
 
 
-def tried(base: Parameters) -> Trial:
-    """Run all variants, choose one tr for them as ``study`` does, and switch each run there.
+def tried(variants: Sequence[Variant]) -> Trial:
+    """Run all variants, the base first, choose one tr for them as ``study`` does, and switch each run there.
 
     td is 10 ms before the first of their landings.
     """
-    variants = tuple(variants_of(base))
     landings = [_run(one.parameters).landed or _END for one in variants]
     td = round(min(landings) - _BEFORE_LANDING, 3)
     rows = [row_of(one.name, suggestion_for(_run(one.parameters), td)) for one in variants]
@@ -200,7 +199,11 @@ def _at(variant: Variant, row: StudyRow, error: float, common: RigidWindow) -> T
 
 
 def _variants(base: Parameters) -> Exhibit:
-    trial = tried(base)
+    return exhibit_of(tried(tuple(variants_of(base))))
+
+
+def exhibit_of(trial: Trial) -> Exhibit:
+    """Show what one tr for many variants costs each of them."""
     window, rows = trial.window, trial.runs
     number = np.arange(1.0, len(rows) + 1)
     own = np.array([np.nan if one.row.tr is None else one.row.tr for one in rows])

@@ -204,7 +204,7 @@ def on_cores(processes: int, module: str) -> Farm:
 
 
 class Cluster:
-    """A Dask cluster that is running already, under the address of its scheduler.
+    """A Dask cluster that is running already, under the address of its scheduler, which has to answer in time [s].
 
     Raises
     ------
@@ -212,7 +212,7 @@ class Cluster:
         If ``distributed`` is not installed or no scheduler answers.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, patience: float = _PATIENCE) -> None:
         try:
             from distributed import Client
         except ImportError:
@@ -220,7 +220,7 @@ class Cluster:
                 "a Dask cluster needs the extra 'dask' of d2rpick; install it with: pip install distributed"
             ) from None
         try:
-            self._client = Client(address, timeout=_PATIENCE, set_as_default=False)
+            self._client = Client(address, timeout=patience, set_as_default=False)
         except (OSError, ValueError) as error:
             what = " ".join(str(error).split())
             raise D2RPickError(f"{address}: no answer from a Dask scheduler ({what}); check the address") from None

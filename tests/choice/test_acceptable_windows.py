@@ -13,7 +13,7 @@ from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows,
 from d2rpick.choice.error_profile import error_at, error_profile
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import Suggestion, suggest
-from d2rpick.choice.verify import verify
+from d2rpick.choice.verify import verify, verify_at
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.modes import Modes
@@ -44,31 +44,24 @@ def holds(windows: Samples, times: Samples) -> Samples:
 
 def check(answer: Suggestion, seed: int) -> None:
     """Hold the windows against ``verify`` at their ends, inside, and anywhere."""
-    with pytest.MonkeyPatch.context() as patch:
-        # the same record at the same td: what is found in it need not be found a hundred times
-        patch.setattr("d2rpick.choice.verify.examine", lambda *_: answer.situation)
-        _check(answer, seed)
-
-
-def _check(answer: Suggestion, seed: int) -> None:
     situation = answer.situation
-    history, td, asked = situation.history, situation.td, situation.settings
+    history = situation.history
     windows = windows_of(answer)
     assert np.all(windows[:, 0] <= windows[:, 1])
     assert np.all(windows[1:, 0] > windows[:-1, 1])
     rng = np.random.default_rng(seed)
     ends = windows[rng.permutation(len(windows))[:4]]
     inside = rng.uniform(ends[:, :1], ends[:, 1:], (len(ends), 4))
-    assert all(verify(history, t, td, asked).verified for t in [*ends.ravel(), *inside.ravel()])
+    assert all(verify_at(situation, t).verified for t in [*ends.ravel(), *inside.ravel()])
     # what ``verify`` accepts anywhere else lies on the swing of td, where nothing outside of the tolerance follows
     last = max([windows[-1, 1]] if len(windows) else [history.time[0]])
     anywhere = rng.uniform(history.time[0], last, 12) if last > history.time[0] else np.zeros(0)
     clear = anywhere[np.min(np.abs(anywhere[:, np.newaxis] - [*windows.ravel(), np.inf]), axis=1) > 1e-5 * history.step]
-    assert [verify(history, t, td, asked).verified for t in clear] == holds(windows, clear).tolist()
+    assert [verify_at(situation, t).verified for t in clear] == holds(windows, clear).tolist()
     # the errors in the windows are those of ``verify``; where nothing vibrates there are none
     profile = error_profile(situation, answer.candidates, windows)
     for t in inside.ravel()[:4]:
-        error = 0.0 if situation.at_rest else verify(history, t, td, asked).candidate.error
+        error = 0.0 if situation.at_rest else verify_at(situation, t).candidate.error
         assert error_at(profile, t) == pytest.approx(error, abs=1e-3)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.choice import candidates
 from d2rpick.choice.candidates import candidates_of, find_candidates
 from d2rpick.choice.ranking import rank
 from d2rpick.choice.settings import Settings
@@ -104,13 +103,12 @@ def test_a_negative_level_is_never_acceptable() -> None:
     assert all(c.level_error is None and c.energy_ratio is None for c in answer.candidates)
 
 
-def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together() -> None:
     look = looking(paper.history(), PLAIN)
     situations = [look(td) for td in (0.02, 0.0335, 0.064, 0.0687, 0.11)]
     alone = [find_candidates(one)[:] for one in situations]
     assert [one[:] for one in candidates_of(situations)] == alone
-    monkeypatch.setattr(candidates, "_MOST", 15)
-    assert [one[:] for one in candidates_of(situations)] == alone
+    assert [one[:] for one in candidates_of(situations, most=15)] == alone
     assert list(candidates_of([])) == []
 
 

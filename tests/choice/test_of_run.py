@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.choice import examine
 from d2rpick.choice.judged_card import CardRequest, judged_card
 from d2rpick.choice.of_run import Reference, judge_of, read, suggest_of, verify_of
 from d2rpick.choice.settings import Settings
@@ -18,33 +16,12 @@ from d2rpick.report.suggestion import as_json
 from d2rpick.report.verdict import as_json as verdict_as_json
 from d2rpick.rules.judgement import faults_of
 from d2rpick.studies.study import Question, ask
-from d2rpick.vibration.span import described_span
 from tests.command import BOX as T01
 from tests.command import ENERGY, GLSTAT, run
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from tests.counted_fits import CountedFits
 
 BOX = Selection(parts=("box",))
 PLAIN = Settings()
-
-
-@pytest.fixture
-def examined(monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
-    """Count how often an oscillator was looked for since the last call."""
-    calls: list[None] = []
-
-    def counted(*args: object, **options: object) -> object:
-        calls.append(None)
-        return described_span(*args, **options)  # type: ignore[arg-type]
-
-    def count() -> int:
-        number = len(calls)
-        calls.clear()
-        return number
-
-    monkeypatch.setattr(examine, "described_span", counted)
-    return count
 
 
 @pytest.mark.parametrize(("file", "selection", "td"), [(ENERGY, Selection(), 0.064), (T01, BOX, 0.37)])
@@ -87,32 +64,17 @@ def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
     assert of_whole.values is of_box.values  # read once
 
 
-def test_a_record_is_examined_once_per_question(examined: Callable[[], int]) -> None:
-    reference = read([GLSTAT])
-    verdict = verify_of(reference, 0.02, 0.0687, PLAIN)  # a tr that does: it is named as the way out
-    assert examined() == 1
+def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
+    verdict = verify_of(read([GLSTAT]), 0.02, 0.0687, PLAIN)
     assert any("suits this td" in fault.message for fault in faults_of(verdict))
-    assert examined() == 0
-    reference = read([T01], BOX)
-    box = suggest_of(reference, 0.37, PLAIN)
-    examined()
+
+
+def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
+    reference, fits = read([T01], BOX), CountedFits()
+    box = suggest_of(reference, 0.37, PLAIN, fits=fits)
+    before = fits.made
+    assert before > 0
     assert box.recommended is not None
-    request = CardRequest("ls-dyna")
-    situation = box.situation
-    judge = partial(judge_of, reference, situation)
-    assert judged_card([box.recommended[:2]], situation.history, judge, request)
-    assert examined() == 0
-
-
-def test_no_td_of_a_window_is_examined_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    from d2rpick.choice import suggest_td
-
-    seen: list[float] = []
-
-    def noted(history: object, td: float, settings: Settings, fits: object) -> object:
-        seen.append(td)
-        return examine.examine(history, td, settings, fits=fits)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(suggest_td, "examine", noted)
-    suggest_of(read([ENERGY]), (0.06, 0.09), PLAIN)
-    assert len(seen) == len(set(seen)) > 3
+    judge = partial(judge_of, reference, box.situation)
+    assert judged_card([box.recommended[:2]], box.situation.history, judge, CardRequest("ls-dyna"))
+    assert fits.made == before

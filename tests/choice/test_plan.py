@@ -249,11 +249,8 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_fac
 
 
 @pytest.mark.parametrize("seed", [33, 40, 72, 77])
-def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(
-    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int, tmp_path: Path) -> None:
     """The page of a plan offered pairs that were rigid while the flight before had not landed."""
-    monkeypatch.setattr(explored, "_STEPS", 120)
     reference = read(bouncing(seed, tmp_path))
     plan = plan_of(reference, Settings(replay=False))
     landings = {row.number: row.end for row in plan.rows}

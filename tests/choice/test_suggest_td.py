@@ -12,7 +12,7 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import expectation, shortfall
 from d2rpick.choice.of_run import read
 from d2rpick.choice.settings import Settings
-from d2rpick.choice.suggest import suggest
+from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.errors import RangeError
 from d2rpick.histories.history import EXACT, Given, History, Momenta, Part
@@ -24,11 +24,10 @@ from d2rpick.report.suggestion import outlook
 from tests import chain, paper
 from tests.command import ENERGY, ROLLOVER, answer, run
 from tests.computed import results, stored
+from tests.counted_fits import CountedFits
 
 if TYPE_CHECKING:
-    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.fits import Fits
 
 PLAIN = Settings()
 T01 = str(ROLLOVER).replace(".csv", "T01.gz")
@@ -122,18 +121,15 @@ def test_without_a_window_the_longest_flight_is_searched_up_to_its_margin() -> N
     assert early["td"] <= end - 0.02 < found["td"]
 
 
-def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr(monkeypatch: pytest.MonkeyPatch) -> None:
-    sought: list[float] = []
-
-    def counted(history: History, td: float, settings: Settings, fits: Fits) -> Situation:
-        sought.append(td)
-        return examine(history, td, settings, fits=fits)
-
-    monkeypatch.setattr("d2rpick.choice.suggest_td.examine", counted)
+def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr() -> None:
     late = Settings(after=0.34)  # no tr lies between the end of the load and these peaks
-    found = suggest_in_window(rollover(), (0.30, 0.335), late)
-    assert found.recommended is None
-    assert len(sought) == 3  # at the ends and the middle of the window
+    history, fits = rollover(), CountedFits()
+    for td in (0.30, 0.3175, 0.335):
+        suggest_at(examine(history, td, late, fits))
+    before = fits.made
+    assert before > 0
+    assert suggest_in_window(history, (0.30, 0.335), late, fits).recommended is None
+    assert fits.made == before
 
 
 def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:

@@ -16,10 +16,11 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import Reference, read
 from d2rpick.choice.ranking import rank, recommend
 from d2rpick.choice.settings import Settings
-from d2rpick.choice.suggest import suggest
+from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.choice.trade_off import explore_of
 from d2rpick.histories.history import History
 from d2rpick.histories.selection import Selection
+from d2rpick.vibration.fits import Fits
 from tests.command import ROOT
 
 if TYPE_CHECKING:
@@ -44,8 +45,9 @@ def reference(history: History) -> Reference:
 
 def check(found: TradeOff, history: History, asked: Settings, offers: list[Offer]) -> None:
     """Hold offers against what ``suggest`` says of their td."""
+    fits = Fits()
     for one in offers:
-        alone = suggest(history, one.td, asked)
+        alone = suggest_at(examine(history, one.td, asked, fits))
         assert one.best == alone.chosen
         assert (one.basis, one.energy_td, one.kinetic_share) == (
             alone.situation.basis, alone.situation.energy_td, alone.situation.kinetic_share,

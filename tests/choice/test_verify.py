@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.choice.verify import verify
+from d2rpick.choice.verify import verify, verify_at
 from d2rpick.errors import RangeError
 from tests import paper
 from tests.energies import codes, of, rollover
@@ -67,8 +68,9 @@ def test_verify_remarks_what_suggest_remarks_on_every_tr() -> None:
     history, asked = ringing(), Settings(after=0.05)
     found = suggest(history, 0.4, asked).candidates
     assert {"crossing", "match"} <= {one.kind for one in found}
+    situation = examine(history, 0.4, asked)
     for one in found:
-        judged = verify(history, one.tr, 0.4, asked).candidate
+        judged = verify_at(situation, one.tr).candidate
         assert judged.notes == one.notes
         assert (judged.tr_low, judged.tr_high) == pytest.approx((one.tr_low, one.tr_high), rel=1e-9)
 

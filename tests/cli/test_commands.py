@@ -346,8 +346,7 @@ def examples(command: str) -> list[list[str]]:
 def test_every_help_ends_with_examples_that_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("D2RPICK_EXPLORE_STEPS", "20")
-    monkeypatch.setattr("d2rpick.models.rollover.scan._FINE", 0.03)  # a scan takes few times
-    monkeypatch.setattr("d2rpick.models.rollover.scan._COARSE", 0.08)
+    monkeypatch.setenv("D2RPICK_ROLLOVER_DT", "1e-3")
     shutil.copytree(ROOT / "sample_data", "sample_data")
     calls = examples(command)
     assert calls

@@ -6,16 +6,14 @@ import gzip
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, run, started
+from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, run
 from tests.made_binout import binout as made_binout
 from tests.made_t01 import t01, value
 from tests.text_files import glstat_text, matsum_text
@@ -71,16 +69,6 @@ def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> No
     packed.write_bytes(50 * gzip.compress(bytes(1 << 24)))
     message = one_line(child('ulimit -v 700000; d2rpick info "$1"', packed))
     assert "zeros.gz: its unpacked data do not fit into memory" in message
-
-
-def test_an_interrupted_scan_shows_no_tracebacks() -> None:
-    with started("rollover", "--scan", "--jobs", "2", text=True) as process:
-        time.sleep(3)
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
-        _, told = process.communicate()
-    assert process.returncode == 2
-    assert "Traceback" not in told
-    assert told.splitlines()[-1] == "d2rpick: interrupted"
 
 
 @pytest.fixture

@@ -7,43 +7,16 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.choice.plan import plan_of
 from tests.command import BOX, ENERGY, answer, run
 from tests.computed import starter, stored
 from tests.drops import drop, written
 from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from d2rpick.choice.of_run import Reference
-    from d2rpick.choice.plan import Plan
-    from d2rpick.choice.settings import Settings
-    from d2rpick.choice.switched_run import Times
 
 PART = ("--part", "box")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _plans_made_once() -> Iterator[None]:
-    """A plan that is asked for in another form is not made again."""
-    known: dict[tuple[object, ...], Plan] = {}
-
-    def planned(
-        reference: Reference, settings: Settings, *, min_rigid: float | None = None, done: Sequence[Times] = (),
-        before: Reference | None = None,
-    ) -> Plan:  # fmt: skip
-        histories = [one.history for one in (reference, before) if one]
-        read = [(one.source, one.parts, one.springs, one.time.tobytes(), one.energy.tobytes()) for one in histories]
-        key = (*read, settings, min_rigid, *done)
-        if key not in known:
-            known[key] = plan_of(reference, settings, min_rigid=min_rigid, done=done, before=before)
-        return known[key]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("d2rpick.choice.plan.plan_of", planned)
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import io
 import os
+import re
+import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,13 +32,22 @@ class Terminal(io.StringIO):
         return True
 
 
+def rest_of(terminal: int) -> bytes:
+    """What is left to be read where nobody writes any more."""
+    rest = b""
+    with suppress(OSError):  # how Linux tells that the other end is closed
+        while piece := os.read(terminal, 1000):
+            rest += piece
+    os.close(terminal)
+    return rest
+
+
 def shown(stream: io.StringIO, names: Sequence[str], *, periods: float, quiet: bool = False) -> str:
     """Give what is on ``stream`` after that many periods of reading."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stderr", stream)
-        patch.setattr(progress, "PERIOD", PERIOD)
         patch.setenv("COLUMNS", "40")
-        with progress.reading(names, quiet=quiet):
+        with progress.reading(names, quiet=quiet, period=PERIOD):
             time.sleep(periods * PERIOD)
     return stream.getvalue()
 
@@ -63,10 +75,9 @@ def test_nothing_is_shown_otherwise(case: str) -> None:
 def test_an_error_is_shown_on_a_clean_line(monkeypatch: pytest.MonkeyPatch) -> None:
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(progress, "PERIOD", PERIOD)
 
     def fail() -> None:
-        with progress.reading(["glstat"], quiet=False):
+        with progress.reading(["glstat"], quiet=False, period=PERIOD):
             time.sleep(5 * PERIOD)
             raise ValueError("broken")
 
@@ -81,24 +92,37 @@ def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
         os.close(slave)
         first = os.read(master, 1000)  # blocks until there is something
         result, _ = process.communicate(Path(ENERGY).read_bytes(), timeout=30)
-    rest = b""
-    try:
-        while piece := os.read(master, 1000):
-            rest += piece
-    except OSError:  # how Linux tells that the other end is closed
-        pass
-    os.close(master)
+    rest = rest_of(master)
     assert first.startswith(b"\rreading standard input ... 1 s")
     assert rest.endswith(b" \r")
     assert process.returncode == 0
     assert result.startswith(b"source,format,")
 
 
+@pytest.mark.parametrize("quiet", [False, True])
+def test_the_runs_of_a_scan_are_counted_until_it_is_interrupted(quiet: bool) -> None:
+    master, slave = pty.openpty()
+    options = ["--quiet"] if quiet else []
+    with started("rollover", "--scan", "--mesh", "4", "--jobs", "2", *options, stderr=slave) as process:
+        os.close(slave)
+        told = b""
+        if quiet:
+            time.sleep(3)  # others have told something by now
+        while not quiet and b" runs" not in told:
+            told += os.read(master, 1000)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
+        process.communicate(timeout=30)
+    told += rest_of(master)
+    assert process.returncode == 2
+    assert b"Traceback" not in told
+    assert told.endswith(b"d2rpick: interrupted\r\n")
+    assert told == b"\r\nd2rpick: interrupted\r\n" if quiet else re.search(rb"\r\d+ of \d+ runs[,\r]", told)
+
+
 def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(progress, "PERIOD", PERIOD)
-    with progress.counting(9, quiet=False) as count:
+    with progress.counting(9, quiet=False, period=PERIOD) as count:
         count.done = count.taken = 3
         time.sleep(5 * PERIOD)
         count.done = 5

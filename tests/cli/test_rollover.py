@@ -5,56 +5,31 @@ from __future__ import annotations
 import csv
 import io
 import json
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from d2rpick.cli import rollover
-from d2rpick.cli.progress import Count
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import RigidWindow, simulate
-from d2rpick.models.rollover.scan import scan
 from d2rpick.report import figures_models
 from tests.command import answer, codes, run
 from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from matplotlib.lines import Line2D
 
-    from d2rpick.models.rollover.record import Record
-    from d2rpick.models.rollover.scan import Outcome
 
 SMALL = ("--mesh", "4", "--dt", "5e-4")
 SHORT = (*SMALL, "--t-end", "0.12")
+SCAN = ("rollover", "--scan", "--jobs", "1", "--mesh", "4", "--dt", "1e-3", "--t-end", "0.11")
 COLUMNS = (
     "time,x,z,roll,vx,vz,omega,internal_energy,kinetic_energy,momentum_x,momentum_z,step_internal_energy,"
     "step_kinetic_energy,contact_energy,frictional_contact_energy,stonewall_energy,damping_energy,external_work,"
     "total_energy,energy_ratio"
 )
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _short_scans_computed_once() -> Iterator[None]:
-    """A scan takes few times, and is not computed again where it is asked for in another form."""
-    known: dict[tuple[object, ...], list[Outcome]] = {}
-
-    def scanned(
-        parameters: Parameters, reference: Record, times: Sequence[float], td: float, jobs: int | None = None
-    ) -> Iterator[Outcome]:
-        key = (parameters, reference.time.tobytes(), *times, td)
-        if key not in known:
-            known[key] = list(scan(parameters, reference, times, td, jobs))
-        yield from known[key]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("d2rpick.models.rollover.scan.scan", scanned)
-        patch.setattr("d2rpick.models.rollover.scan._FINE", 0.006)
-        yield
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.h5", "run.glstat", "run.matsum"])
@@ -136,7 +111,7 @@ def points(line: Line2D) -> np.ndarray:
 
 
 def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
-    asked = ("rollover", "--scan", "--jobs", "1", "--td", "0.14", "--t-end", "0.15", "-q", *SMALL)
+    asked = (*SCAN, "--td", "0.1", "-q")
     plot = tmp_path / "scan.png"
     found = json.loads(run(*asked, "-f", "json", "--plot", str(plot)).stdout)
     check_by_schema(found)
@@ -150,7 +125,7 @@ def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
 
 
 def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
-    asked = ("rollover", "--scan", "--jobs", "1", "--td", "0.06", "--t-end", "0.1", *SMALL)
+    asked = (*SCAN, "--td", "0.06")
     result = run(*asked, "-f", "markdown")
     assert result.stdout.startswith("| tr |")
     told = {line.split(": ")[1] for line in result.stderr.splitlines()}
@@ -159,7 +134,7 @@ def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
 
 
 def test_a_scan_at_whose_td_nothing_can_be_recommended_says_so() -> None:
-    asked = ("rollover", "--scan", "--jobs", "1", "--td", "0.04", "--t-end", "0.1", *SMALL)
+    asked = (*SCAN, "--td", "0.04")
     assert run(*asked, "-q").stdout.endswith("\n\nrecommended  none\n")
     assert [run(*asked, *extra).exit_code for extra in ((), ("-f", "csv"), ("--exit-zero",))] == [1, 1, 0]
     found = answer(*asked)
@@ -170,23 +145,6 @@ def test_a_scan_at_whose_td_nothing_can_be_recommended_says_so() -> None:
 def test_a_run_that_does_not_balance_its_energy_says_so() -> None:
     assert "warning: energy-balance:" in run("rollover", *SHORT, "--damping", "300").stderr
     assert run("rollover", *SHORT).stderr == ""
-
-
-@pytest.mark.parametrize("quiet", [False, True])
-def test_the_runs_of_a_scan_are_counted(quiet: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    counted: list[tuple[Count, bool]] = []
-
-    @contextmanager
-    def counting(total: int, *, quiet: bool) -> Iterator[Count]:
-        counted.append((Count(total), quiet))
-        yield counted[-1][0]
-
-    monkeypatch.setattr(rollover, "counting", counting)
-    asked = ("rollover", "--scan", "--jobs", "1", "--td", "0.1", "--t-end", "0.11", "--mesh", "4", "--dt", "1e-3")
-    run(*asked, *(["-q"] if quiet else []))
-    ((count, silent),) = counted
-    assert count.done == count.total > 1
-    assert silent == quiet
 
 
 @pytest.mark.parametrize(

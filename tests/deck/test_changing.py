@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import builtins
 import itertools
 import os
+import shutil
+import time
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from d2rpick.deck import marks, read_deck, source, stored, writing
+from d2rpick.deck import read_deck
 from d2rpick.deck.folder import main_decks
 from d2rpick.deck.inventory import read_inventory
 from d2rpick.deck.printing import cards
 from d2rpick.deck.printing.common import Printing
+from d2rpick.deck.writing import write_deck
 from d2rpick.errors import DeckError
 from d2rpick.rules import RULES, check_deck
 from d2rpick.rules.example_decks import BACK, GOOD, PARTS, THERE
@@ -22,7 +27,7 @@ from tests.decks import spans, write
 from tests.sample_deck import DECK
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable
+    from collections.abc import Callable, Hashable, Iterator
 
 WINDOW = [(1, 0.02, 0.09)]
 RUN = RULES["D2R401"].passing[0]
@@ -32,17 +37,37 @@ ONCE = f"*KEYWORD\n{PARTS}*INCLUDE\ncards.k\n*END\n"
 TWICE = ONCE.replace("*END", f"*INCLUDE_TRANSFORM\ncards.k\n{0:10d}{0:10d}{1:10d}\n*END")
 
 
-@pytest.fixture(params=["small", "big", "big, by threads"])
-def size(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Treat every file as a small one, or as a big one that is read in small pieces."""
-    if request.param != "small":
-        for module, name, value in ((stored, "_HELD", 0), (stored, "_WINDOW", 400), (source, "_PIECE", 300)):
-            monkeypatch.setattr(module, name, value)
-        monkeypatch.setattr(marks, "_PIECE", 200)
-    if request.param.endswith("threads"):
-        monkeypatch.setattr(marks, "_ALONE", 0)
-        monkeypatch.setattr(marks, "_HELPERS", 2)
-    return str(request.param)
+# Bytes beside what a deck holds: a file of more than 256 KiB stays on its disk, one of more than 4 MiB is searched by
+# threads and read in pieces.
+SIZES = {"small": 0, "big": 300_000, "big, by threads": 5_000_000}
+
+
+def grown(text: str, size: str) -> str:
+    """A deck with so many comments in its middle, where a cut leaves half of it."""
+    middle = text.index("\n", len(text) // 2) + 1
+    sign = "#" if text[0] in "#/" else "$"
+    return text[:middle] + (sign + "x" * 98 + "\n") * (SIZES[size] // 100) + text[middle:]
+
+
+@contextmanager
+def changed_after(turns: int, change: Callable[[], None]) -> Iterator[list[int]]:
+    """Change something before a file is opened or read once so many turns are over; the number of turns."""
+    taken: list[int] = []
+
+    def at_the_turn(function: Callable[..., Any]) -> Callable[..., Any]:
+        def called(*args: Any, **options: Any) -> Any:
+            taken.append(len(taken))
+            if taken[-1] == turns:
+                change()
+            return function(*args, **options)
+
+        return called
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(builtins, "open", at_the_turn(open))
+        if hasattr(os, "preadv"):
+            patch.setattr(os, "preadv", at_the_turn(os.preadv))
+        yield taken
 
 
 def cut(file: Path, _: str) -> None:
@@ -108,40 +133,32 @@ CASES = {
     "engine": (verdict, RUN.deck, RUN.files, "box_0002.rad", "#\n" + RUN.files["box_0002.rad"].replace(".09", ".07")),
     "elements": (parts, DECK.read_text(), {}, "main.k", DECK.read_text().replace("*ELEMENT", "$\n*ELEMENT")[:9000]),
 }  # fmt: skip
+THREADED = ("deck", "elements")  # what is asked of one file does not depend on how many there are
 
 
 @pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    ("case", "size"), [(case, size) for case in CASES for size in SIZES if "threads" not in size or case in THREADED]
+)
 def test_a_change_at_any_moment_gives_one_of_the_states_or_an_error(
-    case: str, change: Callable[[Path, str], None], size: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    case: str, change: Callable[[Path, str], None], size: str, tmp_path: Path
 ) -> None:
     ask, deck, files, changed, text = CASES[case]
     name = RUN.name if deck is RUN.deck else "main.k"
-    path, file = write(tmp_path, deck, files, name), tmp_path / changed
+    texts = {**files, name: deck}
+    texts[changed], text = grown(texts[changed], size), grown(text, size)
+    path, file = write(tmp_path, texts[name], texts, name), tmp_path / changed
     before = answer(ask, path)
     change(file, text)
     after = answer(ask, path)
     assert before != after
-    waiting = itertools.count()
-
-    def at_the_turn(function: Callable[..., Any]) -> Callable[..., Any]:
-        def called(*args: object) -> object:
-            if next(waiting) == 0:
-                change(file, text)
-            return function(*args)
-
-        return called
-
-    monkeypatch.setattr(stored, "_opened", at_the_turn(stored._opened))
-    monkeypatch.setattr(stored.OnDisk, "_fill", at_the_turn(stored.OnDisk._fill))
     found = set()
-    step = 7 if ask is parts else 1
     for turn in itertools.count():
-        write(tmp_path, deck, files, name)
+        write(tmp_path, texts[name], texts, name)
         age(tmp_path)
-        waiting = itertools.count(-turn * step)
-        found.add(answer(ask, path))
-        if next(waiting) <= 0:
+        with changed_after(turn, lambda: change(file, text)) as taken:
+            found.add(answer(ask, path))
+        if len(taken) <= turn:
             break  # it was read before the change
     errors = {one for one in found if isinstance(one, str)} - {before, after}
     assert found - errors <= {before, after}
@@ -151,11 +168,12 @@ def test_a_change_at_any_moment_gives_one_of_the_states_or_an_error(
         assert any("rewritten or replaced while it was read" in one for one in errors)
 
 
+@pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("change", CHANGES)
 def test_rows_that_are_read_late_are_those_of_the_keywords(
     change: Callable[[Path, str], None], size: str, tmp_path: Path
 ) -> None:
-    deck = read_deck(write(tmp_path, GOOD))
+    deck = read_deck(write(tmp_path, grown(GOOD, size)))
     age(tmp_path)
     deck = read_deck(deck.path)
     change(tmp_path / "main.k", LATER)
@@ -166,55 +184,70 @@ def test_rows_that_are_read_late_are_those_of_the_keywords(
             spans(deck)
 
 
-def test_what_is_written_is_what_was_checked(size: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh = "*NODE\n" + "$ of a mesh\n" * 100
-    main = write(tmp_path, f"*KEYWORD\n{PARTS}{mesh}*INCLUDE\nmore.k\n*END\n", {"more.k": mesh})
-    age(tmp_path)
-    look = writing._refuse_switched
+@pytest.mark.parametrize("size", ["small", "big"])
+def test_what_is_written_is_what_was_checked(size: str, tmp_path: Path) -> None:
+    """Whenever both files are written anew with cards in them, which would have been refused."""
+    mesh = grown("*NODE\n$ of a mesh\n", size)
+    text, files = f"*KEYWORD\n{PARTS}{mesh}*INCLUDE\nmore.k\n*END\n", {"more.k": mesh}
+    asked = str(tmp_path / "main.k"), cards([(0.02, 0.09)], Printing(part=(1,))), str(tmp_path / "next")
 
-    def then_change(*args: Any) -> None:
-        look(*args)
+    def change() -> None:
         rewrite(tmp_path / "main.k", LATER)
         rewrite(tmp_path / "more.k", THERE)
 
-    monkeypatch.setattr(writing, "_refuse_switched", then_change)
-    asked = main, cards([(0.02, 0.09)], Printing(part=(1,))), str(tmp_path / "next")
-    if size == "small":
-        written, _, more = writing.write_deck(*asked)
-        assert PARTS in Path(written).read_text()
-        assert Path(more).read_text() == mesh
-    else:
-        with pytest.raises(DeckError, match="rewritten or replaced"):
-            writing.write_deck(*asked)
-        assert not (tmp_path / "next").exists()
+    refusals = set()
+    for turn in itertools.count():
+        write(tmp_path, text, files)
+        age(tmp_path)
+        with changed_after(turn, change) as taken:
+            try:
+                written, _, more = write_deck(*asked)
+            except DeckError as error:
+                refusals.add(str(error).split(": ")[1])
+                assert not (tmp_path / "next").exists()
+            else:
+                assert PARTS + mesh in Path(written).read_text()
+                assert Path(more).read_text() == mesh
+                shutil.rmtree(tmp_path / "next")
+        if len(taken) <= turn:
+            break
+    assert {one.partition(";")[0] for one in refusals} == {
+        "the file was rewritten or replaced while it was read",
+        "the deck switches part 1 already",
+    }
 
 
-@pytest.mark.usefixtures("size")
+@pytest.mark.usefixtures("new_files")
+@pytest.mark.parametrize("size", ["small", "big"])
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
 def test_a_deck_that_is_half_saved_is_read_when_it_is_whole(
-    share: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    size: str, share: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    written = int(share * len(GOOD))
-    path = write(tmp_path, GOOD[:written])
+    text = grown(GOOD, size)
+    written = int(share * len(text))
+    path = write(tmp_path, text[:written])
 
     def write_the_rest(_: float) -> None:
         if (tmp_path / "main.k").stat().st_size == written:
-            write(tmp_path, GOOD)
+            write(tmp_path, text)
 
-    monkeypatch.setattr("d2rpick.file_state.time.sleep", write_the_rest)
+    monkeypatch.setattr(time, "sleep", write_the_rest)
     assert spans(read_deck(path)) == WINDOW
 
 
-@pytest.mark.usefixtures("size")
-def test_a_deck_that_changes_all_the_time_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, number = write(tmp_path, GOOD), itertools.count()
-    monkeypatch.setattr("d2rpick.file_state.time.sleep", lambda _: write(tmp_path, f"${'x' * next(number)}\n{GOOD}"))
+@pytest.mark.usefixtures("new_files")
+@pytest.mark.parametrize("size", ["small", "big"])
+def test_a_deck_that_changes_all_the_time_is_an_error(
+    size: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, number = grown(GOOD, size), itertools.count()
+    path = write(tmp_path, text)
+    monkeypatch.setattr(time, "sleep", lambda _: write(tmp_path, f"${'x' * next(number)}\n{text}"))
     with pytest.raises(DeckError, match=r"main\.k: the file keeps changing while it is read; read it again"):
         read_deck(path)
     assert main_decks(str(tmp_path)) == [path]  # it is not passed over
 
 
-@pytest.mark.usefixtures("size")
 def test_a_pipe_gives_its_bytes_once_and_hangs_no_folder(tmp_path: Path) -> None:
     main, pipe = write(tmp_path, GOOD), tmp_path / "pipe.k"
     os.mkfifo(pipe)
@@ -225,10 +258,11 @@ def test_a_pipe_gives_its_bytes_once_and_hangs_no_folder(tmp_path: Path) -> None
     writer.join()
 
 
+@pytest.mark.usefixtures("new_files")
 def test_no_folder_of_decks_waits_for_what_a_solver_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     main, waited = write(tmp_path, GOOD), list[float]()
     with (tmp_path / "d3plot").open("wb") as results:
         results.truncate(20 << 30)
-    monkeypatch.setattr("d2rpick.file_state.time.sleep", waited.append)
+    monkeypatch.setattr(time, "sleep", waited.append)
     assert main_decks(str(tmp_path)) == [main]
     assert sum(waited) < 1

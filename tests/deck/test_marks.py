@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import builtins
 import errno
 import io
+import os
 import re
 import time
+from contextlib import contextmanager
 from threading import Event, current_thread, main_thread
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.deck import marks, source, stored
 from d2rpick.deck.marks import find_marks
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.stored import Held, OnDisk
@@ -22,8 +24,9 @@ from d2rpick.file_state import FileState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from io import FileIO
     from pathlib import Path
+
+    from d2rpick.deck.stored import Filling
 
 HEAD = b"-----BEGIN PGP MESSAGE"
 MARK = b"\xef\xbb\xbf"
@@ -43,6 +46,12 @@ def line_by_line(data: bytes) -> Iterator[int]:
         start += len(line)
 
 
+def on_disk(file: Path, window: int = 64) -> OnDisk:
+    """A file that stays on its disk, and is read in small pieces."""
+    with file.open("rb", buffering=0) as opened:
+        return OnDisk(str(file), FileState.of(opened), window)
+
+
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("marks") / "deck.k"
@@ -56,83 +65,85 @@ def test_pieces_and_threads_find_what_a_look_at_every_line_finds(
     expected = [*line_by_line(data)]
     assert [*find_marks(Held(data))] == expected
     blocks = [(one.start, one.end, one.head, one.line, [*one.lines()]) for one in SourceFile("held", data).blocks()]
-    with pytest.MonkeyPatch.context() as small:
-        for module, name, value in (
-            *((marks, "_PIECE", piece), (marks, "_ALONE", 0), (marks, "_HELPERS", helpers)),
-            *((stored, "_HELD", -1), (stored, "_WINDOW", window)),
-            *((source, "_PIECE", piece), (source, "_COUNTED", piece), (source, "_FIRST", 0)),
-        ):
-            small.setattr(module, name, value)
-        on_disk = SourceFile(str(file))
-        assert isinstance(on_disk._file, OnDisk)
-        assert [*on_disk.marks] == [*find_marks(Held(data))] == expected
-        assert [(one.start, one.end, one.head, one.line, [*one.lines()]) for one in on_disk.blocks()] == blocks
+    there = on_disk(file, window)
+    for content in (there, Held(data)):
+        assert [*find_marks(content, piece, alone=0, helpers=helpers)] == expected
+    source = SourceFile(str(file), there, piece)
+    assert [*source.marks] == expected
+    assert [(one.start, one.end, one.head, one.line, [*one.lines()]) for one in source.blocks()] == blocks
 
 
 @given(FILES, st.integers(1, 40), st.integers(0, 90), st.none() | st.integers(0, 120))
 def test_pieces_are_whole_lines(file: Path, data: bytes, size: int, start: int, end: int | None) -> None:
     file.write_bytes(data)
-    with pytest.MonkeyPatch.context() as small:
-        small.setattr(stored, "_HELD", -1)
-        small.setattr(stored, "_WINDOW", 2 * size)
-        small.setattr(source, "_PIECE", size)
-        pieces = [*SourceFile(str(file)).pieces(start, end)]
+    pieces = [*SourceFile(str(file), on_disk(file, 2 * size), size).pieces(start, end)]
     assert b"".join(pieces) == data[start:end]
     assert all(piece.endswith(b"\n") for piece in pieces[:-1])
     assert all(pieces)
 
 
-def test_a_call_of_the_system_that_gives_less_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr("os.preadv", raising=False)  # not every system has it
+class Sparing(io.FileIO):
+    """A file that gives three bytes at a time."""
 
-    class Sparing(io.BytesIO):
-        """Gives three bytes at a time."""
-
-        def readinto(self, room: memoryview, /) -> int:  # type: ignore[override]
-            return super().readinto(room[:3])
-
-    on_disk = OnDisk("deck.k", FileState(0, 0, 10, 0, 0, settled=True))
-    file: Any = Sparing(b"0123456789")
-    room = bytearray(8)
-    assert on_disk._fill(file, room, 1, 9) == 8
-    assert bytes(room) == b"12345678"
-    with pytest.raises(DeckError, match="rewritten"):
-        on_disk._fill(file, room, 5, 12)
+    def readinto(self, room: memoryview, /) -> int:  # type: ignore[override]
+        return super().readinto(room[:3])
 
 
-def test_what_goes_wrong_in_a_thread_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_call_of_the_system_that_gives_less_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "deck.k"
-    path.write_bytes(b"*NODE\n" * 100)
-    for module, name, value in ((marks, "_ALONE", 0), (marks, "_PIECE", 64), (stored, "_HELD", 0)):
-        monkeypatch.setattr(module, name, value)
-    fill = OnDisk._fill
+    path.write_bytes(b"0123456789")
+    there = on_disk(path, window=1)
+    monkeypatch.delattr("os.preadv", raising=False)  # not every system has it
+    monkeypatch.setattr(builtins, "open", lambda name, mode, **_: Sparing(name, mode))
+    assert there.read(1, 9) == b"12345678"
+    os.truncate(path, 6)
+    with pytest.raises(DeckError, match="rewritten"):
+        there.read(1, 9)
 
-    def failing(self: OnDisk, opened: FileIO, room: bytearray, begin: int, end: int) -> int:
-        if begin > 300:
-            raise OSError(errno.EIO, "Input/output error")
-        return fill(self, opened, room, begin, end)
 
-    monkeypatch.setattr(OnDisk, "_fill", failing)
+class Failing(Held):
+    """Bytes that a disk gives up to a place."""
+
+    @contextmanager
+    def opened(self) -> Iterator[Filling]:
+        def failing(room: bytearray, begin: int, end: int) -> int:
+            if begin > 300:
+                raise OSError(errno.EIO, "Input/output error")
+            return fill(room, begin, end)
+
+        with super().opened() as fill:
+            yield failing
+
+
+def test_what_goes_wrong_in_a_thread_is_said() -> None:
     with pytest.raises(OSError, match="Input/output"):
-        find_marks(stored.stored(str(path)))
+        find_marks(Failing(b"*NODE\n" * 100), 64, alone=0)
 
 
-def test_no_thread_goes_on_where_a_search_is_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, interrupted, searched = tmp_path / "deck.k", Event(), []
-    path.write_bytes(b"*NODE\n" * 200)
-    for module, name, value in ((marks, "_PIECE", 1), (stored, "_HELD", 0)):
-        monkeypatch.setattr(module, name, value)
+class Interrupted(Held):
+    """Bytes of which the main thread reads none: it is interrupted before."""
 
-    def starred(_: bytearray, __: int, end: int) -> list[int]:
-        if current_thread() is main_thread():
-            interrupted.set()
-            raise KeyboardInterrupt
-        interrupted.wait()
-        time.sleep(0.001)
-        searched.append(end)
-        return []
+    def __init__(self, data: bytes) -> None:
+        super().__init__(data)
+        self.interrupted, self.searched = Event(), 0
 
-    monkeypatch.setattr(marks, "_starred", starred)
+    @contextmanager
+    def opened(self) -> Iterator[Filling]:
+        def interrupted(room: bytearray, begin: int, end: int) -> int:
+            if current_thread() is main_thread():
+                self.interrupted.set()
+                raise KeyboardInterrupt
+            self.interrupted.wait()
+            time.sleep(0.001)
+            self.searched += 1
+            return fill(room, begin, end)
+
+        with super().opened() as fill:
+            yield interrupted
+
+
+def test_no_thread_goes_on_where_a_search_is_interrupted() -> None:
+    file = Interrupted(b"*NODE\n" * 200)
     with pytest.raises(KeyboardInterrupt):
-        find_marks(stored.stored(str(path)))
-    assert len(searched) < 600
+        find_marks(file, 1, alone=0)
+    assert file.searched < 600

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.deck import read_deck, read_switching
-from d2rpick.deck.source import SourceFile
+from d2rpick.deck.marks import find_marks
+from d2rpick.deck.stored import Held
 from d2rpick.errors import DeckError
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
-from tests.decks import found, read, spans, write
+from tests.decks import found, read, spans
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -98,13 +99,11 @@ def test_encrypted_blocks_are_found_and_end_the_card_before(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("chunk", [37, 64, 100])
-def test_no_cut_between_chunks_hides_a_keyword(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
+def test_no_cut_between_chunks_hides_a_keyword(chunk: int) -> None:
     text = (GOOD + "-----BEGIN PGP MESSAGE-----\nA\n").replace(END, "")
-    path = write(tmp_path, text)
-    whole = [(block.start, block.end, block.head, block.line) for block in SourceFile(path).blocks()]
+    whole = find_marks(Held(text.encode()))
     assert len(whole) == text.count("\n*") + 2
-    monkeypatch.setattr("d2rpick.deck.marks._PIECE", chunk)
-    assert [(block.start, block.end, block.head, block.line) for block in SourceFile(path).blocks()] == whole
+    assert [*find_marks(Held(text.encode()), chunk)] == [*whole]
 
 
 def transform(offsets: str = "", rest: str = "", factors: str = "") -> str:
@@ -220,8 +219,7 @@ def test_a_chain_of_includes_ends(tmp_path: Path) -> None:
     assert "deeper" in unread.reason
 
 
-def test_includes_that_multiply_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("d2rpick.deck.reader._MOST_FILES", 500)
+def test_includes_that_multiply_are_an_error(tmp_path: Path) -> None:
     files = {f"{n}.k": f"*INCLUDE\n{n + 1}.k\n{n + 1}.k\n" for n in range(20)} | {"20.k": ""}
     with pytest.raises(DeckError, match="more than"):
         read(tmp_path, "*INCLUDE\n0.k\n", files)

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext, suppress
 from itertools import cycle
 from threading import Event, Thread
+from time import sleep
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -20,40 +21,30 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.overview import survey
 from d2rpick.errors import ChangedError, D2RPickError
-from d2rpick.histories import content
-from d2rpick.histories.content import Content, OnDisk, stored
+from d2rpick.histories.content import Content
 from d2rpick.histories.formats import csv_table
-from d2rpick.histories.opening import Selection, open_run
+from d2rpick.histories.opening import Run, Selection
 from tests.hdf5_files import ENERGY, plain, written
 from tests.histories.test_source import CONTENTS, TIMES
 from tests.made_binout import binout
 from tests.made_t01 import t01
-from tests.reading import read_history
+from tests.reading import on_disk, read_history, run_of_file, run_on_disk
 from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
+
+pytestmark = pytest.mark.usefixtures("new_files")
 
 STATES = np.arange(400)
 ONE, OTHER = (glstat_text(STATES / 8, energy + STATES) for energy in (1000.0, 2000.0))
 TABLES = [csv_table.write({"time": STATES / 8, "IE": np.float64(energy) + STATES}) for energy in (1000.0, 2000.0)]
 
 
-@pytest.fixture
-def on_disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Treat every file as a big one, and read it in small pieces."""
-    for name, size in (("_HELD", 0), ("_BLOCK", 256), ("_NEAR", 32), ("_WINDOW", 64)):
-        monkeypatch.setattr(content, name, size)
+OPENERS = pytest.mark.parametrize("opened", [run_of_file, run_on_disk], ids=["in memory", "on disk"])
 
 
-def opened(file: Path) -> OnDisk:
-    found = stored(str(file))
-    assert isinstance(found, OnDisk)
-    return found
-
-
-@pytest.mark.usefixtures("on_disk")
 @given(
     st.binary(min_size=8, max_size=3000),
     st.lists(st.integers(0, 2995), max_size=60),
@@ -66,7 +57,7 @@ def test_bytes_on_a_disk_are_those_in_memory(
 ) -> None:
     file = tmp_path_factory.getbasetemp() / "bytes"
     file.write_bytes(data)
-    held, there = Content(data), opened(file)
+    held, there = Content(data), on_disk(file)
     addresses = np.array([place % (len(data) - width + 1) for place in places], dtype=np.int64)
     assert there.fields(addresses, width).tolist() == held.fields(addresses, width).tolist()
     assert (len(there), bytes(there), there[begin:size]) == (len(held), data, held[begin:size])
@@ -78,11 +69,10 @@ def test_bytes_on_a_disk_are_those_in_memory(
     assert there.sha256() == hashlib.sha256(data).hexdigest()
 
 
-@pytest.mark.usefixtures("on_disk")
 def test_threads_that_read_one_file_together_get_each_what_it_asks_for(tmp_path: Path) -> None:
     data = np.random.default_rng(5).bytes(2000)
     (tmp_path / "bytes").write_bytes(data)
-    there = opened(tmp_path / "bytes")
+    there = on_disk(tmp_path / "bytes")
     places = np.arange(0, 1960, 40)
 
     def wrong(step: int) -> int:
@@ -102,14 +92,10 @@ def test_threads_that_read_one_file_together_get_each_what_it_asks_for(tmp_path:
 
 
 @pytest.mark.parametrize("kind", CONTENTS)
-def test_every_format_is_read_alike_from_a_disk_and_from_memory(
-    kind: str, tmp_path: Path, request: pytest.FixtureRequest
-) -> None:
+def test_every_format_is_read_alike_from_a_disk_and_from_memory(kind: str, tmp_path: Path) -> None:
     file = tmp_path / "run"
     file.write_bytes(CONTENTS[kind])
-    held = open_run([str(file)])
-    request.getfixturevalue("on_disk")
-    there = open_run([str(file)])
+    held, there = run_of_file(file), run_on_disk(file)
     assert (held.notes, held.parts) == (there.notes, there.parts)
     for found, expected in zip(there.databases, held.databases, strict=True):
         assert found.channels == expected.channels
@@ -122,11 +108,10 @@ def test_every_format_is_read_alike_from_a_disk_and_from_memory(
     assert there.files[0].sha256() == hashlib.sha256(CONTENTS[kind]).hexdigest()
 
 
-@pytest.mark.usefixtures("on_disk")
 def test_what_is_appended_does_not_count(tmp_path: Path) -> None:
     file = tmp_path / "glstat"
     file.write_bytes(ONE)
-    run = open_run([str(file)])
+    run = run_on_disk(file)
     with file.open("ab") as more:
         more.write(OTHER)
     history = run.history(Selection())
@@ -134,11 +119,10 @@ def test_what_is_appended_does_not_count(tmp_path: Path) -> None:
     assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()
 
 
-@pytest.mark.usefixtures("on_disk")
 def test_a_file_replaced_by_another_is_read_as_it_was(tmp_path: Path) -> None:
     file, newer = tmp_path / "glstat", tmp_path / "newer"
     file.write_bytes(ONE)
-    run = open_run([str(file)])
+    run = run_on_disk(file)
     newer.write_bytes(OTHER)
     newer.replace(file)
     history = run.history(Selection())
@@ -146,12 +130,11 @@ def test_a_file_replaced_by_another_is_read_as_it_was(tmp_path: Path) -> None:
     assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()
 
 
-@pytest.mark.usefixtures("on_disk")
 @pytest.mark.parametrize(("rest", "reason"), [(b"", "became shorter|written anew"), (OTHER, "rewritten")])
 def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, rest: bytes, reason: str) -> None:
     file = tmp_path / "glstat"
     file.write_bytes(ONE)
-    run = open_run([str(file)])
+    run = run_on_disk(file)
     file.write_bytes(rest)
     with pytest.raises(D2RPickError, match=reason):
         run.databases[0].channel("kinetic energy")
@@ -160,17 +143,12 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, 
 
 
 @pytest.mark.parametrize("contents", [(ONE, OTHER), TABLES], ids=["glstat", "csv"])
-@pytest.mark.parametrize("kept", [True, False], ids=["in memory", "on disk"])
+@OPENERS
 def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_an_error(
-    kept: bool,
-    contents: Sequence[bytes],
-    tmp_path: Path,
-    request: pytest.FixtureRequest,
-    monkeypatch: pytest.MonkeyPatch,
+    opened: Callable[[Path], Run], contents: Sequence[bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if not kept:
-        request.getfixturevalue("on_disk")
-    monkeypatch.setattr("d2rpick.file_state.PAUSE", 0.005)  # ten times as long as between two of the writes
+    # pauses of a tenth of their length, ten times as long as between two of the writes
+    monkeypatch.setattr(time, "sleep", lambda seconds: sleep(seconds / 10))
     file, done = tmp_path / "run", Event()
     one, other = contents
     file.write_bytes(one)
@@ -188,7 +166,7 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
     try:
         for _ in range(60):
             try:
-                energy = read_history([str(file)]).energy
+                energy = opened(file).history(Selection()).energy
             except D2RPickError as error:
                 assert "\n" not in str(error)  # noqa: PT017
             else:
@@ -198,13 +176,11 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
         writer.join()
 
 
-@pytest.mark.parametrize("kept", [True, False], ids=["in memory", "on disk"])
+@OPENERS
 @pytest.mark.parametrize("share", [0.001, 0.5, 0.999])
 def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_stands(
-    kept: bool, share: float, tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+    opened: Callable[[Path], Run], share: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if not kept:
-        request.getfixturevalue("on_disk")
     file, written = tmp_path / "glstat", int(share * len(ONE))
     file.write_bytes(OTHER[:written] + ONE[written:])
 
@@ -213,9 +189,9 @@ def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_st
             target.seek(written)
             target.write(OTHER[written:])
 
-    monkeypatch.setattr("d2rpick.file_state.time.sleep", write_the_rest)
+    monkeypatch.setattr(time, "sleep", write_the_rest)
     try:
-        energy = read_history([str(file)]).energy
+        energy = opened(file).history(Selection()).energy
     except D2RPickError as error:
         assert "rewritten" in str(error)  # noqa: PT017
     else:
@@ -232,7 +208,6 @@ ANEW = {
 }
 
 
-@pytest.mark.usefixtures("on_disk")
 @pytest.mark.parametrize("kind", CONTENTS)
 def test_a_file_of_any_format_that_is_written_anew_between_two_readings_gives_what_it_was(
     kind: str, tmp_path: Path
@@ -241,7 +216,7 @@ def test_a_file_of_any_format_that_is_written_anew_between_two_readings_gives_wh
     file = tmp_path / "run"
     file.write_bytes(CONTENTS[kind])
     whole = read_history([str(file)]).energy.tolist()
-    run = open_run([str(file)])
+    run = run_on_disk(file)
     database = run.databases[0]
     assert (database.time if database.channels else database.part_time).size
     file.write_bytes(ANEW[kind])
@@ -251,19 +226,17 @@ def test_a_file_of_any_format_that_is_written_anew_between_two_readings_gives_wh
         assert run.files[0].sha256() == hashlib.sha256(CONTENTS[kind]).hexdigest()
 
 
-@pytest.mark.usefixtures("on_disk")
 @pytest.mark.parametrize("kind", ["binout", "radioss-th", "matsum"])
 def test_what_is_not_there_since_a_file_was_written_anew_is_not_passed_over(kind: str, tmp_path: Path) -> None:
     file = tmp_path / "run"
     file.write_bytes(CONTENTS[kind])
-    run = open_run([str(file)])
+    run = run_on_disk(file)
     assert run.databases[0].span
     file.write_bytes(ANEW[kind])
     with pytest.raises(ChangedError, match="rewritten"):
         survey(run, Selection())
 
 
-@pytest.mark.usefixtures("on_disk")
 @given(
     st.binary(min_size=8, max_size=3000),
     st.integers(0, 374),
@@ -275,7 +248,7 @@ def test_bytes_that_change_places_or_make_up_for_each_other_are_seen(
 ) -> None:
     file = tmp_path_factory.getbasetemp() / "bytes"
     file.write_bytes(data)
-    there = opened(file)
+    there = on_disk(file)
     there.view(0, len(data))
     words = np.frombuffer(data[: len(data) // 8 * 8], np.uint64).copy()
     one, other = one % words.size, other % words.size
@@ -307,7 +280,6 @@ def fixed_times(monkeypatch: pytest.MonkeyPatch, modified: int, changed: int) ->
 MOMENT, SECOND, HOUR = 1_000_000, 1_000_000_001, 3_600_000_000_001
 
 
-@pytest.mark.usefixtures("on_disk")
 @pytest.mark.parametrize(
     ("modified", "changed"),
     [(MOMENT, MOMENT), (HOUR, MOMENT), (-HOUR, MOMENT), (MOMENT, HOUR), (-MOMENT, -MOMENT)],
@@ -319,7 +291,7 @@ def test_a_change_that_the_times_may_not_show_is_looked_for(
     file = tmp_path / "run"
     file.write_bytes(ONE)
     pauses = fixed_times(monkeypatch, modified, changed)
-    there = opened(file)
+    there = on_disk(file)
     for begin in range(0, 1000, 100):
         there.view(begin, begin + 100)
         there.check()
@@ -330,22 +302,18 @@ def test_a_change_that_the_times_may_not_show_is_looked_for(
 
 
 @pytest.mark.parametrize(("modified", "changed"), [(HOUR, HOUR), (-HOUR, HOUR)], ids=["old", "time set ahead"])
-@pytest.mark.parametrize("kept", [True, False], ids=["in memory", "on disk"])
+@OPENERS
 def test_a_file_that_did_not_change_lately_is_read_without_a_pause(
-    kept: bool, modified: int, changed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    request: pytest.FixtureRequest,
-) -> None:  # fmt: skip
-    if not kept:
-        request.getfixturevalue("on_disk")
+    opened: Callable[[Path], Run], modified: int, changed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = tmp_path / "run"
     file.write_bytes(ONE)
     pauses = fixed_times(monkeypatch, modified, changed)
-    history = read_history([str(file)])
+    history = opened(file).history(Selection())
     assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()
     assert not pauses
 
 
-@pytest.mark.usefixtures("on_disk")
 def test_times_in_whole_seconds_hide_the_changes_of_two(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "run"
     file.write_bytes(ONE)
@@ -356,21 +324,20 @@ def test_times_in_whole_seconds_hide_the_changes_of_two(tmp_path: Path, monkeypa
     times = SimpleNamespace(st_dev=found.st_dev, st_ino=found.st_ino, st_size=found.st_size, st_mode=found.st_mode)
     times.st_mtime_ns = times.st_ctime_ns = here - 3 * 10**9 // 2
     monkeypatch.setattr(os, "fstat", lambda _: times)
-    there = opened(file)
+    there = on_disk(file)
     there.view(0, len(ONE))
     file.write_bytes(OTHER)
     with pytest.raises(D2RPickError, match="rewritten"):
         there.check()
 
 
-@pytest.mark.usefixtures("on_disk")
 def test_a_write_that_began_long_ago_and_went_on_since_is_seen_by_the_signature(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "run"
     file.write_bytes(ONE)
     fixed_times(monkeypatch, SECOND, SECOND)
-    there = opened(file)
+    there = on_disk(file)
     there.view(0, len(ONE))
     file.write_bytes(OTHER)
     with pytest.raises(D2RPickError, match="rewritten"):

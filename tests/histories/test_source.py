@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import gzip
 import io
+import os
 import time
 from contextlib import nullcontext
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.histories import source
-from d2rpick.histories.content import stored
 from d2rpick.histories.opening import READERS, Selection, open_run
-from d2rpick.histories.source import expand
+from d2rpick.histories.source import expand, open_files
 from tests.hdf5_files import plain, written
 from tests.made_binout import binout
 from tests.made_t01 import t01
@@ -25,8 +25,6 @@ from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from d2rpick.histories.content import OnDisk
 
 TIMES = [0.125, 0.25, 0.375]
 CONTENTS = {
@@ -83,30 +81,29 @@ def test_a_folder_holds_the_databases_of_one_run() -> None:
 
 
 @pytest.mark.parametrize("change", ["replaced", "cut", "written anew", "appended", "taken away"])
-def test_files_of_one_run_are_not_mixed_with_those_of_the_next(
-    change: str, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name, kind in (("run.glstat", "glstat"), ("run.matsum", "matsum"), ("next", "glstat")):
-        Path(name).write_bytes(CONTENTS[kind])
+def test_files_of_one_run_are_not_mixed_with_those_of_the_next(change: str, folder: Path) -> None:
+    first, second, whole = folder / "run.glstat", folder / "run.matsum", CONTENTS["glstat"]
+    for name in (first, folder / "next"):
+        name.write_bytes(whole)
+    os.mkfifo(second)
     time.sleep(0.02)  # above the resolution of the file's times
 
-    def stored_while_it_changes(name: str) -> bytes | OnDisk:
-        found = stored(name)
-        if name.endswith("matsum"):
-            first = folder / "run.glstat"
+    def write_the_second() -> None:
+        with second.open("wb") as pipe:  # when it is opened for reading, the first file was read
             if change == "replaced":
                 Path("next").replace(first)
             elif change == "taken away":
                 first.unlink()
             else:
-                whole = CONTENTS["glstat"]
                 first.write_bytes({"cut": whole[:-900], "written anew": whole, "appended": 2 * whole}[change])
-        return found
+            pipe.write(CONTENTS["matsum"])
 
-    monkeypatch.setattr(source, "stored", stored_while_it_changes)
+    writer = Thread(target=write_the_second, daemon=True)
+    writer.start()
     reason = r"run\.glstat: this file was replaced or written anew"
     with nullcontext() if change == "appended" else pytest.raises(FormatError, match=reason):
-        assert len(source.open_files(["run.glstat", "run.matsum"])) == 2
+        assert len(open_files([str(first), str(second)])) == 2
+    writer.join()
 
 
 @pytest.mark.usefixtures("folder")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import shutil
 from contextlib import contextmanager
+from math import isclose
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -64,12 +65,13 @@ class Browser:
         """What the interactive part says under a name."""
         return str(self.find(f'[data-value="{name}"]').get_property("textContent"))
 
-    def spoken(self, roles: set[str]) -> list[dict[str, Any]]:
-        """Elements with these roles as a screen reader finds them; it is told of them a little later."""
+    def spoken(self, roles: set[str], value: float | None = None) -> list[dict[str, Any]]:
+        """Elements with these roles, and this value, as a screen reader finds them, which is told a little later."""
 
         def found(_: webdriver.Chrome) -> list[dict[str, Any]]:
             nodes = self.ask("Accessibility.getFullAXTree")["nodes"]
             used = [node for node in nodes if node["role"]["value"] in roles and not node["ignored"]]
+            used = [node for node in used if value is None or isclose(node["value"]["value"], value, rel_tol=1e-6)]
             return used if {node["role"]["value"] for node in used} == roles else []
 
         return WebDriverWait(self.driver, timeout=20).until(found)

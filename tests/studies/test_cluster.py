@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -13,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from d2rpick.errors import D2RPickError
+from d2rpick.studies.workers import Cluster
 from tests import variants
 from tests.command import ROOT, run
 
@@ -102,13 +105,13 @@ def test_what_cannot_be_read_on_a_cluster_is_a_row_and_no_scheduler_an_error(tmp
     assert (result.exit_code, statuses) == (1, ["ok", "unreadable", None])
 
 
-def test_where_no_scheduler_answers_the_study_ends(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("d2rpick.studies.workers._PATIENCE", 0.3)
-    args = ("study", "--td", str(variants.TD), variants.write(tmp_path / "run.csv"), "--scheduler")
-    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
-        result = run(*args, address)
-        assert (result.exit_code, result.stdout) == (2, "")
-        assert result.stderr.startswith(f"d2rpick: {address}: no answer from a Dask scheduler (")
+def test_where_no_scheduler_answers_the_study_ends(tmp_path: Path) -> None:
+    told = "no answer from a Dask scheduler ("
+    with pytest.raises(D2RPickError, match=f"^tcp://127.0.0.1:9: {re.escape(told)}"):
+        Cluster("tcp://127.0.0.1:9", patience=0.3)
+    result = run("study", "--td", str(variants.TD), variants.write(tmp_path / "run.csv"), "--scheduler", "nonsense://x")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith(f"d2rpick: nonsense://x: {told}")
 
 
 def test_without_the_package_its_name_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

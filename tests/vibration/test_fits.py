@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from d2rpick.choice import examine as examination
 from d2rpick.choice.examine import examine
-from d2rpick.choice.flights import find_flights
 from d2rpick.choice.settings import Settings
-from d2rpick.histories.history import History
 from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.identify import identify
 from tests import paper
 from tests.records import ENERGY, TIME
 
 if TYPE_CHECKING:
-    import pytest
-
-    from d2rpick.vibration.identify import Identification
+    import numpy as np
 
 
 def test_a_window_is_fitted_once_by_each_fitter_and_demand() -> None:
@@ -47,17 +40,3 @@ def test_what_was_fitted_before_changes_no_answer() -> None:
         assert again.evidence.fit is not None
         assert anew.evidence.fit is not None
         assert again.evidence.fit.mode == anew.evidence.fit.mode
-
-
-def test_all_flights_are_found_without_fitting_a_window_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    windows: list[tuple[float, float, bool]] = []
-
-    def counting(time: np.ndarray, energy: np.ndarray, *, quick: bool = False) -> Identification:
-        windows.append((time[0], time[-1], quick))
-        return identify(time, energy, quick=quick)
-
-    monkeypatch.setattr(examination, "identify", counting)
-    time = np.linspace(0.0, 1.0, 200)
-    energy = np.abs(np.random.default_rng(3).standard_normal(200))
-    find_flights(History(time, energy, ("made",), "made", "energy"))
-    assert len(windows) == len(set(windows)) > 20

@@ -19,10 +19,10 @@ BATCH: Final = 1 << 15  # numbers converted at a time: they stay in the cache
 
 
 class Ahead:
-    """Numbers at the same ``offsets`` of all blocks, of so many columns and decimals."""
+    """Numbers at the same ``offsets`` of all blocks, of so many columns and decimals, converted in batches."""
 
-    def __init__(self, offsets: NDArray[np.int64], width: int, decimals: int) -> None:
-        self._offsets, self._width, self._decimals = offsets, width, decimals
+    def __init__(self, offsets: NDArray[np.int64], width: int, decimals: int, batch: int = BATCH) -> None:
+        self._offsets, self._width, self._decimals, self._batch = offsets, width, decimals, batch
         self._waiting: list[NDArray[np.bytes_]] = []
         self._moving = np.zeros(offsets.size, bool)
         self._done: list[Samples] = []
@@ -31,7 +31,7 @@ class Ahead:
         """Take the numbers of further blocks, shape (count, stride), which differ in these bits, shape (stride,)."""
         self._waiting.append(self._fields(rows))
         self._moving |= self._fields(differing[np.newaxis])[0].view(np.uint8).reshape(-1, self._width).any(axis=1)
-        if sum(one.size for one in self._waiting) >= BATCH:
+        if sum(one.size for one in self._waiting) >= self._batch:
             self._convert()
 
     def numbers(self) -> Samples:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from array import array
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,17 @@ Addresses = NDArray[np.int64]
 _RECENT: Final = 4  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
 _NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
-_MANY: Final = 64  # of so many blocks it is remembered what differs between them, a small share of the file
+
+
+class Portions(NamedTuple):
+    """How much of a text is looked at together."""
+
+    many: int = 64  # of so many blocks it is remembered what differs between them, a small share of the file
+    chunk: int = CHUNK  # bytes in which the beginning of a line is looked for
+    batch: int = BATCH  # numbers that are converted
+
+
+PORTIONS: Final = Portions()
 
 
 class Blocks:
@@ -52,6 +62,7 @@ class Blocks:
         What a block looks like.
     ahead : sequence of names, optional
         Numbers that will be asked for first, together: they are taken while all blocks are compared.
+    portions : Portions
 
     Attributes
     ----------
@@ -68,9 +79,10 @@ class Blocks:
     """
 
     def __init__(
-        self, data: bytes | Content, source: str, begin: int, grammar: Grammar, ahead: Sequence[Hashable] = ()
-    ) -> None:
-        self.source = source
+        self, data: bytes | Content, source: str, begin: int, grammar: Grammar, ahead: Sequence[Hashable] = (),
+        portions: Portions = PORTIONS,
+    ) -> None:  # fmt: skip
+        self.source, self._portions = source, portions
         self._data = content_of(data)
         self._grammar = grammar
         self._end = self._data.rfind(b"\n", len(self._data)) + 1
@@ -139,7 +151,8 @@ class Blocks:
 
     def line(self, address: int) -> int:
         """Find the number of the line at ``address``, from 1."""
-        return 1 + sum(self._data[at : min(at + CHUNK, address)].count(b"\n") for at in range(0, address, CHUNK))
+        chunk = self._portions.chunk
+        return 1 + sum(self._data[at : min(at + chunk, address)].count(b"\n") for at in range(0, address, chunk))
 
     def text(self, start: int, size: int) -> bytes:
         """Copy a piece of the whole lines of the file."""
@@ -147,13 +160,13 @@ class Blocks:
 
     def _fetch(self, values: Samples, names: Sequence[Hashable]) -> None:
         """Replace the addresses in ``values`` by the numbers that stand there."""
-        grammar = self._grammar
+        grammar, batch = self._grammar, self._portions.batch
         addresses = values.view(np.int64)
-        for at in range(0, values.size, BATCH):
-            where = addresses[at : at + BATCH].copy()
+        for at in range(0, values.size, batch):
+            where = addresses[at : at + batch].copy()
             fields = self._data.fields(where, grammar.width).view(f"S{grammar.width}").ravel()
             found = decode(fields, grammar.decimals)
-            values[at : at + BATCH] = found
+            values[at : at + batch] = found
             if np.isnan(found).any():
                 self._data.check()
                 bad = int(np.argmax(np.isnan(found)))
@@ -282,7 +295,7 @@ class Blocks:
         """Count the blocks from ``position`` on that look like the example and have another behind them."""
         literal, start = self.layout(example, stride).literal, self._grammar.start
         run = Stretch(position, stride, (self._end - position) // stride, example)
-        if self._compared and run.repeats >= _MANY:
+        if self._compared and run.repeats >= self._portions.many:
             count = self._count_and_take(run, literal)
         elif self._compared:
             count = like_example(self._data, run, 0, literal)
@@ -297,9 +310,10 @@ class Blocks:
         varied, fields = np.zeros_like(literal), self.layout(run.example, run.stride).fields
         offsets = np.array([fields.get(name, UNSURE) for name in self._asked_ahead], dtype=np.int64)
         sure = offsets.size > 0 and not np.any(offsets == UNSURE)
-        ahead = Ahead(offsets, self._grammar.width, self._grammar.decimals) if sure else None
+        form = self._grammar.width, self._grammar.decimals
+        ahead = Ahead(offsets, *form, self._portions.batch) if sure else None
         count = like_example(self._data, run, 0, literal, varied, ahead)
-        if count > _MANY:
+        if count > self._portions.many:
             self._varied[run.start] = varied
             if ahead is not None:
                 self._ahead[run.start] = ahead.numbers()
@@ -351,11 +365,11 @@ class Blocks:
 
     def _find(self, position: int) -> int | None:
         """Address of the next line that begins a block."""
-        start = self._grammar.start
+        start, chunk = self._grammar.start, self._portions.chunk
         if position == 0 and self.text(0, len(start)) == start:
             return 0
-        for at in range(max(0, position - 1), self._end, CHUNK):
-            found = self.text(at, CHUNK + len(start)).find(b"\n" + start)
+        for at in range(max(0, position - 1), self._end, chunk):
+            found = self.text(at, chunk + len(start)).find(b"\n" + start)
             if found >= 0:
                 return at + found + 1
         return None

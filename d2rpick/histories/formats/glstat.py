@@ -15,7 +15,7 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
-from d2rpick.histories.formats.fixed_text import Blocks
+from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
 from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, overlong, release
 from d2rpick.histories.formats.text_head import head, written_head
 
@@ -65,10 +65,12 @@ class Glstat(SolverFile):
     parts: tuple[Part, ...] = ()
     digits = 6
 
-    def __init__(self, data: bytes | Content, source: str, needed: Sequence[str] = ()) -> None:
+    def __init__(
+        self, data: bytes | Content, source: str, needed: Sequence[str] = (), portions: Portions = PORTIONS
+    ) -> None:
         self.source = source
         self.title, self.version, begin = head(data)
-        self._blocks = Blocks(data, source, begin, _GRAMMAR, ahead=(_TIME, _ENERGY))
+        self._blocks = Blocks(data, source, begin, _GRAMMAR, (_TIME, _ENERGY), portions)
         self.channels = self._names()
         names = [_TIME]
         with suppress(FormatError):  # that there is no such line is said when it is read

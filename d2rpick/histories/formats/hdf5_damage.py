@@ -25,17 +25,18 @@ _SLOWEST: Final = 100_000
 _USER_BLOCK: Final = 512  # MATLAB puts it before the file
 
 
-def check_file(file: BinaryIO, source: str) -> None:
+def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
     """FormatError where a file has not the size it says, or the library would crash on it.
 
-    It is read once in a child process, of limited time: what ends that one would end this one, or never end.
+    It is read once in a child process, of limited time, so many seconds and one for each 100 kB: what ends that one
+    would end this one, or never end.
     """
     _check_size_of_file(file, source)
     if not hasattr(os, "fork"):
         return
     child = os.fork()
     if child == 0:
-        _read_and_exit(file)
+        _read_and_exit(file, seconds)
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
@@ -85,7 +86,7 @@ def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
     return head, file.seek(0, os.SEEK_END)
 
 
-def _read_and_exit(file: BinaryIO) -> None:
+def _read_and_exit(file: BinaryIO, seconds: int) -> None:
     """Read all that could crash the library: what describes the data, and data in chunks; errors are not for here."""
     try:
         import faulthandler
@@ -93,7 +94,7 @@ def _read_and_exit(file: BinaryIO) -> None:
 
         faulthandler.disable()
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        limit = _SECONDS + _head_and_size(file)[1] // _SLOWEST
+        limit = seconds + _head_and_size(file)[1] // _SLOWEST
         _, most = resource.getrlimit(resource.RLIMIT_CPU)
         resource.setrlimit(resource.RLIMIT_CPU, (limit if most < 0 else min(limit, most), most))
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)

@@ -17,7 +17,7 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
-from d2rpick.histories.formats.fixed_text import Blocks
+from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
 from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, overlong, release
 from d2rpick.histories.formats.text_head import head, written_head
 from d2rpick.histories.history import Part
@@ -85,7 +85,7 @@ class Matsum(SolverFile):
     channels: tuple[str, ...] = ()
     digits = 5
 
-    def __init__(self, data: bytes | Content, source: str) -> None:
+    def __init__(self, data: bytes | Content, source: str, portions: Portions = PORTIONS) -> None:
         self.title, self.version, begin = head(data)
         self.source = source
         self._legend = _legend(data)
@@ -97,7 +97,7 @@ class Matsum(SolverFile):
             decimals=4,
             compare_all=False,
         )
-        self._blocks = Blocks(data, source, begin, grammar)
+        self._blocks = Blocks(data, source, begin, grammar, portions=portions)
         if not self.version and not self._blocks.states:
             raise FormatError(
                 f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a matsum; "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import islice
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.content import Content
@@ -20,14 +20,17 @@ _UTF8: Final = b"\xef\xbb\xbf"
 # What these lines do not tell about the form of a text, the others will not.
 HEAD: Final = 10_000
 
-# Bytes at a time: their cells stay in the processor's cache.
-_PIECE: Final = 1 << 17
 
-# A text of no more bytes is looked at as a whole to judge the printed format.
-_SHORT: Final = 1 << 16
+class Portions(NamedTuple):
+    """How much of a text is looked at together."""
 
-# How many lines from the start, the end and between are looked at to judge the printed format.
-_SAMPLE: Final = 100
+    head: int = HEAD  # lines that tell its form
+    piece: int = 1 << 17  # bytes: their cells stay in the processor's cache
+    short: int = 1 << 16  # a text of no more bytes is looked at as a whole to judge the printed format
+    sample: int = 100  # of others so many lines from the start, the end and between
+
+
+_PORTIONS: Final = Portions()
 
 
 class Text:
@@ -36,25 +39,25 @@ class Text:
     A big file in plain ASCII stays on its disk.  FormatError for binary data.
     """
 
-    def __init__(self, source: Source) -> None:
-        self.name = source.name
-        self._data, self._encoding = _plain(source)
+    def __init__(self, source: Source, portions: Portions = _PORTIONS) -> None:
+        self.name, self._portions = source.name, portions
+        self._data, self._encoding = _plain(source, portions.piece)
         self._end = self._data.rfind(b"\n", len(self._data)) + 1  # behind the last line that counts
         self.unended = self._text(self._data[self._end :])
 
     @property
     def head(self) -> list[str]:
-        """The first lines that have an end, at most `HEAD` of them."""
-        return self._first[:HEAD]
+        """The first lines that have an end, as many as tell its form."""
+        return self._first[: self._portions.head]
 
     @property
     def is_short(self) -> bool:
         """Whether ``head`` holds all lines but the last one without end."""
-        return len(self._first) <= HEAD
+        return len(self._first) <= self._portions.head
 
     @cached_property
     def _first(self) -> list[str]:
-        return list(islice(self.lines(0), HEAD + 1))
+        return list(islice(self.lines(0), self._portions.head + 1))
 
     def place(self, line: int) -> int:
         """Where a line begins, counted from 0 [byte]; the end of the lines where there are fewer."""
@@ -70,7 +73,7 @@ class Text:
 
         FormatError behind the last of them where the file was written anew meanwhile.
         """
-        size = _PIECE
+        size = self._portions.piece
         while begin < self._end:
             piece = self._data[begin : min(begin + size, self._end)]
             end = piece.rfind(b"\n") + 1
@@ -92,17 +95,17 @@ class Text:
 
     def sample(self, begin: int) -> list[str]:
         """Lines behind byte ``begin`` from the start, the end and evenly between; all of a short text."""
-        data, end = self._data, self._end
-        if end - begin <= _SHORT:
+        data, end, count = self._data, self._end, self._portions.sample
+        if end - begin <= self._portions.short:
             return [] if begin >= end else self._text(data[begin:end]).removesuffix("\n").split("\n")
         starts, first, last = [], begin, end
-        for _ in range(_SAMPLE):
+        for _ in range(count):
             starts.append(first)
             first = data.find(b"\n", first) + 1 or end
-        for _ in range(_SAMPLE):
+        for _ in range(count):
             last = data.rfind(b"\n", max(last - 1, 0)) + 1
             starts.append(last)
-        between = ((first * (_SAMPLE - i) + last * i) // _SAMPLE for i in range(_SAMPLE))
+        between = ((first * (count - i) + last * i) // count for i in range(count))
         starts += (data.find(b"\n", at) + 1 for at in between)
         spans = [(at, data.find(b"\n", at)) for at in starts if begin <= at < end]
         lines = [self._text(data[at : to if to >= 0 else end]) for at, to in spans]
@@ -113,12 +116,12 @@ class Text:
         return data.decode(self._encoding)
 
 
-def _plain(source: Source) -> tuple[Content, str]:
+def _plain(source: Source, piece: int) -> tuple[Content, str]:
     """Text with line feeds alone and no mark before it, and its encoding."""
     data = source.data
     if not isinstance(data, bytes):
-        pieces = (data.glance(at, at + _PIECE) for at in range(0, len(data), _PIECE))
-        if all(piece.isascii() and b"\r" not in piece and b"\0" not in piece for piece in pieces):
+        pieces = (data.glance(at, at + piece) for at in range(0, len(data), piece))
+        if all(one.isascii() and b"\r" not in one and b"\0" not in one for one in pieces):
             return data, "latin-1"  # of which ASCII is a part
     data = bytes(data)
     if data.startswith(UTF16):

@@ -115,13 +115,12 @@ def test_other_kinds(tmp_path: Path, elements: str, expected: dict[int, dict[str
     assert found.notes == ()
 
 
-def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("d2rpick.deck.source._PIECE", 40)
-    text = "".join(row(n, 7) + row(*range(n, n + 8)) for n in range(1, 10))
-    found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}*ELEMENT_SOLID\n{text}*END\n")
-    assert counted(found) == {7: {"solid": 9}}
+def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(tmp_path: Path) -> None:
+    text = "".join(row(n, 7) + row(*range(1, 9)) for n in range(1, 60_001))
+    assert len(text) > 4 << 20  # a piece ends in it
+    for shift in ("", "$" * 63 + "\n"):  # then the other line of an element is the last of a piece
+        found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}*ELEMENT_SOLID\n{shift}{text}*END\n")
+        assert counted(found) == {7: {"solid": 60_000}}
 
 
 def test_ids_move_with_a_transform_and_parts_of_other_files_share_nodes(tmp_path: Path) -> None:

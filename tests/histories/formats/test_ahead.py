@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.formats import ahead, alike, fixed_text
+from d2rpick.histories.content import Content
+from d2rpick.histories.formats.fixed_text import PORTIONS, Portions
 from d2rpick.histories.formats.glstat import Glstat
 from d2rpick.histories.formats.matsum import Matsum
 from tests.text_files import glstat_text, matsum_text
@@ -38,63 +39,55 @@ def damaged(draw: st.DrawFn, *, parts: bool) -> bytes:
     return bytes(text[: draw(st.integers(len(text) // 2, len(text)))] if draw(st.booleans()) else text)
 
 
-def energies_of_model(data: bytes) -> tuple[bytes, ...]:
-    run = Glstat(data, "glstat", ["internal energy"])
+def energies_of_model(data: bytes, portions: Portions) -> tuple[bytes, ...]:
+    run = Glstat(data, "glstat", ["internal energy"], portions)
     return run.time.tobytes(), run.channel("internal energy").tobytes(), run.channel("kinetic energy").tobytes()
 
 
-def energies_of_parts(data: bytes) -> tuple[bytes, ...]:
-    run = Matsum(data, "matsum")
+def energies_of_parts(data: bytes, portions: Portions) -> tuple[bytes, ...]:
+    run = Matsum(data, "matsum", portions)
     asked = ([20], IDS, IDS[::-1])
     return run.part_time.tobytes(), *(run.part_channel("internal_energy", ids).tobytes() for ids in asked)
 
 
-def answer(read: Callable[[bytes], tuple[bytes, ...]], data: bytes) -> tuple[bytes, ...] | None:
+def answer(read: Callable[[bytes, Portions], tuple[bytes, ...]], data: bytes, portions: Portions) -> object:
     """What is read; None where it is refused, for whichever of several damages."""
     try:
-        return read(data)
+        return read(data, portions)
     except FormatError:
         return None
 
 
-def agree(read: Callable[[bytes], tuple[bytes, ...]], data: bytes, many: int, chunk: int, batch: int) -> bool:
-    """Whether it makes no difference that numbers are taken ahead, so many blocks and numbers at a time."""
-    expected = answer(read, data)  # these blocks are too few for it
-    with pytest.MonkeyPatch.context() as small:
-        for module, name, value in (
-            *((fixed_text, "_MANY", many), (alike, "CHUNK", chunk), (fixed_text, "CHUNK", chunk)),
-            *((ahead, "BATCH", batch), (fixed_text, "BATCH", batch)),
-        ):
-            small.setattr(module, name, value)
-        return answer(read, data) == expected
+# Where these blocks are many, numbers are taken ahead.
+SIZES = st.builds(Portions, st.integers(1, 4), st.sampled_from([64, 3000, 1 << 20]), st.integers(1, 12))
 
 
-SIZES = st.integers(1, 4), st.sampled_from([64, 3000, 1 << 20]), st.integers(1, 12)
+@given(damaged(parts=False), SIZES)
+def test_numbers_of_a_glstat(data: bytes, portions: Portions) -> None:
+    assert answer(energies_of_model, data, portions) == answer(energies_of_model, data, PORTIONS)
 
 
-@given(damaged(parts=False), *SIZES)
-def test_numbers_of_a_glstat(data: bytes, many: int, chunk: int, batch: int) -> None:
-    assert agree(energies_of_model, data, many, chunk, batch)
+@given(damaged(parts=True), SIZES)
+def test_numbers_of_a_matsum(data: bytes, portions: Portions) -> None:
+    assert answer(energies_of_parts, data, portions) == answer(energies_of_parts, data, PORTIONS)
 
 
-@given(damaged(parts=True), *SIZES)
-def test_numbers_of_a_matsum(data: bytes, many: int, chunk: int, batch: int) -> None:
-    assert agree(energies_of_parts, data, many, chunk, batch)
+class Noted(Content):
+    """Bytes that remember how many fields were taken out of them."""
+
+    taken = 0
+
+    def fields(self, addresses: np.ndarray, width: int) -> np.ndarray:
+        self.taken += addresses.size
+        return super().fields(addresses, width)
 
 
-def test_what_is_taken_ahead_is_not_fetched(monkeypatch: pytest.MonkeyPatch) -> None:
-    fetched = []
-    fetch = fixed_text.Blocks._fetch
-
-    def noted(self: fixed_text.Blocks, values: np.ndarray, names: list[str]) -> None:
-        fetched.append(values.size)
-        fetch(self, values, names)
-
-    monkeypatch.setattr(fixed_text.Blocks, "_fetch", noted)
+def test_what_is_taken_ahead_is_not_fetched() -> None:
     states = np.arange(200.0)
-    run = Glstat(glstat_text(states, states**2), "glstat", ["internal energy"])
+    data = Noted(glstat_text(states, states**2))
+    run = Glstat(data, "glstat", ["internal energy"])
     assert run.channel("internal energy").tolist() == (states**2).tolist()
-    assert fetched == [2]  # of the last state, behind which no other one begins
+    assert data.taken == 2  # of the last state, behind which no other one begins
 
 
 def test_damage_to_a_number_taken_ahead_is_named_with_its_line() -> None:

@@ -15,7 +15,8 @@ import pytest
 from hypothesis import given
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.formats import hdf5_damage, hdf5_file
+from d2rpick.histories.formats import hdf5_file
+from d2rpick.histories.formats.hdf5_damage import check_file
 from d2rpick.histories.formats.hdf5_file import SavedBinout
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
@@ -214,24 +215,30 @@ def test_a_flipped_bit_in_data_with_a_checksum_is_refused() -> None:
         read(io.BytesIO(bytes(content)))
 
 
-def test_a_crash_of_the_library_is_survived(monkeypatch: pytest.MonkeyPatch) -> None:
-    def crash(_: object) -> None:
+class Fatal(io.BytesIO):
+    """A file on which the library crashes when it reads it."""
+
+    def readinto(self, _: object) -> int:
         os.kill(os.getpid(), signal.SIGSEGV)
-
-    monkeypatch.setattr(hdf5_damage, "_read", crash)
-    with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library crashed on it \(signal 11\)"):
-        read(written(plain))
+        return 0
 
 
-def test_a_library_that_comes_to_no_end_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    def endless(_: object) -> None:
+class Endless(io.BytesIO):
+    """A file that the library reads without end."""
+
+    def readinto(self, _: object) -> int:
         while True:
             pass
 
-    monkeypatch.setattr(hdf5_damage, "_read", endless)
-    monkeypatch.setattr(hdf5_damage, "_SECONDS", 1)
+
+def test_a_crash_of_the_library_is_survived() -> None:
+    with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library crashed on it \(signal 11\)"):
+        check_file(Fatal(written(plain).getvalue()), "run.h5")
+
+
+def test_a_library_that_comes_to_no_end_is_ended() -> None:
     with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library did not finish reading it; the file is damaged"):
-        read(written(plain))
+        check_file(Endless(written(plain).getvalue()), "run.h5", seconds=1)
 
 
 @pytest.mark.parametrize("name", ["segfault", "bitflip_silent", "lost_chunk_zeros"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 import pytest
@@ -10,10 +11,10 @@ from hypothesis import strategies as st
 
 from d2rpick.errors import ChangedError
 from d2rpick.histories import content
-from d2rpick.histories.content import OnDisk, stored
-from d2rpick.histories.formats import text
-from d2rpick.histories.formats.text import Text
+from d2rpick.histories.content import OnDisk
+from d2rpick.histories.formats.text import Portions, Text
 from d2rpick.histories.source import Source
+from tests.reading import on_disk
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,19 +25,12 @@ CONTENTS = st.lists(st.sampled_from([b"0.125,17", b"\n", b"\r\n", b"\xc2\xb5s", 
 )
 
 
-@pytest.fixture
-def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave every file on its disk, and take texts apart in small pieces."""
-    for module, name, size in (
-        (content, "_HELD", 0),
-        (content, "_NEAR", 8),
-        (content, "_WINDOW", 16),
-        (text, "_PIECE", 16),
-        (text, "_SHORT", 32),
-        (text, "_SAMPLE", 3),
-        (text, "HEAD", 5),
-    ):
-        monkeypatch.setattr(module, name, size)
+SMALL = Portions(head=5, piece=16, short=32, sample=3)
+
+
+def on_a_disk(file: Path) -> Text:
+    """A text that stays on its disk and is taken apart in small pieces."""
+    return Text(Source("text", on_disk(file, content.Portions(gap=8, window=16))), SMALL)
 
 
 def lines_of(data: bytes) -> list[str]:
@@ -47,7 +41,6 @@ def lines_of(data: bytes) -> list[str]:
     return found.replace("\r\n", "\n").split("\n")
 
 
-@pytest.mark.usefixtures("small_pieces")
 @given(CONTENTS, st.integers(0, 12), st.booleans())
 @example(b"0.125,17\n" * 20 + b"0.5,1", 3, True)
 @example(b"0.125,17" * 9 + b"\n1,2", 1, False)
@@ -60,7 +53,7 @@ def test_a_text_has_its_lines_from_a_disk_and_from_memory(
     skipped = min(skipped, len(ended))
     lines = [*ended, last][skipped:] if rest and last else ended[skipped:]
     samples = []
-    for found in (Text(Source("text", data)), Text(Source("text", stored(str(file))))):
+    for found in (Text(Source("text", data), SMALL), on_a_disk(file)):
         assert (found.unended, found.head, found.is_short) == (last, ended[:5], len(ended) <= 5)
         begin = found.place(skipped)
         if rest:
@@ -71,21 +64,25 @@ def test_a_text_has_its_lines_from_a_disk_and_from_memory(
     assert {*lines[:3], *lines[-3:]} <= {*samples[0]} <= {*lines}
 
 
-@pytest.mark.usefixtures("small_pieces")
-def test_a_big_plain_text_is_not_taken_into_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(OnDisk, "__bytes__")
+def test_a_big_plain_text_is_not_taken_into_memory(tmp_path: Path) -> None:
+    class TooBig(OnDisk):
+        """A file that the memory does not hold."""
+
+        def __bytes__(self) -> bytes:
+            raise MemoryError
+
     file = tmp_path / "text"
     file.write_bytes(b"time,IE\n" + b"0.125,17\n" * 50)
-    found = Text(Source("text", stored(str(file))))
+    found = Text(Source("text", TooBig("text", os.open(file, os.O_RDONLY))), SMALL)
     assert [*found.lines(found.place(1))] == ["0.125,17"] * 50
 
 
-@pytest.mark.usefixtures("small_pieces")
+@pytest.mark.usefixtures("new_files")
 @pytest.mark.parametrize("read", [lambda found: [*found.lines(0)], lambda found: found.sample(0)])
 def test_a_text_written_anew_since_it_was_opened_is_an_error(read: Callable[[Text], object], tmp_path: Path) -> None:
     file = tmp_path / "text"
     file.write_bytes(b"0.125,17\n" * 50)
-    found = Text(Source("text", stored(str(file))))
+    found = on_a_disk(file)
     file.write_bytes(b"0.125,18\n" * 50)
     with pytest.raises(ChangedError, match="rewritten"):
         read(found)

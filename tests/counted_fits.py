@@ -1,0 +1,25 @@
+"""Fits to windows of a record that are counted."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar
+
+from d2rpick.vibration.fits import Fits
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable
+
+_Found = TypeVar("_Found")
+
+
+class CountedFits(Fits):
+    """What was found in a record, and how often something had to be made."""
+
+    made = 0
+
+    def once(self, key: tuple[Hashable, ...], make: Callable[[], _Found]) -> _Found:
+        def counted() -> _Found:
+            self.made += 1
+            return make()
+
+        return super().once(key, counted)
