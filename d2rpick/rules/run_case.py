@@ -100,8 +100,10 @@ class RunCase(Case):
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:
         """What the starter does to the nodes of the bodies that the legs switch."""
-        starter = self.run.starter
-        if not (starter and (starter.walls or starter.velocities or any(leg.starts for leg in self.run.legs))):
+        starter, legs = self.run.starter, self.run.legs
+        if not self.named or starter is None:
+            return ()
+        if not (starter.walls or starter.velocities or any(leg.starts for leg in legs)):
             return ()
         from d2rpick.deck.inventory.body_flaws import flaws_of  # loads numpy
 

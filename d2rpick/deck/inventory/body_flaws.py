@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.rows import Field
 
 _PENALTY_SINCE: Final = 2026  # version of the format from which on a wall has Iform
-_ROUND: Final = {"CYL", "SPHER"}
-_GEOMETRIES: Final = {*_ROUND, "PLANE", "PARAL"}
+_GEOMETRIES: Final = {"CYL", "SPHER", "PLANE", "PARAL"}
 _WITH_KIND: Final = {"LAGMUL", "THERM"}  # a wall's geometry may stand behind it
 
 
@@ -38,11 +37,9 @@ def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
     """
     starter = run.starter
     bodies = [body for body in starter.bodies if body.node.value in switched] if starter else []
-    if (
-        starter is None
-        or not bodies
-        or not (starter.walls or starter.velocities or any(one.starts for one in run.legs))
-    ):
+    if starter is None or not bodies:
+        return ()
+    if not (starter.walls or starter.velocities or any(leg.starts for leg in run.legs)):
         return ()
     if starter.moved:
         why = "ids of a //SUBMODEL may be moved: what its rigid walls and initial velocities do to /RBODY is not known"
@@ -58,7 +55,7 @@ def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
 
 
 def _unknown(group: int, whose: str, place: Field) -> Flaw:
-    told = f"the nodes of group {group} are not known: what {whose} does to the nodes of rigid bodies was not judged"
+    told = f"the nodes of group {group} of {whose} are not known: what becomes of those of rigid bodies was not judged"
     return Flaw(NOT_FOLLOWED, place, told)
 
 
@@ -112,8 +109,8 @@ def _near(card: Card, node: int, starter: Starter, groups: NodeGroups) -> frozen
     reach, _, diameter = reals(rows[1], 3)
     if reach == 0:
         return frozenset()
-    words = card.name.split("/")[1:]
-    kind = next((word for word in words if word in _GEOMETRIES), "PLANE" if words[0] in _WITH_KIND else "")
+    words = set(card.name.split("/"))
+    kind = next(iter(words & _GEOMETRIES), "PLANE" if words & _WITH_KIND else "")
     points = np.array([reals(row, 3) for row in rows[2:5]])
     if not kind or not len(points) or starter.transformed:
         return None
@@ -122,7 +119,8 @@ def _near(card: Card, node: int, starter: Starter, groups: NodeGroups) -> frozen
         if not (ids == node).any():
             return None
         points[0] = places[ids == node][0]
-    distance = _distance(kind, places, points, diameter / 2)
+    with np.errstate(invalid="ignore", over="ignore"):  # of a field that is no number
+        distance = _distance(kind, places, points, diameter / 2)
     return None if distance is None else frozenset(ids[(distance >= 0) & (distance <= reach) & (ids != node)].tolist())
 
 
