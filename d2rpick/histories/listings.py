@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ def wrong_energies(histories: Iterable[str]) -> Iterator[str]:
 def _ends(path: str) -> tuple[bytes, bytes]:
     """Give the beginning and the end of a file; nothing of one that cannot be read."""
     try:
-        with Path(path).open("rb") as stream:
+        with open(path, "rb") as stream:  # noqa: PTH123  start-up
             head = stream.read(_HEAD)
             stream.seek(max(os.fstat(stream.fileno()).st_size - _TAIL, 0))
             return head, stream.read()
