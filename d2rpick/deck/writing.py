@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from d2rpick.deck import radioss
 from d2rpick.deck.cut import cure, cuts
 from d2rpick.deck.parts import read_parts
-from d2rpick.deck.printing.radioss import off
+from d2rpick.deck.printing.radioss import listed, off
 from d2rpick.deck.radioss.blocks import blocks, keyword
 from d2rpick.deck.radioss.engine import kept_off, read_legs
 from d2rpick.deck.reader import read_deck
@@ -163,7 +163,8 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         kept = (_text(block) for block in further if _repeated(keyword(block), mine))
         named = {node.value for _, _, ids in mine.switched for node in ids}
         others = [node for node in kept_off(run.legs) if node not in named]  # else they would be rigid from time 0
-        yield name, text.encode() + b"".join(kept) + "".join(f"{line}\n" for line in off(others)).encode()
+        lines = listed(others) if mine.cap is None else off(others)  # its text ends with the bodies that it puts off
+        yield name, (text + "".join(f"{line}\n" for line in lines)).encode() + b"".join(kept)
     yield from _copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files})
 
 

@@ -67,6 +67,18 @@ def test_a_card_keeps_off_what_the_run_of_the_deck_keeps_off(tmp_path: Path) -> 
         assert printed.stdout.count("/RBODY/ON\n1808\n/RBODY/OFF\n1809 1810\n") == 1
 
 
+def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> None:
+    for rule, expected in (("D2R406", 1), ("D2R408", 0)):  # the latter's deck has a wheel whose main node is 1809
+        example = RULES[rule].failing[0]
+        files = {"box_0001.rad": "/RUN/box/1\n0.15\n/RBODY/OFF\n1808 1809\n"}
+        deck = write(tmp_path, example.deck, files, example.name)
+        written = tmp_path / rule
+        result = run("plan", "-q", "--node", "1808", "--deck", deck, "--write-deck", str(written), ENERGY)
+        assert (result.exit_code, "error D2R406" in result.stdout) == (expected, bool(expected)), result.stderr
+        legs = sorted(path.read_text() for path in written.glob("box_000[1-9].rad"))
+        assert [leg.count("1809") for leg in legs] == [1] * len(legs)
+
+
 # An engine that reports wrong energies.
 
 

@@ -89,12 +89,13 @@ def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[E
 
 
 def off(nodes: Sequence[int]) -> Iterator[str]:
-    """Put rigid bodies off: in one block, since the starter overlooks the second of two that follow each other."""
+    """Put rigid bodies off; the starter of OpenRadioss overlooks a second such block right behind the first."""
     if nodes:
-        yield from ("/RBODY/OFF", *_listed(nodes))
+        yield from ("/RBODY/OFF", *listed(nodes))
 
 
-def _listed(ids: Sequence[int]) -> Iterator[str]:
+def listed(ids: Sequence[int]) -> Iterator[str]:
+    """Write numbers in lines."""
     yield from (" ".join(map(str, ids[i : i + _NODES_PER_LINE])) for i in range(0, len(ids), _NODES_PER_LINE))
 
 
@@ -102,7 +103,7 @@ def _engine(leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int
     yield f"/RUN/{name}/{leg.number}"
     yield f"{leg.stop!r:>20}"
     if leg.cap is not None:
-        yield from ("/RBODY/ON", *_listed(ids))
+        yield from ("/RBODY/ON", *listed(ids))
     yield from off(others if leg.cap is not None else (*ids, *others))
     if leg.cap is not None:
         yield from ("# with nothing deformable left the step would grow without limit", "/DTIX")
