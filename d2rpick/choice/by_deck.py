@@ -6,7 +6,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.cost import ByDeck, CostModel, Weights
-from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost, of_another_model
+from d2rpick.choice.deck_doubts import (
+    doubts_of,
+    doubts_of_bodies,
+    doubts_of_cost,
+    doubts_of_solver,
+    of_another_model,
+)
 from d2rpick.choice.part_sets import recommended_parts, with_cost_of
 from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.warnings import Caution
@@ -61,23 +67,24 @@ def with_deck(settings: Settings, reference: Reference, model: CostModel) -> tup
 
     What stays unknown is in the cautions; the deck of another model tells nothing.
     """
-    if foreign := of_another_model(reference.run, model.inventory):
+    inventory = model.inventory
+    if foreign := of_another_model(reference.run, inventory):
         return replace(settings, bodies=()), (foreign,)
-    history = reference.history
+    history, settings = reference.history, replace(settings, kept_off=inventory.kept_off)
     if not history.parts:
         why = "no parts are named whose elements are saved; give them with `parts`"
-        told = () if settings.cost_share is not None else (Caution("cost-unknown", f"the run time stays open: {why}"),)
-        return replace(settings, bodies=()), told
+        told = [Caution("cost-unknown", f"the run time stays open: {why}")] if settings.cost_share is None else []
+        return replace(settings, bodies=()), (*doubts_of_solver((), inventory), *told)
     ids = [part.id for part in history.parts]
     found, share = with_cost_of(settings, model, ids)
-    source = ByDeck(model.inventory.files, model.weights if settings.cost_share is None else None)
-    placement = Placement(model.inventory)
-    found = replace(found, bodies=bodies_of(model.inventory, ids), placement=placement, by_deck=source)
+    source = ByDeck(inventory.files, model.weights if settings.cost_share is None else None)
+    placement = Placement(inventory)
+    found = replace(found, bodies=bodies_of(inventory, ids), placement=placement, by_deck=source)
     doubts = [
-        *doubts_of(history.parts, model.inventory),
+        *doubts_of(history.parts, inventory),
         *doubts_of_cost(model, used=settings.cost_share is None and share.value is not None),
     ]
-    doubts += doubts_of_bodies(ids, model.inventory)
+    doubts += [*doubts_of_bodies(ids, inventory), *doubts_of_solver(ids, inventory)]
     if share.reason:
         doubts.append(Caution("cost-unknown", f"the run time stays open: {share.reason}"))
     return found, tuple(doubts)

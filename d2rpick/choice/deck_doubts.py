@@ -59,6 +59,16 @@ def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[C
         yield Caution("ties-not-followed", f"{found}; parts that are tied belong in one rigid body")
 
 
+def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
+    """Say what ruins a run of Radioss, and which of the parts would spring back wrongly after a rotation."""
+    for flaw in inventory.flaws:
+        yield Caution(flaw.code, f"{flaw.place.file}:{flaw.place.line}: {flaw.message}")
+    unturned = [part for part in parts if part in inventory.parts and not inventory.parts[part].section.turns]
+    if unturned and inventory.solver == "radioss":
+        found = f"{name_units(unturned)}: the stresses of these solids do not turn with the rigid body"
+        yield Caution("stresses-unturned", f"{found}; expect an error after a large rotation")
+
+
 def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
     """Say what was not followed of a deck and, where its cost is ``used``, which weights were not measured."""
     for note in model.inventory.notes:

@@ -40,9 +40,10 @@ class CardRequest:
         return self.solver or solver_of(history.format), replace(self.printing, part=ids, end=end)
 
     def by(self, settings: Settings) -> CardRequest:
-        """Let the parts of each rigid body that a deck tells be merged."""
+        """Let the parts of each rigid body that a deck tells be merged, and what its run keeps off stay off."""
         bodies = tuple(body.parts for body in settings.bodies or ())
-        return replace(self, printing=replace(self.printing, bodies=bodies))
+        off = tuple(node for node in settings.kept_off if node not in self.printing.node)
+        return replace(self, printing=replace(self.printing, bodies=bodies, off=off))
 
 
 class SolverInput(NamedTuple):

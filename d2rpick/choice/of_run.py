@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from d2rpick.choice.examine import examine
 from d2rpick.choice.suggest import Suggestion, suggest_at
 from d2rpick.choice.verify import Verdict, verify, verify_at, with_comparison
+from d2rpick.choice.warnings import cautions_of_engine
 from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.opening import Selection, open_run
 
@@ -119,6 +120,7 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference) ->
     RangeError
         If one of the two runs does not go on after td.
     """
+    verdict = verdict._replace(cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)))
     return with_comparison(verdict, _comparison(verdict, reference.run, switched))
 
 
@@ -127,6 +129,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
 
     What comes after td does not matter for the choice.
     """
+    answer = answer._replace(cautions=(*answer.cautions, *cautions_of_engine(run.sources)))
     history, td = answer.situation.history, answer.situation.td
     balance = balance_of(run, history.parts, td)
     if balance is None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.choice.health import Health, assess, cautions_of_health
+from d2rpick.choice.warnings import cautions_of_engine
 from d2rpick.errors import FormatError
 from d2rpick.flight.flight import all_seen
 from d2rpick.flight.flying_parts import with_parts_by_number
@@ -71,8 +72,8 @@ class Overview:
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
-        """What to know of the health of the run."""
-        return tuple(cautions_of_health(self.health)) if self.health else ()
+        """What to know of the health of the run, and of the engine that computed it."""
+        return (*(cautions_of_health(self.health) if self.health else ()), *cautions_of_engine(self.source))
 
 
 def survey(run: Run, selection: Selection) -> Overview:

@@ -10,7 +10,13 @@ import numpy as np
 
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share
-from d2rpick.choice.deck_doubts import doubts_of, doubts_of_bodies, doubts_of_cost, of_another_model
+from d2rpick.choice.deck_doubts import (
+    doubts_of,
+    doubts_of_bodies,
+    doubts_of_cost,
+    doubts_of_solver,
+    of_another_model,
+)
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
 from d2rpick.choice.part_facts import facts_of
 from d2rpick.choice.part_steps import steps_of
@@ -339,6 +345,7 @@ def _cautions(
         return
     yield from doubts_of((fact.part for fact in facts.parts.values()), model.inventory)
     yield from doubts_of_bodies([row.id for row in rows if row.movable], model.inventory)
+    yield from doubts_of_solver((), model.inventory)
     yield from doubts_of_cost(model)
     if missing := [row.id for row in rows if row.elements is None and row.id in facts.parts]:
         yield Caution("parts-not-in-deck", f"{name_units(missing)} of the history {are(missing)} not in the deck")

@@ -20,7 +20,7 @@ from d2rpick.choice.margin import Margin, margin_before_contact
 from d2rpick.choice.of_run import Reference, suggest_of
 from d2rpick.choice.suggest_td import bounds, flights_of, last_td
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
-from d2rpick.choice.warnings import Caution
+from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
 from d2rpick.flight.energy_alone import round_off
 from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.measures import run_time_share
@@ -197,7 +197,8 @@ def plan_of(
     if min_rigid is None:
         judged = _without_short(list(judged))
     rows = tuple(_with_status(list(judged), known))
-    return Plan(history, settings, shortest, rows, (*cautions, *_cautions(rows, known)), found)
+    cautions = (*cautions, *cautions_of_engine(reference.run.sources), *_cautions(rows, known))
+    return Plan(history, settings, shortest, rows, cautions, found)
 
 
 def _rows(
@@ -323,6 +324,8 @@ def _cautions(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Cautio
     windows = [row for row in rows if row.status == "supported" and row.answer]
     for row in windows:
         for caution in row.answer.cautions if row.answer else ():
+            if caution.code == WRONG_ENERGY:  # said of the whole run
+                continue
             which = f"flight {row.number}: " if len(rows) > 1 else ""
             yield caution._replace(message=which + caution.message)
     yield from _blocked(rows)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.errors import name_units
 from d2rpick.histories.digits import not_after, window_as_read
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from d2rpick.choice.situation import Situation
     from d2rpick.flight.bodies import RigidBody
@@ -19,11 +19,26 @@ POOR_KINETIC_SHARE = 0.5
 _NOTABLE_PLASTIC = 0.05
 
 
+WRONG_ENERGY: Final = "engine-wrong-energy"
+
+
 class Caution(NamedTuple):
     """Something the user should know: a stable ``code`` for scripts, and a sentence."""
 
     code: str
     message: str
+
+
+def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:
+    """Say so where listings beside the files of a run show an engine that reports wrong energies."""
+    if not any("T0" in name for name in sources):  # none is a leg of a Radioss run
+        return
+    from d2rpick.histories.listings import wrong_energies  # not above: other histories do without it
+
+    if found := list(wrong_energies(sources)):
+        why = "OpenRadioss from before January 2026 reports a wrong internal energy after /RBODY/ON or /RBODY/OFF"
+        told = f"{found[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
+        yield Caution(WRONG_ENERGY, told)
 
 
 def cautions_of(situation: Situation) -> Iterator[Caution]:

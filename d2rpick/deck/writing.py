@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from d2rpick.deck import radioss
 from d2rpick.deck.cut import cure, cuts
 from d2rpick.deck.parts import read_parts
+from d2rpick.deck.printing.radioss import listed, off
 from d2rpick.deck.radioss.blocks import blocks, keyword
-from d2rpick.deck.radioss.engine import read_legs
+from d2rpick.deck.radioss.engine import kept_off, read_legs
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import read_switching
@@ -160,7 +161,10 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     further = list(blocks(leg.run.block.source))
     for (name, text), mine in zip(card.files.items(), printed, strict=True):
         kept = (_text(block) for block in further if _repeated(keyword(block), mine))
-        yield name, text.encode() + b"".join(kept)
+        named = {node.value for _, _, ids in mine.switched for node in ids}
+        others = [node for node in kept_off(run.legs) if node not in named]  # else they would be rigid from time 0
+        lines = listed(others) if mine.cap is None else off(others)  # its text ends with the bodies that it puts off
+        yield name, (text + "".join(f"{line}\n" for line in lines)).encode() + b"".join(kept)
     yield from _copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files})
 
 

@@ -8,7 +8,19 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck import radioss, read_deck
 from d2rpick.errors import ConfigurationError
-from d2rpick.rules import constraints, energy, force, formats, pairs, reading, runs, scope, switched_parts, times
+from d2rpick.rules import (
+    bodies,
+    constraints,
+    energy,
+    force,
+    formats,
+    pairs,
+    reading,
+    runs,
+    scope,
+    switched_parts,
+    times,
+)
 from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, Severity, Unreadable
 from d2rpick.rules.configuration import Configuration, expected_instead, find_configuration
 from d2rpick.rules.run_case import RunCase
@@ -33,7 +45,7 @@ __all__ = [
     "find_rules",
 ]
 
-_MODULES = (reading, pairs, force, times, formats, switched_parts, constraints, energy, scope, runs)
+_MODULES = (reading, pairs, force, times, formats, switched_parts, constraints, energy, scope, runs, bodies)
 
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted((rule for module in _MODULES for rule in module.RULES), key=lambda rule: rule.id)
@@ -46,7 +58,7 @@ def find_rules(name: str) -> tuple[Rule, ...]:
     Examples
     --------
     >>> [rule.id for rule in find_rules("d2r30")]
-    ['D2R301', 'D2R302', 'D2R303', 'D2R304', 'D2R305', 'D2R306']
+    ['D2R301', 'D2R302', 'D2R303', 'D2R304', 'D2R305', 'D2R306', 'D2R307']
     """
     found = tuple(rule for rule in RULES.values() if name and rule.id.startswith(name.upper()))
     if not found:

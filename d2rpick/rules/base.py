@@ -11,7 +11,7 @@ from d2rpick.deck import Deck, Parts, SwitchSet, Window, Windows, find_windows, 
 from d2rpick.deck.sections import NOT_TURNED, solid_formulations
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.includes import Unread
@@ -39,6 +39,9 @@ class Judge(Protocol):
 
     def faults(self, window: Window, together: Iterable[int]) -> Sequence[Fault]:
         """Everything that speaks against a window; nothing when it is a good one."""
+
+    def deforming(self, parts: Collection[int]) -> tuple[int, ...] | None:
+        """Those of some parts that ever have internal energy; None where that is not known."""
 
 
 class Severity(StrEnum):

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import Reference, verify_of
 from d2rpick.choice.suggest import find_better_pair, suggest_at
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, end_of_flight, end_of_load
-from d2rpick.errors import name_units
+from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, Caution, end_of_flight, end_of_load
+from d2rpick.errors import FormatError, name_units
 from d2rpick.histories.digits import above, first_as_read
 from d2rpick.rules.base import Fault
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.switched_run import Times
@@ -34,6 +34,7 @@ _KEPT: Final = (
     "flight-from-energy",
     "flight-sources-disagree",
     "plastic-or-preload",
+    WRONG_ENERGY,
 )
 _UNKNOWN: Final = "nothing in the history shows when the load is over; give that time as `after`"
 
@@ -101,6 +102,17 @@ class HistoryJudge:
                 self._cautions[Caution("judged-by-whole", what)] = []
             self._faults[key] = tuple(self._judged(parts, window.tr, td))
         return self._faults[key]
+
+    def deforming(self, parts: Collection[int]) -> tuple[int, ...] | None:
+        """Those of some parts that ever have internal energy; None where the history has not all of them."""
+        chosen = [part for part in self.run.parts if part.id in parts]
+        if len(chosen) < len(parts):
+            return None
+        try:
+            energies = self.run.part_energies(chosen)
+        except FormatError:  # it is not written
+            return None
+        return tuple(part.id for part, energy in zip(chosen, energies.T, strict=True) if energy.any())
 
     @property
     def _known(self) -> tuple[int, ...]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.includes import Unread
     from d2rpick.deck.radioss import RunWindows
     from d2rpick.deck.radioss.files import Run
+    from d2rpick.deck.radioss.flaws import Flaw
     from d2rpick.deck.rows import Field, Value
     from d2rpick.rules.base import Judge
 
@@ -73,8 +74,7 @@ class RunCase(Case):
     def unread(self) -> Sequence[Unread]:
         """Includes that were not read, where a main node that is switched may stand in them."""
         bodies = {body.node.value for body in self.run.starter.bodies} if self.run.starter else set()
-        switched = {node.value for leg in self.run.legs for _, _, nodes in leg.switched for node in nodes if node.value}
-        return self.deck.unread if switched - bodies else ()
+        return self.deck.unread if self.named - bodies - {0} else ()
 
     @cached_property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
@@ -90,12 +90,24 @@ class RunCase(Case):
     @cached_property
     def unturned(self) -> Mapping[int, str]:
         """Parts of elements without a co-rotating frame."""
-        starter = self.run.starter
-        if starter is None:
-            return {}
-        bricks = {part for part, line in starter.parts.items() if line.prop in starter.unturned}
-        found = dict.fromkeys(bricks, "Isolid 1 or 2 without Iframe 2")
-        return found | dict.fromkeys(starter.unturned_parts, "tetrahedra, 20-node bricks or 16-node shells")
+        return self.run.starter.unturned if self.run.starter else {}
+
+    @cached_property
+    def named(self) -> frozenset[int]:
+        """Main nodes that the legs switch."""
+        return frozenset(node.value for leg in self.run.legs for _, _, nodes in leg.switched for node in nodes)
+
+    @cached_property
+    def flaws(self) -> tuple[Flaw, ...]:
+        """What the starter does to the nodes of the bodies that the legs switch."""
+        starter, legs = self.run.starter, self.run.legs
+        if not self.named or starter is None:
+            return ()
+        if not (starter.walls or starter.velocities or any(leg.starts for leg in legs)):
+            return ()
+        from d2rpick.deck.inventory.body_flaws import flaws_of  # loads numpy
+
+        return flaws_of(self.run, self.named)
 
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[Window]]]:

@@ -6,7 +6,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import name_units
-from d2rpick.rules.base import RADIOSS, Example, Rule, Severity
+from d2rpick.rules.base import RADIOSS, Rule, Severity
+from d2rpick.rules.example_runs import GOOD_RUN, WINDOW, engine_files, run_of, starter_deck
 from d2rpick.rules.run_case import RunCase
 
 if TYPE_CHECKING:
@@ -101,32 +102,9 @@ def _versions(case: Case) -> Iterator[Objection]:
             yield leg.run.here, f"{found}; fields are read by the version: give the same in all legs"
 
 
-def _starter(group: str = "/GRNOD/PART/7\nbox\n         1\n", body: str = "      1808") -> str:
-    return (
-        "#RADIOSS STARTER\n/BEGIN\nbox\n      2022         0\n/TITLE\na box\n/PART/1\nbox\n         1         1\n"
-        "/SHELL/1\n         1         1         2         3         4\n"
-        f"/RBODY/1\nbox\n{body}         0         0         0                   0         7\n{group}/END\n"
-    )
-
-
-def _legs(*legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808") -> dict[str, str]:
-    """Engine files: end and state of every leg."""
-    files = {}
-    for number, (stop, state) in enumerate(legs, start=1):
-        limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""
-        switch = f"/RBODY/{state}\n{node}\n" if state else ""
-        files[f"box_{number:04d}.rad"] = f"/RUN/box/{number}\n{stop:>20}\n/VERS/2022\n{switch}{limit}"
-    return files
-
-
-def _run(files: dict[str, str], starter: str = "") -> Example:
-    return Example(starter or _starter(), files, name="box_0000.rad")
-
-
-_WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
-_GOOD: Final = _run(_legs(*_WINDOW))
 _MIXED: Final = {
-    name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text for name, text in _legs(*_WINDOW).items()
+    name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text
+    for name, text in engine_files(*WINDOW).items()
 }
 
 RULES: Final = (
@@ -139,10 +117,10 @@ RULES: Final = (
         "is rigid. Two legs with the same end are not reported. Source: Altair's help for /RUN, and runs computed with "
         "OpenRadioss.",
         _order,
-        (_GOOD, _run(_legs(("0.05", "ON"), ("0.05", "OFF")))),
+        (GOOD_RUN, run_of(engine_files(("0.05", "ON"), ("0.05", "OFF")))),
         (
-            _run(_legs(("0.09", "OFF"), ("0.02", "ON"), ("0.2", "OFF"))),
-            _run({name: text for name, text in _legs(*_WINDOW).items() if "0002" not in name}),
+            run_of(engine_files(("0.09", "OFF"), ("0.02", "ON"), ("0.2", "OFF"))),
+            run_of({name: text for name, text in engine_files(*WINDOW).items() if "0002" not in name}),
         ),
         (RADIOSS,),
     ),
@@ -154,8 +132,8 @@ RULES: Final = (
         "message: the part stays as it was. 0 names nothing and is not reported. Judged only when the starter deck and "
         "its includes could be read. Source: Altair's help and the published source of OpenRadioss.",
         _main_nodes,
-        (_GOOD, _run(_legs(*_WINDOW, node="0"))),
-        (_run(_legs(*_WINDOW, node="1")), _run(_legs(*_WINDOW, node="1808 77"))),
+        (GOOD_RUN, run_of(engine_files(*WINDOW, node="0"))),
+        (run_of(engine_files(*WINDOW, node="1")), run_of(engine_files(*WINDOW, node="1808 77"))),
         (RADIOSS,),
     ),
     Rule(
@@ -165,8 +143,8 @@ RULES: Final = (
         "A rigid body is on by default in the first leg. Where no leg before says /RBODY/OFF the part is rigid from "
         "time 0 on, through the load as well. Source: Altair's help for /RBODY in engine files.",
         _never_off,
-        (_GOOD, _run(_legs(("0.09", "ON"), ("0.2", "OFF")))),
-        (_run(_legs(("0.02", ""), ("0.09", "ON"), ("0.2", "OFF"))),),
+        (GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.2", "OFF")))),
+        (run_of(engine_files(("0.02", ""), ("0.09", "ON"), ("0.2", "OFF"))),),
         (RADIOSS,),
     ),
     Rule(
@@ -178,8 +156,14 @@ RULES: Final = (
         "reported only where every element lies in a rigid part. Source: runs computed with OpenRadioss (td came "
         "0.26 ms late).",
         _step,
-        (_GOOD, _run(_legs(*_WINDOW, cap=""), _starter().replace("/RBODY", "/SHELL/2\n         2         1\n/RBODY"))),
-        (_run(_legs(*_WINDOW, cap="")), _run(_legs(*_WINDOW, cap="1e-5 1e-3"))),
+        (
+            GOOD_RUN,
+            run_of(
+                engine_files(*WINDOW, cap=""),
+                starter_deck().replace("/RBODY", "/SHELL/2\n         2         1\n/RBODY"),
+            ),
+        ),
+        (run_of(engine_files(*WINDOW, cap="")), run_of(engine_files(*WINDOW, cap="1e-5 1e-3"))),
         (RADIOSS,),
     ),
     Rule(
@@ -189,8 +173,8 @@ RULES: Final = (
         "The version says how the fields of an engine file are read. Source: Altair's help for /VERS; that a mixture "
         "does harm was not seen.",
         _versions,
-        (_GOOD,),
-        (_run(_MIXED),),
+        (GOOD_RUN,),
+        (run_of(_MIXED),),
         (RADIOSS,),
     ),
 )

@@ -288,6 +288,7 @@ def test_the_beginning_of_an_id_gives_all_of_them_and_near_misses_are_named() ->
         "D2R304",
         "D2R305",
         "D2R306",
+        "D2R307",
     ]
     result = run("rule", "D2R1O5")
     assert (result.exit_code, result.stdout) == (2, "")

@@ -102,7 +102,7 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
     card = cards(windows, Printing(node=(MAIN,), end=END, name="strip"), "radioss")
     main, *legs = write_deck(str(reference / "strip_0000.rad"), card, str(switched))
     checked = check_deck(main)
-    assert checked.findings == ()
+    assert [one.rule for one in checked.findings] == ([] if vibrates else ["D2R407"])  # its main node is not moved
     assert [(window.part, window.tr, window.td) for window in checked.windows] == [(1, *times) for times in windows]
     solve(switched, "strip")
     histories = sorted(map(str, switched.glob("stripT0?")))

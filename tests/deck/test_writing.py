@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick.deck.printing import cards
 from d2rpick.deck.printing.common import Printing
+from d2rpick.deck.radioss import read_run
 from d2rpick.deck.writing import write_deck
 from d2rpick.errors import DeckError
 from d2rpick.rules import RULES, check_deck
 from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE
 from tests.decks import write
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.deck.radioss.engine import Leg
 
 WINDOWS = [(0.02, 0.09), (0.1, 0.15)]
 CARD = cards(WINDOWS, Printing(part=(1,)))
@@ -123,6 +130,33 @@ def test_a_run_gets_the_legs_with_its_own_keywords(tmp_path: Path) -> None:
     assert ["/INIV" in text for text in texts] == [True, False, False, False, False]
     assert all("/TFILE/4\n1e-5\n" in text and "/VERS/2022" in text for text in texts)
     assert all(text.count("/DTIX") == text.count("/RUN") == 1 for text in texts)
+
+
+def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> None:
+    """Else they would be rigid from time 0: the loose wheels of a car whose body alone is switched."""
+    engine = ENGINE.replace("1808\n", "1808 1809\n1810\n") + "/END\nleft over\n"
+    for own, name in (((), "a"), ((1810, 1809), "b")):  # a card that knows them, and one that does not
+        card = cards(WINDOWS, Printing(node=(1808,), off=own, end=0.4, name="box"), "radioss")
+        starter, *legs = write_deck(radioss_run(tmp_path / "ref", engine), card, str(tmp_path / name))
+        found = [dict(_states(leg)) for leg in read_run(starter).legs]
+        rigid = [{1808: False, 1809: False, 1810: False}, {1808: True, 1809: False, 1810: False}]
+        assert found == [rigid[0], rigid[1], rigid[0], rigid[1], rigid[0]]
+        blocks = [Path(leg).read_text().count("/RBODY/OFF") for leg in legs]
+        assert blocks == [1] * len(found)  # the starter overlooks a second one that follows the first
+
+
+def _states(leg: Leg) -> Iterator[tuple[int, bool]]:
+    for _, rigid, nodes in leg.switched:
+        yield from ((node.value, rigid) for node in nodes)
+
+
+def test_a_card_names_all_that_is_off_in_one_block() -> None:
+    """The starter of OpenRadioss overlooks the second of two blocks that follow each other."""
+    card = cards(WINDOWS, Printing(node=(1808,), off=(1809,), end=0.4, name="box"), "radioss")
+    texts = list(card.files.values())
+    assert [text.count("/RBODY/OFF") for text in texts] == [1] * 5
+    assert [text.count("/RBODY/ON") for text in texts] == [0, 1, 0, 1, 0]
+    assert "/RBODY/OFF\n1808 1809\n" in texts[0]
 
 
 @pytest.mark.parametrize(

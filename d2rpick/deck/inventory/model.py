@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from d2rpick.deck.radioss.flaws import Flaw
     from d2rpick.deck.source import SourceFile
 
     Places = NDArray[np.int64]
@@ -114,6 +115,7 @@ class Inventory:
     share no nodes; ``ties`` do too, but it is not known which.  ``watched`` are the places of nodes whose motion is
     written.  ``moved``: something moves nodes away from the coordinates of the deck.  ``files`` are those of the deck.
     ``history_groups`` are the ids of /THPART: groups of elements that a time history lists among its parts.
+    ``kept_off`` are main nodes of rigid bodies that a Radioss run keeps off, ``flaws`` what ruins it because of bodies.
     """
 
     solver: str
@@ -128,6 +130,8 @@ class Inventory:
     moved: bool = False
     files: tuple[SourceFile, ...] = ()
     history_groups: frozenset[int] = frozenset()
+    kept_off: tuple[int, ...] = ()
+    flaws: tuple[Flaw, ...] = ()
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:

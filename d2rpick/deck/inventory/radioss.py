@@ -12,42 +12,25 @@ import numpy as np
 from d2rpick.deck.cut import cuts, holds_mesh
 from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.inventory import formulations, joints
-from d2rpick.deck.inventory.columns import layout, lines_of
+from d2rpick.deck.inventory.body_flaws import flaws_of
 from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of
+from d2rpick.deck.inventory.radioss_mesh import KINDS, NOT_COUNTED, elements_of, nodes_of
 from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
+from d2rpick.deck.radioss.engine import kept_off
 from d2rpick.deck.radioss.legs import find_run_windows
-from d2rpick.deck.radioss.starter import WITHOUT_FRAME
 from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card
-    from d2rpick.deck.inventory.columns import Integers, Layout, Reals
+    from d2rpick.deck.inventory.columns import Integers
     from d2rpick.deck.inventory.model import Formulation
     from d2rpick.deck.radioss.files import Run
     from d2rpick.deck.radioss.starter import Starter
 
-_COMMENTS: Final = b"$#"
 _WIDTH, _REAL = 10, 20
 
-
-class _Kind(NamedTuple):
-    """Kind of elements: what to call it, nodes that hold the part, ids on each of its lines."""
-
-    name: str
-    nodes: int
-    lines: tuple[int, ...]
-
-
-_KINDS: Final = {
-    "SHELL": _Kind("shell", 4, (5,)), "SH3N": _Kind("triangle", 3, (4,)), "BRICK": _Kind("solid", 8, (9,)),
-    "TETRA4": _Kind("tetrahedron", 4, (5,)), "PENTA6": _Kind("pentahedron", 6, (7,)), "QUAD": _Kind("quad", 4, (5,)),
-    "TRIA": _Kind("tria", 3, (4,)), "BEAM": _Kind("beam", 2, (3,)), "TRUSS": _Kind("truss", 2, (3,)),
-    "SPRING": _Kind("spring", 2, (3,)), "TETRA10": _Kind("tetrahedron", 10, (1, 10)),
-    "BRIC20": _Kind("solid", 20, (9, 8, 4)), "SHEL16": _Kind("thick shell", 16, (9, 8)),
-}  # fmt: skip
-_NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
 _ELASTIC: Final = {
     *("ELAST", "LAW1", "LAW01", "PLAS_JOHNS", "LAW2", "LAW02", "PLAS_ZERIL", "PLAS_BRIT", "LAW27", "PLAS_TAB", "LAW36"),
     *("COWPER", "LAW44", "DAMA", "LAW22", "LAW22_DAMA"),
@@ -84,8 +67,8 @@ def read(run: Run) -> Inventory:
         return Inventory("radioss", {}, (), np.empty((0, 3)), ("no starter deck (NAME_0000.rad) was found",), False)
     cards = [card_of(block) for source in starter.sources for block in blocks(source)]
     worded = [(card, keyword(card.block)) for card in cards]
-    raw = [one for card, words in worded if words and words[0] in _KINDS for one in _elements(card, words)]
-    ids, coordinates = _nodes([card for card, words in worded if words[:1] == ("NODE",)])
+    raw = [one for card, words in worded if words and words[0] in KINDS for one in elements_of(card, words)]
+    ids, coordinates = nodes_of([card for card, words in worded if words[:1] == ("NODE",)])
     kinds = sorted({(kind, nodes.shape[1]) for kind, _, nodes in raw})
     table, places = placed(
         ids, [np.concatenate([n for name, _, n in raw if (name, n.shape[1]) == kind]) for kind in kinds]
@@ -96,7 +79,7 @@ def read(run: Run) -> Inventory:
     )
     beyond = np.full((table.size - ids.size, 3), np.nan)
     notes = tuple(_notes(run, worded, elements, starter, len(beyond)))
-    parts = _parts(run, worded, elements)
+    parts = _parts(run, starter, worded, elements)
     held = joints.of_radioss(starter, worded)
     return Inventory(
         "radioss", parts, elements, np.concatenate([coordinates, beyond]), notes, not notes,
@@ -104,7 +87,14 @@ def read(run: Run) -> Inventory:
         watched=places_of(_watched(worded), table), moved=any(words[:1] == ("TRANSFORM",) for _, words in worded),
         files=tuple(run.deck.sources),
         history_groups=frozenset(whole(words[-1]) for _, words in worded if words[:1] == ("THPART",)),
+        kept_off=kept_off(run.legs), flaws=flaws_of(run, _switched(run, starter)),
     )  # fmt: skip
+
+
+def _switched(run: Run, starter: Starter) -> set[int]:
+    """Main nodes that the legs switch; of all bodies where there is no engine file."""
+    named = {node.value for leg in run.legs for _, _, nodes in leg.switched for node in nodes}
+    return named if run.legs else {body.node.value for body in starter.bodies}
 
 
 def _watched(cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Integers:
@@ -120,7 +110,7 @@ def _notes(
 ) -> Iterator[str]:
     """Say what may be missing."""
     for card, words in cards:
-        if words and words[0] in _NOT_COUNTED:
+        if words and words[0] in NOT_COUNTED:
             yield f"{card.file}:{card.line}: elements of /{'/'.join(words)} are not followed"
     yield from (f"{block.source.name}: {told}" for block, told in cuts(run.deck) if holds_mesh(block))
     for unread in run.deck.unread:
@@ -134,36 +124,8 @@ def _notes(
         yield f"{lost} nodes of elements are not in any /NODE of the deck"
 
 
-def _elements(card: Card, words: tuple[str, ...]) -> Iterator[tuple[str, Integers, Integers]]:
-    """Kind, parts and node ids of the elements of a card."""
-    kind, part = _KINDS[words[0]], whole(words[1]) if words[1:] else 0
-    fields: Layout = layout(*[_WIDTH] * max(kind.lines))
-    found = [lines.integers(fields) for lines in lines_of(card, _COMMENTS) if len(lines)]
-    if not found:
-        return
-    values = np.concatenate(found)
-    per = len(kind.lines)
-    values = values[: len(values) // per * per].reshape(-1, per, values.shape[1])
-    flat = np.concatenate([values[:, line, :count] for line, count in enumerate(kind.lines)], axis=1)
-    good = (flat[:, 0] > 0) & (flat[:, 1 : 1 + min(kind.nodes, 3)] > 0).all(axis=1)
-    nodes = np.maximum(flat[good, 1 : 1 + kind.nodes], 0)
-    yield kind.name, np.full(len(nodes), part, np.int64), nodes
-
-
-def _nodes(cards: Sequence[Card]) -> tuple[Integers, Reals]:
-    ids, places = [np.empty(0, np.int64)], [np.empty((0, 3))]
-    fields: Layout = layout(_WIDTH, _REAL, _REAL, _REAL)
-    for card in cards:
-        for lines in lines_of(card, _COMMENTS):
-            if len(lines):
-                numbers = lines.integers(fields[:1])[:, 0]
-                ids.append(numbers[numbers > 0])
-                places.append(lines.reals(fields, slice(1, 4))[numbers > 0])
-    return np.concatenate(ids), np.concatenate(places)
-
-
 def _parts(
-    run: Run, cards: Sequence[tuple[Card, tuple[str, ...]]], elements: Sequence[Elements]
+    run: Run, starter: Starter, cards: Sequence[tuple[Card, tuple[str, ...]]], elements: Sequence[Elements]
 ) -> Mapping[int, PartData]:
     materials = dict(_materials(cards))
     properties = dict(_properties(cards))
@@ -171,10 +133,7 @@ def _parts(
     for one in elements:
         for part in np.unique(one.part).tolist():
             kinds.setdefault(part, set()).add(one.kind)
-    rigid, unturned = (
-        _always_rigid(run),
-        {whole(words[1]) for _, words in cards if words[1:] and words[0] in WITHOUT_FRAME},
-    )
+    rigid, unturned = _always_rigid(run), starter.unturned
     found: dict[int, PartData] = {}
     for card, words in cards:
         rows = [row for row in card.rows if not row.blank] if words[:1] == ("PART",) else []
@@ -233,8 +192,7 @@ def _properties(cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Iterator[tuple
                 section=_of_plain_shells(rows) if words[1] in _PLAIN_SHELLS else Section(),
             )  # fmt: skip
         elif words[1] in _SOLIDS:
-            isolid, iframe = flags[0] or solid or _DEFAULT_SOLID, flags[7]
-            found = _Property(words[1], solid=isolid, section=Section(turns=isolid not in (1, 2) or iframe == 2))
+            found = _Property(words[1], solid=flags[0] or solid or _DEFAULT_SOLID)
         elif words[1] in _BEAMS:
             found = _Property(words[1], section=Section(area=_at(rows, 3, 0)))
         elif words[1] in _TRUSSES:
@@ -256,7 +214,7 @@ def _section(prop: _Property | None, kinds: set[str], *, turns: bool) -> Section
         if one:
             found[kind] = one
     own = prop.section
-    return Section(found, own.thickness, own.area, own.damped, own.mass, own.turns and turns, own.layers)
+    return Section(found, own.thickness, own.area, own.damped, own.mass, turns, own.layers)
 
 
 def _of_plain_shells(rows: Sequence[str]) -> Section:

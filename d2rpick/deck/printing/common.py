@@ -43,6 +43,8 @@ class Printing:
         Ids of the parts to switch.
     node : tuple of int
         Main nodes of the rigid bodies to be switched, for solvers that switch these.
+    off : tuple of int
+        Main nodes of further rigid bodies, which stay off in all legs.
     merge : int, optional
         Lead part that all others are merged into; without it each part becomes a body of its own.
     bodies : tuple of tuple of int, optional
@@ -59,6 +61,7 @@ class Printing:
 
     part: tuple[int, ...] = ()
     node: tuple[int, ...] = ()
+    off: tuple[int, ...] = ()
     merge: int | None = None
     bodies: tuple[tuple[int, ...], ...] = ()
     swset: tuple[int, int] = (901, 902)

@@ -32,6 +32,10 @@ _SOLVER = (
     "  node groups; no warning is given.",
     "The energy reported for rigid solids can be wrong until the release.",
     "The starter looks for /RBODY/OFF in the engine files; keep all of them.",
+    "A body that the first file does not put off is rigid from time 0.",
+    "The starter takes the nodes of an /RBODY from every /RWALL; Ikrem 1 keeps",
+    "  them there while the body is off.",
+    "An initial velocity must move the main node of a body too.",
     "Repeat your output keywords (/TFILE, /ANIM, ...) in every file.",
 )
 
@@ -62,9 +66,8 @@ def cards(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] =
     if printing.end is None or not windows[-1][1] < printing.end < math.inf:
         found = "the end of the run is not given" if printing.end is None else f"the run ends at {printing.end:g}"
         raise DeckError(f"{found}, a time after td = {windows[-1][1]:g} was expected")
-    listed = [" ".join(map(str, ids[i : i + _NODES_PER_LINE])) for i in range(0, len(ids), _NODES_PER_LINE)]
     files = {
-        f"{name}_{leg.number:04d}.rad": "\n".join(_engine(leg, name, listed)) + "\n"
+        f"{name}_{leg.number:04d}.rad": "\n".join(_engine(leg, name, ids, printing.off)) + "\n"
         for leg in legs(windows, printing.end, printing.step_cap)
     }
     spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
@@ -85,11 +88,23 @@ def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[E
     return [EngineFile(number, stop, cap) for number, (stop, cap) in numbered]
 
 
-def _engine(leg: EngineFile, name: str, listed: Sequence[str]) -> Iterator[str]:
+def off(nodes: Sequence[int]) -> Iterator[str]:
+    """Put rigid bodies off; the starter of OpenRadioss overlooks a second such block right behind the first."""
+    if nodes:
+        yield from ("/RBODY/OFF", *listed(nodes))
+
+
+def listed(ids: Sequence[int]) -> Iterator[str]:
+    """Write numbers in lines."""
+    yield from (" ".join(map(str, ids[i : i + _NODES_PER_LINE])) for i in range(0, len(ids), _NODES_PER_LINE))
+
+
+def _engine(leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int]) -> Iterator[str]:
     yield f"/RUN/{name}/{leg.number}"
     yield f"{leg.stop!r:>20}"
-    yield "/RBODY/ON" if leg.cap else "/RBODY/OFF"
-    yield from listed
+    if leg.cap is not None:
+        yield from ("/RBODY/ON", *listed(ids))
+    yield from off(others if leg.cap is not None else (*ids, *others))
     if leg.cap is not None:
         yield from ("# with nothing deformable left the step would grow without limit", "/DTIX")
         yield f"{leg.cap!r} {leg.cap!r}"

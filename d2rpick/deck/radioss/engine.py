@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
 from d2rpick.deck.rows import Field, Value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.source import Block, SourceFile
+
+
+class Start(NamedTuple):
+    """An /INIV: velocities given at the start of a leg to ranges of nodes, or to a group of nodes (else 0)."""
+
+    card: Card
+    ranges: tuple[tuple[int, int], ...]
+    group: int
 
 
 @dataclass(eq=False)
@@ -27,6 +35,7 @@ class Leg:
     switched: list[tuple[Card, bool, tuple[Value[int], ...]]] = field(default_factory=list)  # True: made rigid
     cap: Value[float] | None = None
     version: str = ""
+    starts: list[Start] = field(default_factory=list)
 
 
 def read_legs(source: SourceFile) -> list[Leg]:
@@ -47,6 +56,13 @@ def read_legs(source: SourceFile) -> list[Leg]:
     return legs
 
 
+def kept_off(legs: Sequence[Leg]) -> tuple[int, ...]:
+    """Main nodes of the bodies that the first leg puts off and none puts on, in the order of the file."""
+    states = {node.value: rigid for leg in legs[:1] for _, rigid, nodes in leg.switched for node in nodes if node.value}
+    on = {node.value for leg in legs for _, rigid, nodes in leg.switched for node in nodes if rigid}
+    return tuple(node for node, rigid in states.items() if not rigid and node not in on)
+
+
 def _leg(block: Block, words: tuple[str, ...]) -> Leg:
     card = card_of(block)
     stop = next(_numbers(block), None)
@@ -61,8 +77,24 @@ def _take(leg: Leg, block: Block, words: tuple[str, ...]) -> None:
         leg.switched.append((card_of(block), words[1] == "ON", nodes))
     elif words == ("DTIX",):
         leg.cap = next(reversed(list(_numbers(block))), None)
+    elif words and words[0] == "INIV":
+        leg.starts.append(_start(block, words))
     elif words and words[0] == "VERS":
         leg.version = words[1] if words[1:] else ""
+
+
+def _start(block: Block, words: tuple[str, ...]) -> Start:
+    """Read whom an /INIV moves: single nodes, by type 1 first and last of ranges, by type 2 a group.
+
+    Source: Altair's public help for /INIV, and the published source of OpenRadioss.
+    """
+    type_ = whole(words[3]) if words[3:] else 0
+    before = 5 if words[1:2] == ("AXIS",) else 1  # numbers of the velocity
+    ids = [_integer(value).value for value in _numbers(block)][before:]
+    if type_ == 2:
+        return Start(card_of(block), (), ids[0] if ids else 0)
+    pairs = zip(ids[::2], ids[1::2], strict=False) if type_ == 1 else zip(ids, ids, strict=True)
+    return Start(card_of(block), tuple(pairs), 0)
 
 
 def _numbers(block: Block) -> Iterator[Value[float]]:

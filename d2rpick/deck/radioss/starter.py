@@ -34,21 +34,28 @@ NODES: Final = {
 }
 _UNFOLLOWED: Final = {"BRIC20", "TETRA10", "SHEL16", "SPHCEL", "XELEM"}
 WITHOUT_FRAME: Final = {"TETRA4", "TETRA10", "BRIC20", "SHEL16"}  # their stresses do not turn with a rigid body
+_BRICK: Final = "BRICK"
 _SUBMODEL: Final = ""  # before the second slash of //SUBMODEL
 _GROUP_FIELD: Final = 6  # of the first line of /RBODY, in columns of 10: the mass before it takes two
 _ICOROTATIONAL: Final = 2  # Iframe
-_NOT_TURNED: Final = {1, 2}  # Isolid of bricks without a co-rotating frame
+_NOT_TURNED: Final = {1, 2, 12}  # Isolid of bricks without a co-rotating frame; 12 by the help up to 2017
+_DEFAULT_ISOLID: Final = 1
+_SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
 _WIDTH: Final = 10
 
 
 class Body(NamedTuple):
-    """A rigid body: its id, main node, sensor and group of nodes (0: none)."""
+    """A rigid body: its id, main node, sensor and group of nodes (0: none).
+
+    ``stays``: its nodes are to stay in rigid walls (Ikrem 1, or a sensor).
+    """
 
     id: int
     node: Value[int]
     sensor: int
     group: int
     card: Card
+    stays: bool
 
 
 class PartLine(NamedTuple):
@@ -61,17 +68,26 @@ class PartLine(NamedTuple):
 
 @dataclass(eq=False)
 class Starter:
-    """What a starter deck says about its rigid bodies; ``sources`` are its files."""
+    """What a starter deck says about its rigid bodies; ``sources`` are its files.
+
+    ``walls`` and ``velocities`` are its cards /RWALL and /INIVEL.
+    """
 
     name: str = ""
+    version: int = 0  # of the format
     bodies: list[Body] = field(default_factory=list)
     parts: dict[int, PartLine] = field(default_factory=dict)
     subsets: dict[int, tuple[int, ...]] = field(default_factory=dict)
     groups: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
     timed: dict[int, tuple[float, float]] = field(default_factory=dict)  # sensors: active from, to
-    unturned: set[int] = field(default_factory=set)  # properties of bricks without a co-rotating frame
-    unturned_parts: set[int] = field(default_factory=set)  # of elements that have none
+    solids: dict[int, tuple[int, int]] = field(default_factory=dict)  # properties: Isolid, Iframe
+    default_solid: tuple[int, int] | None = None
+    bricks: set[int] = field(default_factory=set)  # parts of 8-node bricks
+    unturned_parts: set[int] = field(default_factory=set)  # of other elements without a co-rotating frame
+    walls: list[Card] = field(default_factory=list)
+    velocities: list[Card] = field(default_factory=list)
     moved: bool = False  # whether a submodel may offset its ids
+    transformed: bool = False  # whether nodes are moved
     sources: list[SourceFile] = field(default_factory=list)
 
     def take(self, card: Card, words: tuple[str, ...]) -> None:
@@ -79,17 +95,25 @@ class Starter:
         if words[0] == _SUBMODEL:
             self.moved = True
             return
-        if words[0] in WITHOUT_FRAME:
-            self.unturned_parts.add(whole(words[1]) if words[1:] else 0)
+        if words[0] in WITHOUT_FRAME or words[0] == _BRICK:
+            parts = self.bricks if words[0] == _BRICK else self.unturned_parts
+            parts.add(whole(words[1]) if words[1:] else 0)
             return
-        rows = [row for row in card.rows if not row.blank]
+        rows = [*card.rows[:1], *(row for row in card.rows[1:] if not row.blank)]  # the title may be blank
         id_ = whole(words[_ID_AT.get(words[0], 1)]) if len(words) > _ID_AT.get(words[0], 1) else 0
         if words[0] == "BEGIN" and rows:
             self.name = rows[0].text.strip()
-        elif words[0] == "RBODY" and len(rows) > 1:
+            self.version = card.integer(rows[1], 0).value if len(rows) > 1 else 0
+        elif words[0] == "RBODY" and len(rows) > 1 and id_:  # one of /RBODY/LAGMUL is never switched
             first = rows[1]
-            sensor, group = card.integer(first, 1).value, card.integer(first, _GROUP_FIELD).value
-            self.bodies.append(Body(id_, card.integer(first, 0), sensor, group, card))
+            sensor, group, keeps = (card.integer(first, at).value for at in (1, _GROUP_FIELD, _GROUP_FIELD + 1))
+            self.bodies.append(Body(id_, card.integer(first, 0), sensor, group, card, bool(sensor or keeps)))
+        elif words[0] == "RWALL":
+            self.walls.append(card)
+        elif words[0] == "INIVEL":
+            self.velocities.append(card)
+        elif words[0] == "TRANSFORM":
+            self.transformed = True
         elif words[0] == "PART" and len(rows) > 1:
             prop, subset = card.integer(rows[1], 0).value, card.integer(rows[1], 2).value
             self.parts[id_] = PartLine(rows[0].text.strip(), prop, subset)
@@ -98,12 +122,25 @@ class Starter:
         elif words[0] == "GRNOD" and words[1:]:
             self.groups[id_] = words[1], _ids(rows[1:])
         elif words[:2] == ("SENSOR", "TIME") and len(rows) > 1:
-            start, stop = (_real(rows[1].text[at : at + 2 * _WIDTH]) for at in (0, 2 * _WIDTH))
+            start, stop = reals(rows[1], 2)
             self.timed[id_] = start, stop if stop > 0 else math.inf
-        elif words[:2] in {("PROP", "SOLID"), ("PROP", "TYPE14")} and len(rows) > 1:
-            isolid, iframe = card.integer(rows[1], 0).value, card.integer(rows[1], 7).value
-            if isolid in _NOT_TURNED and iframe != _ICOROTATIONAL:
-                self.unturned.add(id_)
+        elif words[0] == "PROP" and words[1:] and words[1] in _SOLIDS and len(card.rows) > 1:
+            self.solids[id_] = _isolid_and_iframe(card, card.rows[1])  # the line may be blank
+        elif words[0] == "DEF_SOLID" and rows and self.default_solid is None:  # the first one counts
+            self.default_solid = _isolid_and_iframe(card, rows[0])
+
+    @property
+    def unturned(self) -> dict[int, str]:
+        """Parts of solids whose stresses do not turn with a rigid body, and of which kind these are."""
+        isolid, iframe = self.default_solid or (0, 0)
+        props = {
+            prop
+            for prop, (own, frame) in self.solids.items()
+            if (own or isolid or _DEFAULT_ISOLID) in _NOT_TURNED and (frame or iframe) != _ICOROTATIONAL
+        }
+        bricks = [part for part, line in self.parts.items() if part in self.bricks and line.prop in props]
+        found = dict.fromkeys(bricks, "bricks with Isolid 1, 2 or 12 without Iframe 2")
+        return found | dict.fromkeys(self.unturned_parts, "tetrahedra, 20-node bricks or 16-node shells")
 
     def elements(self) -> Iterator[tuple[int, frozenset[int]]]:
         """Part and nodes of every element; no nodes for one whose lines are not followed."""
@@ -151,7 +188,10 @@ class Starter:
 
 _ID_AT: Final = {"GRNOD": 2, "SENSOR": 2, "PROP": 2}  # where a keyword has its id; others behind their name
 # Keywords of the cards that say what a `Starter` keeps.
-KEPT: Final = {*WITHOUT_FRAME, _SUBMODEL, "BEGIN", "RBODY", "PART", "SUBSET", "GRNOD", "SENSOR", "PROP"}
+KEPT: Final = {
+    *(*WITHOUT_FRAME, _BRICK, _SUBMODEL, "BEGIN", "RBODY", "PART", "SUBSET", "GRNOD", "SENSOR", "PROP", "DEF_SOLID"),
+    *("RWALL", "INIVEL", "TRANSFORM"),
+}
 
 
 def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:
@@ -184,6 +224,10 @@ def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[in
     return named
 
 
+def _isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
+    return card.integer(row, 0).value, card.integer(row, 7).value
+
+
 def _nodes(line: str, count: int) -> frozenset[int]:
     cells = (line[start : start + _WIDTH].strip() for start in range(_WIDTH, _WIDTH * (count + 1), _WIDTH))
     return frozenset(node for cell in cells if (node := whole(cell)))
@@ -193,6 +237,11 @@ def _ids(rows: Iterable[Row]) -> tuple[int, ...]:
     """Ids on lines of 10 columns; a word ends what can be followed and counts as -1."""
     cells = [row.text[start : start + _WIDTH].strip() for row in rows for start in range(0, len(row.text), _WIDTH)]
     return tuple(whole(cell) or -1 for cell in cells if cell)
+
+
+def reals(row: Row, count: int) -> list[float]:
+    """Read numbers of 20 columns each; a blank is 0, NaN what is none."""
+    return [_real(row.text[at : at + 2 * _WIDTH]) for at in range(0, count * 2 * _WIDTH, 2 * _WIDTH)]
 
 
 def _real(text: str) -> float:

@@ -99,12 +99,22 @@ def test_a_time_sensor_releases_a_body(tmp_path: Path, sensor: str, expected: li
 SOLID = "/PROP/SOLID/1\nsolid\n" + "".join(f"{n:10d}" for n in (1, 0, 0, 0, 0, 0, 0, 0)) + "\n"
 
 
+BRICK = "/BRICK/1\n" + "".join(f"{n:10d}" for n in (9, 1, 2, 3, 4, 5, 6, 7, 8)) + "\n"
+
+
 @pytest.mark.parametrize(
     ("more", "found"),
     [
-        (SOLID, True),
-        (SOLID.replace("         1", "        17", 1), False),
-        (SOLID.replace("         0\n", "         2\n"), False),
+        (SOLID + BRICK, True),
+        (SOLID.replace("         1", "        12", 1) + BRICK, True),
+        (SOLID.replace("         1", "        17", 1) + BRICK, False),
+        (SOLID.replace("         0\n", "         2\n") + BRICK, False),
+        (SOLID.replace("SOLID", "TYPE6") + BRICK, True),
+        (f"/PROP/SOLID/1\n\n\n{BRICK}", True),  # Isolid 1 is the default
+        (f"/DEF_SOLID\n        24\n/PROP/SOLID/1\nsolid\n\n{BRICK}", False),
+        (f"{SOLID}{BRICK}/DEF_SOLID\n{'':70}         2\n/DEF_SOLID\n         1\n", False),  # the first one counts
+        (SOLID + BRICK.replace("BRICK", "PENTA6"), False),
+        (f"/PROP/TYPE20/1\nthick shell\n\n{BRICK}", False),  # HA8 is its default
         ("/TETRA4/1\n         9         1         2         3         4\n", True),
     ],
 )
@@ -191,9 +201,26 @@ def test_a_run_cut_anywhere_is_checked_or_refused() -> None:
                 assert window.tr in {0.0, 0.02}
 
 
-@given(st.binary(max_size=300), st.sampled_from([b"/BEGIN\n", b"/RUN/x/1\n", b"/RBODY/ON\n", b"/PART/\xb2\n"]))
+FIELDS = b"".join(b"%20d" % n for n in (1, 2, 3)) + b"\n"
+BEHIND = [
+    *(
+        b"/BEGIN\n",
+        b"/RUN/x/1\n",
+        b"/RBODY/ON\n",
+        b"/PART/\xb2\n",
+        b"/INIV/TRA/X/1\n",
+        b"/INIV\n",
+        b"/INIVEL/TRA/1\nv\n",
+    ),
+    *(b"/INIVEL\n", b"/INIVEL/AXIS/1\nv\n", b"/INIVEL/NODE/1\nv\n", b"/RWALL/CYL/1\nw\n", b"/RWALL\nw\n\n" + FIELDS),
+    b"/NODE\n         1" + FIELDS + b"/RWALL/PLANE/1\nw\n\n" + FIELDS + FIELDS,
+]
+
+
+@given(st.binary(max_size=300), st.sampled_from(BEHIND))
 def test_garbage_behind_a_keyword_is_no_crash(garbage: bytes, keyword: bytes) -> None:
-    content = b"/BEGIN\n" + EXAMPLE.deck.encode().replace(b"/END\n", b"") + b"/RUN/x/1\n 1.0\n" + keyword + garbage
+    legs = b"/RUN/x/1\n 1.0\n/RBODY/OFF\n1808\n"
+    content = b"/BEGIN\n" + EXAMPLE.deck.encode().replace(b"/END\n", b"") + legs + keyword + garbage
     assert recognises(content)
     check_deck("run.rad", content=content)
 
