@@ -271,7 +271,7 @@ class _Comparison:
         return replace(
             one,
             bodies=inventory.bodies(one.parts),
-            moving=_loose(inventory, one.parts),
+            moving=self._loose(inventory, one.parts),
             elements=sum(within.values()),
             element_fraction=sum(within.values()) / sum(whole.values()) if whole else None,
             mass_fraction=self._mass_fraction(one.parts),
@@ -286,6 +286,12 @@ class _Comparison:
         if len(known) < len(masses) or not set(parts) <= known.keys() or not sum(known.values()):
             return None
         return sum(known[part] for part in parts) / sum(known.values())
+
+    def _loose(self, inventory: Inventory, parts: Sequence[int]) -> frozenset[int]:
+        """Parts of other rigid bodies than the heaviest; none where ties that are not followed may join these."""
+        masses = {row.id: row.mass or 0.0 for row in self.rows}
+        main = max(inventory.bodies(parts), key=lambda body: sum(masses.get(part, 0.0) for part in body), default=())
+        return frozenset() if inventory.ties else frozenset(parts) - {*main}
 
     def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
         """Find when the set may be rigid; RangeError with the reason where it may not."""
@@ -327,12 +333,6 @@ def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
         position_is_lower_bound=worst.at_least,
     )
     return replace(placed, moving=one.moving | {*worst.drift.moving}) if placed.out_of_place else placed
-
-
-def _loose(inventory: Inventory, parts: Sequence[int]) -> frozenset[int]:
-    """Parts that make other rigid bodies than the main one; none where ties that are not followed may join these."""
-    main = max(inventory.bodies(parts), key=inventory.rigid_nodes, default=())
-    return frozenset() if inventory.ties else frozenset(parts) - {*main}
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:

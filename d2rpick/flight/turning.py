@@ -35,8 +35,7 @@ _MOST_BENT: Final = 0.05
 _STATES: Final = 2000
 # Parts that hang together make the frame where they have half of the mass of the body; else all that stand still do.
 _MOST: Final = 0.5
-# Parts from which on a frame can spare one, and the share of their inertia below which they lie on a line.
-_FEWEST: Final = 4
+# Share of their inertia below which parts lie on a line.
 _ALONG_LINE: Final = 1e-9
 
 
@@ -175,11 +174,9 @@ def _doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
     """By how much the frame turns from one time to another where each of its parts in turn is left out (jackknife).
 
     Parts about their centre, (parts, 3), are ``bent`` (n, parts, 3) off their shape; without one of them the others
-    turn by what its arm and its deviation would have held.  Three parts have none to spare.
+    turn by what its arm and its deviation would have held; two, about their line, by nothing.
     """
     count = mass.size
-    if count < _FEWEST:
-        return np.inf
     alone = mass * mass.sum() / (mass.sum() - mass)
     others = _second(shape[np.newaxis], mass) - np.einsum("p,pi,pj->pij", alone, shape, shape)
     light = np.linalg.pinv(_inertia(others), rcond=_ALONG_LINE, hermitian=True)
