@@ -49,8 +49,8 @@ def centres() -> Samples:
     return np.array([np.mean([at[n] for of, nodes in quads() if of == part for n in nodes], axis=0) for part in TITLES])
 
 
-def momenta(periods: float, loose: float = 3.0) -> Samples:
-    """Momenta over `TIME`, (n, parts, 3): the engine swings so often until the landing; wheels fly off at ``loose``."""
+def momenta(periods: float, wheels_land: float = WHEELS_LAND) -> Samples:
+    """Momenta over `TIME`, (n, parts, 3): the engine swings so often until the landing, the wheels fly away."""
     body, masses = len(BODY), MASSES[: len(BODY)]
     inside = np.repeat(centres()[np.newaxis, :body], TIME.size, axis=0)
     inside[:, ENGINE] += np.outer(0.02 * np.sin(2 * np.pi * periods * TIME / LANDS), (0.2, 0.6, 0.8))
@@ -61,17 +61,17 @@ def momenta(periods: float, loose: float = 3.0) -> Samples:
     where[:, :, 2] = sine[:, np.newaxis] * inside[:, :, 1] + cosine[:, np.newaxis] * inside[:, :, 2]
     velocity = np.empty((TIME.size, len(TITLES), 3))
     velocity[:, :body] = np.gradient(where, TIME, axis=0, edge_order=2)
-    velocity[:, body:] = (0.0, loose, 0.0)
+    velocity[:, body:] = (0.0, 3.0, 0.0)
     velocity += (4.0, -2.5, -1.0)
-    for parts, begin in ((slice(body), LANDS), (slice(body, None), WHEELS_LAND)):
+    for parts, begin in ((slice(body), LANDS), (slice(body, None), wheels_land)):
         after = np.clip(TIME - begin, 0.0, None)[:, np.newaxis]
         velocity[:, parts, 2] += 2.0 * np.sin(60 * after) ** 2 - 9.81 * TIME[:, np.newaxis]
     return np.asarray(velocity * MASSES[:, np.newaxis])
 
 
-def t01(folder: Path, periods: float, loose: float = 3.0) -> str:
+def t01(folder: Path, periods: float, wheels_land: float = WHEELS_LAND) -> str:
     """Write the time history, and give its name."""
-    moved = momenta(periods, loose)
+    moved = momenta(periods, wheels_land)
     energy = 50.0 + 20.0 * np.cos(2 * np.pi * 90 * TIME) * np.exp(-10 * TIME)
     parts = [MadePart(part, title, _CODES) for part, title in TITLES.items()]
     made = headed(parts, globals_=len(_CODES))

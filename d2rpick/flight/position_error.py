@@ -51,6 +51,8 @@ _HEAVY: Final = 0.05
 # Others that bend so make the error a lower bound.  In computed cars whose errors came out right this was at most 0.24,
 # in a public one whose error was three and four times as large 1.1 and 1.4.
 _NOTABLE_DOUBT: Final = 1 / 3
+# What moves the body by less than this share of the limit may be three times as much: it stays in place.
+_HARDLY: Final = 0.01
 # A body that has flown so many times its error is not out of place: that is a third of the margin before a contact,
 # 3 % of the flight, within which runs have moved their landing.
 MOST_OF_PATH: Final = 0.01
@@ -93,11 +95,13 @@ class Drift:
         A slow one of the part does.  So does that of the others, where it turns their frame by more than is said of
         the body, or where no deck tells that, moves them by a notable share of what the part does.
         """
-        if self.turning:
-            said = np.radians(self.angles(self.time, float(self.time[-1])))
-            return self.slow or self.turning.doubt > float(np.sqrt(np.mean(said**2)))
-        moved = np.sqrt(np.mean(np.square(self.place - self.place.mean(axis=0)).sum(axis=1)))
-        return self.slow or self.doubt > _NOTABLE_DOUBT * float(moved)
+        moved = float(np.sqrt(np.mean(np.square(self.place - self.place.mean(axis=0)).sum(axis=1))))
+        if moved <= _HARDLY * self.limit:
+            return False
+        if self.slow or self.turning is None:
+            return self.slow or self.doubt > _NOTABLE_DOUBT * moved
+        said = np.radians(self.angles(self.time, float(self.time[-1])))
+        return self.turning.doubt > float(np.sqrt(np.mean(said**2)))
 
     def errors(self, tr: Samples, td: float) -> Samples:
         """Distances of the body at td from where it should be, for times tr (k,) [length]; NaN outside the flight.
