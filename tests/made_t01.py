@@ -31,6 +31,13 @@ class T01Writer:
         if numbers:
             self.record(np.array(numbers, ">f4").tobytes())
 
+    def state(self, time: float, whole: Sequence[float], parts: Sequence[float], subset_variables: int = 2) -> None:
+        self.reals([time])
+        self.reals(whole)
+        self.reals(parts)
+        self.reals([0.0] * subset_variables)
+        self.reals([0.0] * 18)
+
 
 @dataclass(frozen=True)
 class MadePart:
@@ -55,6 +62,18 @@ def t01(
     subset_variables: int = 2,
     start: int = 0,
 ) -> T01Writer:
+    made = headed(parts, globals_=globals_, code=code, title=title, subset_variables=subset_variables)
+    for state in range(start, start + states):
+        globals_of = [value(state, 0, code) for code in range(1, globals_ + 1)]
+        of_parts = [value(state, part.id, code) for part in parts for code in part.codes]
+        made.state(state / 8, globals_of, of_parts, subset_variables)
+    return made
+
+
+def headed(
+    parts: Sequence[MadePart], *, globals_: int, code: int = 3040, title: int = 40, subset_variables: int = 2
+) -> T01Writer:
+    """Write what stands before the states."""
     made = T01Writer()
     made.record(struct.pack(">i", code) + b"made for tests".ljust(80))
     made.record(b"Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss,       linuxa64 gf".ljust(80))
@@ -77,10 +96,4 @@ def t01(
     for node in (5, 6, 7):
         made.record(struct.pack(">i", node) + b"corner".ljust(title))
     made.integers(*range(1, 7))
-    for state in range(start, start + states):
-        made.reals([state / 8])
-        made.reals([value(state, 0, code) for code in range(1, globals_ + 1)])
-        made.reals([value(state, part.id, code) for part in parts for code in part.codes])
-        made.reals([0.0] * subset_variables)
-        made.reals([0.0] * 18)
     return made

@@ -51,7 +51,8 @@ class Candidate(NamedTuple):
     is a further mode.  ``parts``: what each part has of the mismatch, empty where single parts are not known.
     ``position_error``: how far a body is out of place at td [length], because ``position_error_part`` is frozen
     elsewhere; of several bodies the largest, ``position_error_body`` has the parts of that one.
-    ``position_error_assumes`` says what is taken for granted where no deck tells which parts become one body.
+    ``position_error_assumes`` says what is taken for granted where no deck tells which parts become one body;
+    ``position_error_is_lower_bound``: it may be further off, by inner motion that passes for the rotation of the body.
     """
 
     rank: int
@@ -81,6 +82,7 @@ class Candidate(NamedTuple):
     position_error_part: str | None = None
     position_error_body: str | None = None
     position_error_assumes: str | None = None
+    position_error_is_lower_bound: bool | None = None
 
     @property
     def error(self) -> float:
@@ -333,6 +335,7 @@ def _position(worst: Off | None) -> dict[str, Any]:
         "position_error_part": worst.part,
         "position_error_body": worst.body.name if worst.body and worst.part else None,
         "position_error_assumes": ONE_BODY if worst.assumed else None,
+        "position_error_is_lower_bound": worst.at_least,
     }
 
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.warnings import Caution
+from d2rpick.deck.inventory.pieces import pieces_of
 from d2rpick.errors import FormatError, are, name_units
 
 if TYPE_CHECKING:
@@ -52,11 +54,19 @@ def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
 
 
 def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
-    """Say so where ties that are not followed may join the rigid bodies that parts become."""
-    if inventory.ties and len(inventory.groups(parts)) > 1:
+    """Say so where ties that are not followed may join the rigid bodies that parts become, or one has loose pieces."""
+    if inventory.ties and len(inventory.bodies(parts)) > 1:
         more = f" and {len(inventory.ties) - 1} more ties" if len(inventory.ties) > 1 else ""
         found = f"{inventory.ties[0]}{more} may join parts that share no nodes, which is not followed"
         yield Caution("ties-not-followed", f"{found}; parts that are tied belong in one rigid body")
+    cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece a part of its own"
+    cure = cure if inventory.solver == "ls-dyna" else "each of them needs a rigid body of its own"
+    for body in bodies_of(inventory, parts):
+        if not (body.whole or inventory.ties):
+            lies = f"{name_units(body.parts)} {'lies' if len(body.parts) == 1 else 'lie'}"
+            yield Caution(
+                "loose-pieces", f"{lies} in {pieces_of(inventory, body.parts)} pieces that nothing joins; {cure}"
+            )
 
 
 def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:

@@ -116,4 +116,4 @@ def _reported_wrong(
 
 
 def _names(parts: Iterable[Part]) -> str:
-    return listing([part.title or f"part {part.id}" for part in parts])
+    return listing([part.name for part in parts])

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 _LIKE: Final = 0.01
 # The heaviest parts that together have this share of the mass of all that may be switched.
 _HEAVY: Final = 0.5
+_ALL, _STILL = "all that may", "all but what moves"
 _NO_ANGLE: Final = "the momenta of the parts do not tell how a body of them turns; the angle error is not known"
 
 
@@ -58,12 +59,14 @@ class PartSet:
     ``bodies`` are the rigid bodies that its parts make, ``cost_share`` is what they save of a step [-].
     ``step_growth`` is how much the step may grow then [-], infinite where nothing deformable keeps it; predictions
     take that of the settings.  ``window`` is (tr, td) in the longest flight [time], ``rigid_fraction`` its share of
-    the record [-].  ``angle_error`` is by how much a body is turned at td from where it should be [degrees].
+    the record [-].  ``angle_error`` is by how much a body is turned at td from where it should be [degrees]; it and the
+    position error may be larger where ``position_is_lower_bound``.  ``moving`` are the parts that move against the
+    rest, ``apart``: some of them fly away from the body that they are to become one with.
     """
 
     name: str
     parts: tuple[int, ...]
-    bodies: tuple[tuple[int, ...], ...]
+    bodies: tuple[tuple[int, ...], ...] = ()
     elements: int | None = None
     element_fraction: float | None = None
     mass_fraction: float | None = None
@@ -78,6 +81,9 @@ class PartSet:
     position_body: tuple[int, ...] | None = None
     position_assumes: str | None = None
     angle_error: float | None = None
+    position_is_lower_bound: bool | None = None
+    moving: frozenset[int] = frozenset()
+    apart: bool = False
     reasons: tuple[str, ...] = ()
     recommended: bool = False
 
@@ -88,10 +94,9 @@ class PartSet:
 
     @property
     def out_of_place(self) -> bool:
-        """Whether the position error is beyond its limit."""
-        return self.position_error is not None and self.position_limit is not None and (
-            self.position_error > self.position_limit
-        )  # fmt: skip
+        """Whether the position error is beyond its limit, or a part flies away from the body it is to be one with."""
+        known = self.position_error is not None and self.position_limit is not None
+        return self.apart or (known and self.position_error > self.position_limit)  # type: ignore[operator]
 
 
 class Parts(NamedTuple):
@@ -155,10 +160,13 @@ def parts_of(
     rows = rows_of(facts, model, steps)
     comparison = _Comparison(run, settings, model, rows, steps)
     sets: list[PartSet] = []
-    for one in _sets(rows, inventory, given):
+    for one in _sets(rows, given):
         td = next((other.window[1] for other in sets if other.window), None)  # the same for all, to be compared
         sets.append(comparison.of(one, times or td))
-    found = tuple(_with_recommendation(sets))
+        left = tuple(part for part in one.parts if part not in sets[-1].moving) if one.name == _ALL else ()
+        if left and sets[-1].moving:  # they may fly longer without what moves
+            sets.append(comparison.of(PartSet(_STILL, left), times))
+    found = tuple(_with_recommendation(_distinct(sets)))
     cautions = (*((foreign,) if foreign else ()), *_cautions(facts, model, rows, found))
     return Parts(run, inventory, model.weights if model else None, settings, facts, rows, found, cautions)
 
@@ -200,22 +208,22 @@ def with_cost_of(settings: Settings, model: CostModel, parts: Sequence[int]) -> 
     return replace(settings, cost_share=share.value), share
 
 
-def _sets(rows: Sequence[PartRow], inventory: Inventory | None, given: Sequence[int]) -> Iterator[PartSet]:
-    """Name the sets worth comparing; none twice."""
+def _distinct(sets: Sequence[PartSet]) -> list[PartSet]:
+    """Leave out what is there already under another name."""
+    return [one for at, one in enumerate(sets) if one.parts not in [other.parts for other in sets[:at]]]
+
+
+def _sets(rows: Sequence[PartRow], given: Sequence[int]) -> Iterator[PartSet]:
+    """Name the sets worth comparing."""
     movable = [row for row in rows if row.movable]
     stopped = [row for row in movable if row.flight and row.flight.deforms is False]
     named = {
-        "all that may": movable,
+        _ALL: movable,
         "stopped deforming": stopped,
         "heavy": _heavy(movable),
         "given": [row for row in rows if row.id in given],
     }
-    seen: set[tuple[int, ...]] = set()
-    for name, members in named.items():
-        ids = tuple(row.id for row in members)
-        if ids and ids not in seen:
-            seen.add(ids)
-            yield PartSet(name, ids, inventory.bodies(ids) if inventory else ())
+    yield from (PartSet(name, tuple(row.id for row in members)) for name, members in named.items() if members)
 
 
 def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
@@ -268,6 +276,8 @@ class _Comparison:
         computed = [row.id for row in self.rows if row.elements and row.kind not in ("rigid", "void")]
         return replace(
             one,
+            bodies=inventory.bodies(one.parts),
+            moving=self._loose(inventory, one.parts),
             elements=sum(within.values()),
             element_fraction=sum(within.values()) / sum(whole.values()) if whole else None,
             mass_fraction=self._mass_fraction(one.parts),
@@ -282,6 +292,12 @@ class _Comparison:
         if len(known) < len(masses) or not set(parts) <= known.keys() or not sum(known.values()):
             return None
         return sum(known[part] for part in parts) / sum(known.values())
+
+    def _loose(self, inventory: Inventory, parts: Sequence[int]) -> frozenset[int]:
+        """Parts of other rigid bodies than the heaviest; none where ties that are not followed may join these."""
+        masses = {row.id: row.mass or 0.0 for row in self.rows}
+        main = max(inventory.bodies(parts), key=lambda body: sum(masses.get(part, 0.0) for part in body), default=())
+        return frozenset() if inventory.ties else frozenset(parts) - {*main}
 
     def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
         """Find when the set may be rigid; RangeError with the reason where it may not."""
@@ -304,13 +320,15 @@ class _Comparison:
 
 def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
     """Add how far the body that is off most is out of place at td since its parts moved against each other before."""
-    why = tuple(caution.message for caution in out_of_place(situation, tr) if caution.code == "several-bodies")
+    told = ("several-bodies", "moves-apart")
+    why = tuple(caution.message for caution in out_of_place(situation, tr) if caution.code in told)
     bodies = situation.bodies
     worst = bodies.worst(tr, situation.td) if bodies else None
     if bodies is None or worst is None:
-        return replace(one, reasons=why)
+        apart = {part.id for part in bodies.apart} if bodies else set()
+        return replace(one, reasons=why, moving=one.moving | apart, apart=bool(apart))
     angle = float(worst.drift.angles(np.array([tr]), situation.td)[0])
-    return replace(
+    placed = replace(
         one,
         position_error=worst.error,
         position_limit=bodies.limit if worst.part else None,
@@ -318,7 +336,9 @@ def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
         position_body=worst.body.parts if worst.body and worst.part else None,
         position_assumes=ONE_BODY if worst.assumed else None,
         angle_error=None if np.isnan(angle) else angle,
+        position_is_lower_bound=worst.at_least,
     )
+    return replace(placed, moving=one.moving | {*worst.drift.moving}) if placed.out_of_place else placed
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.inventory.model import DISCRETE
+from d2rpick.deck.inventory.pieces import pieces_of
 from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ def _kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None
 def _judged(row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None) -> PartRow:
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
-    kept = tuple(_to_keep(row, fact, data, alone))
+    kept = tuple(_to_keep(row, fact, data, alone)) or tuple(_in_pieces(row, inventory))
     if kept:
         return replace(row, verdict=KEEP, reasons=kept)
     open_ = tuple(_not_known(row, facts, inventory, data))
@@ -161,6 +162,15 @@ def _to_keep(row: PartRow, fact: PartFacts | None, data: PartData | None, alone:
         yield "stresses of its solids do not turn with a rigid body"
     if row.id == alone:
         yield "drives the landing alone, at little cost"
+
+
+def _in_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
+    """Say so where LS-DYNA, which switches parts, would make one rigid body of what nothing joins."""
+    if inventory is None or inventory.solver != "ls-dyna" or inventory.ties or not inventory.complete:
+        return
+    pieces = pieces_of(inventory, [row.id], among=inventory.parts.keys())
+    if pieces > 1:
+        yield f"{pieces} pieces that nothing joins, of which one rigid body would be made"
 
 
 def _not_known(row: PartRow, facts: RunFacts, inventory: Inventory | None, data: PartData | None) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from d2rpick.deck.inventory.pieces import pieces_of
 from d2rpick.flight.bodies import RigidBody
 
 if TYPE_CHECKING:
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
 def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, ...]:
     """Give the rigid bodies that these parts become; none where elements, or ties between bodies, are not known.
 
-    A part whose elements do not hang together is one body all the same in LS-DYNA, which switches parts; in Radioss,
-    where a body is a set of nodes, each piece may have a body of its own.
+    A part in pieces that nothing joins is one body all the same in LS-DYNA, which switches parts; in Radioss, where a
+    body is a set of nodes, each piece may have a body of its own.
     """
     if not inventory.complete or not inventory.counts.keys() >= set(parts):
         return ()
@@ -27,4 +28,5 @@ def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, 
 
 
 def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
-    return len(body) > 1 or inventory.solver == "radioss" or inventory.pieces(body[0]) == 1
+    alone = len(body) == 1 and inventory.solver == "radioss"
+    return alone or frozenset(body) in inventory.ready or pieces_of(inventory, body) == 1

@@ -160,7 +160,7 @@ def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Cautio
     if rigid is None:
         return
     if rigid.any():
-        names = [part.title or f"part {part.id}" for part, one in zip(parts, rigid.tolist(), strict=True) if not one]
+        names = [part.name for part, one in zip(parts, rigid.tolist(), strict=True) if not one]
         if names and history.parts:
             found = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {listing(names)}"
             yield Caution("partly-rigid", f"{found}; the window counts as done for the others")

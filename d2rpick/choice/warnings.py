@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.errors import name_units
+from d2rpick.errors import listing, name_units
 from d2rpick.histories.digits import not_after, window_as_read
 
 if TYPE_CHECKING:
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.situation import Situation
     from d2rpick.flight.bodies import RigidBody
+    from d2rpick.histories.history import Part
 
 # Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.
 POOR_KINETIC_SHARE = 0.5
@@ -106,16 +107,25 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
         return
     if len(bodies.told) > 1 and bodies.unknown:
         yield Caution("several-bodies", _not_predicted(bodies.told, bodies.unknown))
+    if bodies.apart:
+        yield Caution("moves-apart", _moves_apart(bodies.apart))
     worst = bodies.worst(tr, situation.td)
     if worst is None or worst.error <= bodies.limit:
         return
     drift, which = worst.drift, f" of {name_units(worst.body.parts)}" if worst.body else ""
     share, last = worst.error / float(drift.path[-1]), float(drift.time[-1] - drift.time[0])
-    found = f"{drift.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
-    off = f"there the body{which} is off by {worst.error:.3g}, {share:.1%} of its path in the flight"
+    found = f"{drift.part.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
+    least = "at least " * worst.at_least
+    off = f"there the body{which} is off by {least}{worst.error:.3g}, {share:.1%} of its path in the flight"
     taken = "; this holds if the parts become one rigid body" if worst.assumed else ""
     taken += ", which `deck` tells" if worst.assumed and situation.settings.bodies is None else ""
     yield Caution("out-of-place", f"{found}: {off}; the next contact may move by {share * last:.2g}{taken}")
+
+
+def _moves_apart(parts: Sequence[Part]) -> str:
+    """Name the parts that nothing holds in a body."""
+    away = f"{listing([part.name for part in parts])} fl{'ies' if len(parts) == 1 else 'y'} away from the other parts"
+    return f"{away}: nothing joins them, and one rigid body of them would move as none of them does; leave these out"
 
 
 def _not_predicted(told: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.errors import listing, name_units
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -87,8 +88,13 @@ def with_cost(
         settings, cautions = by_deck.with_deck(settings, reference, model)
     parts = reference.history.parts
     if merge is not None and parts:
+        from d2rpick.choice.warnings import Caution
         from d2rpick.flight.bodies import RigidBody
 
+        bodies = [name_units(body.parts) for body in settings.bodies or ()]
+        if len(bodies) > 1:
+            found = f"--merge {merge} makes one rigid body of what nothing joins: {listing(bodies, between='; ')}"
+            cautions = (*cautions, Caution("merged-apart", f"{found}; leave it out to keep them apart"))
         merged = tuple(sorted({part.id for part in parts} | {merge}))
         told = any(body.whole for body in settings.bodies or ())  # a part alone may be of pieces
         settings = replace(settings, bodies=(RigidBody(merged, whole=len(merged) > 1 or told),))

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick.flight.position_error import Drift, drift_in_flight
+from d2rpick.flight.position_error import Drift, apart_in_flight, drift_in_flight
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.deck.inventory.placement import Placement
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.history import History, Part, Samples
 
 
 class RigidBody(NamedTuple):
@@ -38,28 +38,32 @@ class RigidBody(NamedTuple):
 class Off(NamedTuple):
     """How far the body that is off most will be [length], and how it drifts; ``body`` is named where there are several.
 
-    ``assumed``: no deck tells that the parts become one body.
+    ``assumed``: no deck tells that the parts become one body.  ``at_least``: it may be further off, or another body is.
     """
 
     error: float
     drift: Drift
     body: RigidBody | None
     assumed: bool
+    at_least: bool = False
 
     @property
     def part(self) -> str | None:
         """Name of the part that is frozen elsewhere; None where nothing is."""
-        return self.drift.name if self.error > 0 else None
+        return self.drift.part.name if self.error > 0 else None
 
 
 class Bodies:
     """Rigid bodies of a flight, each with its drift; ``told`` are those of a deck, none where one body is assumed.
 
-    Where the drift of one of them is not known, no error is: it may be the largest.
+    Where the drift of one of them is not known, no error is: it may be the largest.  ``apart`` are parts that are to
+    become one body with others, and fly away from them.
     """
 
-    def __init__(self, drifts: Sequence[Drift | None], told: Sequence[RigidBody] | None) -> None:
-        self.told = tuple(told or ())
+    def __init__(
+        self, drifts: Sequence[Drift | None], told: Sequence[RigidBody] | None, apart: Sequence[Part] = ()
+    ) -> None:
+        self.told, self.apart = tuple(told or ()), tuple(apart)
         self._known = tuple(one for one in drifts if one)
         self._complete = len(self._known) == len(drifts) > 0
         self.unknown = tuple(body for body, one in zip(self.told, drifts, strict=False) if one is None)
@@ -80,7 +84,7 @@ class Bodies:
             return None
         at = int(np.argmax(found))
         body = self.told[at] if len(self.told) > 1 else None
-        return Off(float(found[at]), self._known[at], body, not self.told)
+        return Off(float(found[at]), self._known[at], body, not self.told, any(one.at_least for one in self._known))
 
     def _each(self, tr: Samples, td: float) -> Samples:
         """Errors by body, shape (bodies, k) [length]."""
@@ -103,8 +107,15 @@ def bodies_in_flight(
         Where the deck puts the parts.
     """
     if not told:
-        return Bodies([drift_in_flight(history, flight, placement=placement)], None)
-    return Bodies([_drift(history, flight, body, placement) for body in told], told)
+        apart = apart_in_flight(history, flight)
+        return Bodies([None if apart else drift_in_flight(history, flight, placement=placement)], None, apart)
+    found = [_drift(history, flight, body, placement) for body in told]
+    away = [_apart(history, flight, body) for body in told]
+    return Bodies([None if parts else one for one, parts in zip(found, away, strict=True)], told, sum(away, ()))
+
+
+def _apart(history: History, flight: Flight, body: RigidBody) -> tuple[Part, ...]:
+    return apart_in_flight(history, flight, [part for part in history.parts or () if part.id in body.parts])
 
 
 def _drift(history: History, flight: Flight, body: RigidBody, placement: Placement | None) -> Drift | None:

@@ -25,6 +25,8 @@ _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
 # Directions in which arms move by less than this share of the others, squared, cannot be told: along the axis.
 _ALONG_AXIS: Final = 1e-6
+# Periods in the record that are tried: in steps of a twentieth up to two, then by so much more each.
+_PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
 
 class Rotation(NamedTuple):
@@ -90,6 +92,25 @@ def off_the_circle(time: Samples, ways: Samples, rate: Samples) -> Samples:
     right = np.tensordot(turned, frame, axes=((0, 2), (0, 2)))
     arms = right @ np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True)
     return np.asarray(turned - arms @ frame)
+
+
+def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
+    """Give the number of periods in the record of the harmonic motion that explains best what is left of a way.
+
+    A motion of less than a period and an arc are alike: the circle that was taken off took most of it along.  So a
+    circle is taken off each motion before it is held against ``left`` (n, 3), a way without its own.  Infinite where
+    none explains half of that.
+    """
+    wanted = (left - left.mean(axis=0)).ravel()
+    least, found = 0.5 * float(wanted @ wanted), np.inf
+    for periods in _PERIODS:
+        phase = 2 * np.pi * periods * (time - time[0])[:, np.newaxis, np.newaxis] / (time[-1] - time[0])
+        motions = np.concatenate([np.cos(phase) * np.eye(3), np.sin(phase) * np.eye(3)], axis=1)
+        columns = off_the_circle(time, motions, rate).transpose(0, 2, 1).reshape(wanted.size, -1)
+        rest = float(np.sum((wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=_ALONG_AXIS)[0]) ** 2))
+        if rest < least:
+            least, found = rest, float(periods)
+    return found
 
 
 def least_ways(ways: Samples, masses: Samples) -> Samples:

@@ -35,6 +35,8 @@ _MOST_BENT: Final = 0.05
 _STATES: Final = 2000
 # Parts that hang together make the frame where they have half of the mass of the body; else all that stand still do.
 _MOST: Final = 0.5
+# Share of their inertia below which parts lie on a line.
+_ALONG_LINE: Final = 1e-9
 
 
 class Turning(NamedTuple):
@@ -42,7 +44,8 @@ class Turning(NamedTuple):
 
     ``place`` (n, 3): of the body against the centre of mass of all that flies, as far as parts that become rigid push
     it; ``arm`` (n, 3) from there to where errors are looked at [length]; ``inertia`` (n, 3, 3) of those parts;
-    ``carried`` (n, 3, 3), ``pushed`` (n, 3) and ``kept`` (n, 3, 3, 3) solve the equation of psi.
+    ``carried`` (n, 3, 3), ``pushed`` (n, 3) and ``kept`` (n, 3, 3, 3) solve the equation of psi.  ``doubt`` is by how
+    much the bending of the body turns its frame from one time to another [rad].
     """
 
     time: Samples
@@ -52,6 +55,7 @@ class Turning(NamedTuple):
     carried: Samples
     pushed: Samples
     kept: Samples
+    doubt: float
 
     def angles(self, tr: Samples, td: float) -> Samples:
         """By what a body that is rigid from each of ``tr`` (k,) is turned at td: psi, (k, 3) [rad]."""
@@ -162,7 +166,22 @@ def turning_of(time: Samples, parts: Parts, looked_at: Samples | None) -> Turnin
     moving = _inertia(_second(places[:, rigid], mass[rigid]))
     solved = _solved(time, frames, (inertia, spin), (moving, _spin(places[:, rigid], mass[rigid])))
     place = np.einsum("p,npi->ni", mass[rigid], places[:, rigid] - middle[:, np.newaxis]) / mass.sum()
-    return Turning(time, place, middle + (0.0 if looked_at is None else looked_at - home), moving, *solved)
+    doubt = _doubt(shape, places[:, body] - middle[:, np.newaxis] - shape, mass[body])
+    return Turning(time, place, middle + (0.0 if looked_at is None else looked_at - home), moving, *solved, doubt)
+
+
+def _doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
+    """By how much the frame turns from one time to another where each of its parts in turn is left out (jackknife).
+
+    Parts about their centre, (parts, 3), are ``bent`` (n, parts, 3) off their shape; without one of them the others
+    turn by what its arm and its deviation would have held; two, about their line, by nothing.
+    """
+    count = mass.size
+    alone = mass * mass.sum() / (mass.sum() - mass)
+    others = _second(shape[np.newaxis], mass) - np.einsum("p,pi,pj->pij", alone, shape, shape)
+    light = np.linalg.pinv(_inertia(others), rcond=_ALONG_LINE, hermitian=True)
+    turned = np.einsum("pij,npj->npi", light, alone[:, np.newaxis] * np.cross(shape, bent))
+    return float(np.sqrt(2 * (count - 1) / count * turned.var(axis=0).sum()))
 
 
 def _solved(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 import numpy as np
 
 from d2rpick.errors import FormatError, listing
-from d2rpick.histories.history import Precision, newest_states
+from d2rpick.histories.history import Precision, newest_states, with_namesakes
 from d2rpick.histories.names import quantity_of, resolve
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ class Legs:
     @cached_property
     def parts(self) -> tuple[Part, ...]:
         """Parts that all legs have."""
-        return tuple(part for part in self._legs[0].parts if part.id not in self._passing)
+        return with_namesakes(part for part in self._legs[0].parts if part.id not in self._passing)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:

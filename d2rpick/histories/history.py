@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias
@@ -14,7 +15,7 @@ from d2rpick.histories.digits import told_apart
 from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Sequence
+    from collections.abc import Hashable, Iterable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -72,6 +73,35 @@ class Part(NamedTuple):
 
     id: int
     title: str
+
+    @property
+    def name(self) -> str:
+        """What to call it: its title, or its number."""
+        return self.title or f"part {self.id}"
+
+
+class Namesake(Part):
+    """A part whose title another one has too, which its number tells apart."""
+
+    __slots__ = ()
+
+    @property
+    def name(self) -> str:
+        """Title and number."""
+        return f"{self.title} ({self.id})"
+
+
+def with_namesakes(parts: Iterable[Part]) -> tuple[Part, ...]:
+    """Let parts of one title be told apart by number.
+
+    Examples
+    --------
+    >>> [part.name for part in with_namesakes([Part(1, "shell"), Part(2, "door"), Part(7, "shell"), Part(9, "")])]
+    ['shell (1)', 'door', 'shell (7)', 'part 9']
+    """
+    every = tuple(parts)
+    times = Counter(part.title for part in every if part.title)
+    return tuple(Namesake(*part) if times[part.title] > 1 else part for part in every)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -227,7 +227,7 @@ class Run:
             left_out[:] = False
         idle = [part for part, energy in zip(chosen, energies.T, strict=True) if not energy.any()]
         notes = (f"without any internal energy: part {menu(idle)}; rigid, or without elements?",) if idle else ()
-        every = [part.title or f"part {part.id}" for part in chosen]
+        every = [part.name for part in chosen]
         names, apart = ([name for name, out in zip(every, left_out, strict=True) if out == of] for of in (False, True))
         channel = "internal energy of " + ", ".join(names)
         if apart:

@@ -29,7 +29,7 @@ def measures_of(health: Health) -> list[Measure]:
     """All measures of a run, those of its window last."""
     low, high = health.energy_ratio_min, health.energy_ratio_max
     span = None if low is None or high is None else (low, high)
-    part = f"hourglass energy of {health.part.title or health.part.id}" if health.part else "hourglass energy of parts"
+    part = f"hourglass energy of {health.part.name if health.part else 'parts'}"
     found = [
         _share("hourglass energy", health.hourglass_share, limits.MOST_HOURGLASS),
         _share(part, health.part_hourglass_share, limits.MOST_HOURGLASS),

@@ -107,6 +107,7 @@ CANDIDATE: Final[Mapping[str, Callable[[Candidate], Any]]] = {
     "position_error_part": lambda c: c.position_error_part,
     "position_error_body": lambda c: c.position_error_body,
     "position_error_assumes": lambda c: c.position_error_assumes,
+    "position_error_is_lower_bound": lambda c: c.position_error_is_lower_bound,
 }
 
 
@@ -120,6 +121,7 @@ MEASURES: Final = (
     *("energy", "energy_ratio", "level_error", "sign_match", "lock_in_error", "residual", "residual_high"),
     *("part_mismatch", "timing_tolerance", "rigid_time", "rigid_fraction", "run_time_share"),
     *("position_error", "position_error_part", "position_error_body", "position_error_assumes"),
+    "position_error_is_lower_bound",
 )
 
 

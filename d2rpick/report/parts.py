@@ -43,6 +43,7 @@ SET = (
     "name", "recommended", "parts", "bodies", "elements", "element_fraction", "mass_fraction", "cost_share",
     "step_growth", "step_free", "tr", "td", "rigid_fraction", "run_time_share", "saving", "position_error",
     "position_limit", "position_part", "position_body", "position_assumes", "angle_error", "reasons",
+    "position_is_lower_bound",
 )  # fmt: skip
 _MOST_SHOWN = 6
 
@@ -196,6 +197,7 @@ def set_(one: PartSet) -> dict[str, Any]:
         "position_assumes": one.position_assumes,
         "angle_error": one.angle_error,
         "reasons": list(one.reasons),
+        "position_is_lower_bound": one.position_is_lower_bound,
     }
 
 
@@ -258,7 +260,7 @@ def set_rows(found: Parts) -> list[list[tables.Cell]]:
             _percent(one.run_time_share),
             _percent(one.saving),
             _position(one),
-            _short(one.angle_error),
+            _least(one, one.angle_error),
         ]
         for one in found.sets
     ]
@@ -266,7 +268,13 @@ def set_rows(found: Parts) -> list[list[tables.Cell]]:
 
 def _position(one: PartSet) -> str | None:
     """How far a set is out of place, and what that takes for granted."""
-    return f"{_short(one.position_error)} if one body" if one.position_assumes else _short(one.position_error)
+    found = _least(one, one.position_error)
+    return f"{found} if one body" if one.position_assumes else found
+
+
+def _least(one: PartSet, value: float | None) -> str | None:
+    """An error, and whether it may be larger."""
+    return f">= {value:.3g}" if one.position_is_lower_bound and value is not None else _short(value)
 
 
 def verdict(row: PartRow) -> str:

@@ -24,7 +24,7 @@ WINDOW = (
     "flight", "flight_start", "flight_end", "flight_source", "certain", "status", "reason", "tr", "td", "rigid_time",
     "rigid_fraction", "run_time_share", "locks_in", "basis", "kind", "level_error", "lock_in_error", "residual",
     "kinetic_share", "margin", "margin_source", "landing_spread", "landing", "landing_planned", "position_error",
-    "position_error_part", "position_error_body", "position_error_assumes", "quality",
+    "position_error_part", "position_error_body", "position_error_assumes", "quality", "position_error_is_lower_bound",
 )  # fmt: skip
 
 
@@ -106,6 +106,7 @@ def window(plan: Plan, row: Planned) -> dict[str, Any]:
         "position_error_body": best.position_error_body if best else None,
         "position_error_assumes": best.position_error_assumes if best else None,
         "quality": row.quality.grade if row.quality else None,
+        "position_error_is_lower_bound": best.position_error_is_lower_bound if best else None,
     }
 
 
@@ -198,7 +199,8 @@ def _place(row: Planned) -> str | None:
     best = row.candidate
     if best is None or best.position_error is None:
         return None
-    return f"{best.position_error:.2g}{' if one body' if best.position_error_assumes else ''}"
+    least = ">= " if best.position_error_is_lower_bound else ""
+    return f"{least}{best.position_error:.2g}{' if one body' if best.position_error_assumes else ''}"
 
 
 def _run_time(row: Planned) -> str | None:

@@ -37,7 +37,7 @@ def what_was_read(history: History) -> str:
 
 def energy_name(history: History) -> str:
     """Name the energy; of many parts the first ones."""
-    parts = [part.title or f"part {part.id}" for part in history.parts or () if part not in history.springs]
+    parts = [part.name for part in history.parts or () if part not in history.springs]
     return history.channel if len(parts) <= _NAMED else f"internal energy of {listing(parts, most=_NAMED)}"
 
 
@@ -54,7 +54,7 @@ def heading(situation: Situation) -> list[str]:
         lines.append("flight   unknown")
     else:
         end = "no next contact found" if flight.end is None else f"to {flight.end:.6g}"
-        parts = [part.title or str(part.id) for part in flight.parts or ()]
+        parts = [part.name if part.title else str(part.id) for part in flight.parts or ()]
         who = f" of {listing(parts, most=_NAMED)}" if parts else ""
         lines.append(f"flight   from {flight.start:.6g} ({_source(flight)}{who}), {end}")
     return [printable(line) for line in lines]

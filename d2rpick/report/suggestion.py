@@ -179,7 +179,8 @@ def position(best: Candidate, *, deck: bool) -> str:
         return f"in place at td{taken}, as far as parts tell: none moves against the others of its rigid body"
     parts = best.position_error_body
     body = f", the body of {name_units(map(int, parts.split(',')))}" if parts else ""
-    return f"off by {best.position_error:.2g} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
+    least = "at least " if best.position_error_is_lower_bound else ""
+    return f"off by {least}{best.position_error:.2g} at td{body}{taken}: {best.position_error_part} is frozen elsewhere"
 
 
 def given_up(longer: Pair, chosen: Pair) -> str:

@@ -126,6 +126,25 @@ def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
     assert drift_of(momenta(np.zeros(3), slides), MASSES, range(5), FLIGHT) is None
 
 
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.25, 4.0).filter(lambda periods: abs(periods - 1) > 0.2), vectors, st.floats(0.0, 6.0))
+def test_a_swing_of_less_than_a_period_makes_the_error_a_lower_bound(
+    periods: float, turn: Samples, phase: float
+) -> None:
+    """Most of it passes for the rotation: the error comes out too small, down to a tenth."""
+    slides = np.zeros((TIME.size, *PLACES.shape))
+    slides[:, ENGINE] = np.outer(np.sin(2 * np.pi * periods * TIME / TIME[-1] + phase), (0.004, 0.012, 0.016))
+    found = drift(momenta(4.0 * turn + np.array([2.0, 0.0, 0.0]), slides))
+    assert found.slow is (periods < 1)
+    assert found.at_least is found.slow
+
+
+def test_without_rotation_a_slow_swing_passes_for_nothing() -> None:
+    slides = np.zeros((TIME.size, *PLACES.shape))
+    slides[:, ENGINE, 0] = 0.02 * np.sin(np.pi * TIME / TIME[-1])
+    assert not drift(momenta(np.zeros(3), slides)).at_least
+
+
 @cache
 def solved(name: str, parts: str) -> Reference:
     return read([stored(name)], Selection(parts=(parts,)))
@@ -169,6 +188,25 @@ def test_the_car_is_as_far_off_as_computed() -> None:
 def test_the_box_is_as_far_off_as_computed(tr: float, td: float, flight: tuple[float, float], computed: float) -> None:
     """drop2_runs.csv: the box 0.2 ms before td of the windows w2, w123_m8 and w3."""
     assert errors("drop2T01.gz", "1-5", flight, [tr], td)[0] == pytest.approx(computed, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("name", "parts", "flight", "bound"),
+    [
+        ("carT01.gz", "1-14", (0.0386, 0.1503), False),
+        ("carT01.gz", "1,4,5,7,11", (0.0386, 0.1503), True),  # 0.5 mm where the solver found 0.9
+        ("drop2T01.gz", "1-5", (0.3396, 0.4194), False),
+        ("drop2T01.gz", "1-5", (0.5022, 0.5962), False),
+    ],
+)
+def test_of_computed_runs_those_that_come_out_too_small_are_lower_bounds(
+    name: str, parts: str, flight: tuple[float, float], bound: bool
+) -> None:
+    history = read([stored(name)], Selection(parts=tuple(parts.split(",")))).history
+    assert history.masses is not None
+    found = drift_of(history.momenta[0], history.masses, history.momenta[0].chosen, flight)
+    assert found is not None
+    assert found.at_least is bound
 
 
 def test_a_set_that_leaves_the_first_landing_part_out_is_off_as_far() -> None:

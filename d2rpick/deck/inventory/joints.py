@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.inventory.model import Places
+    from d2rpick.deck.radioss.files import Run
     from d2rpick.deck.radioss.starter import Starter
     from d2rpick.deck.reader import Deck
 
@@ -47,22 +48,27 @@ class Held(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """Joints that are followed, and names and places of ties of which it is not known which parts they hold."""
+    """Joints that are followed, and names and places of ties of which it is not known which parts they hold.
+
+    ``switched`` are rigid bodies that are there to be switched.
+    """
 
     found: tuple[Held, ...]
     unknown: tuple[str, ...]
+    switched: tuple[Held, ...] = ()
 
-    def placed(self, table: Places) -> tuple[Joint, ...]:
-        """Give the joints with the places of their nodes in a table of ids; nodes that are not in it are left out."""
-        if not self.found:
-            return ()
-        ends = np.cumsum([len(one.nodes) for one in self.found])
-        ids = np.fromiter(chain.from_iterable(one.nodes for one in self.found), np.int64, int(ends[-1]))
-        order = np.argsort(table, kind="stable")
-        at = np.minimum(np.searchsorted(table, ids, sorter=order), table.size - 1)
-        places = np.where(table[order[at]] == ids, order[at], NO_NODE) if table.size else np.full(ids.size, NO_NODE)
-        split = np.split(places, ends[:-1])
-        return tuple(Joint(one.kind, at[at != NO_NODE], one.parts) for one, at in zip(self.found, split, strict=True))
+
+def placed(held: Sequence[Held], table: Places) -> tuple[Joint, ...]:
+    """Give joints with the places of their nodes in a table of ids; nodes that are not in it are left out."""
+    if not held:
+        return ()
+    ends = np.cumsum([len(one.nodes) for one in held])
+    ids = np.fromiter(chain.from_iterable(one.nodes for one in held), np.int64, int(ends[-1]))
+    order = np.argsort(table, kind="stable")
+    at = np.minimum(np.searchsorted(table, ids, sorter=order), table.size - 1)
+    places = np.where(table[order[at]] == ids, order[at], NO_NODE) if table.size else np.full(ids.size, NO_NODE)
+    split = np.split(places, ends[:-1])
+    return tuple(Joint(one.kind, at[at != NO_NODE], one.parts) for one, at in zip(held, split, strict=True))
 
 
 def of_ls_dyna(deck: Deck) -> Joints:
@@ -106,13 +112,14 @@ def _of_contact(card: Card, sets: Callable[[], dict[int, frozenset[int]]]) -> He
     return Held("tied contact", nodes, frozenset({other + moved.part})) if nodes else None
 
 
-def of_radioss(starter: Starter, cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Joints:
-    """Collect the tied interfaces (/INTER/TYPE2) of a starter deck whose main surface is one part.
+def of_radioss(run: Run, starter: Starter, cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Joints:
+    """Collect the tied interfaces (/INTER/TYPE2) of a starter deck whose main surface is one part, and rigid bodies.
 
-    Rigid bodies are not followed: the starter does not tell those of the switching from others.
+    A rigid body that no engine file and no sensor switches is always on, and joins what it has nodes of.  Without
+    engine files all are taken for those that are switched.
     """
     surfaces = {whole(words[-1]): card for card, words in cards if words[:2] == ("SURF", "PART") and words[2:]}
-    found, unknown = [], []
+    found, switched, unknown = list[Held](), list[Held](), list[str]()
     for card, words in cards:
         interface = words[:2] == ("INTER", "TYPE2")
         tie = _of_interface(card, starter, surfaces) if interface else None
@@ -120,7 +127,16 @@ def of_radioss(starter: Starter, cards: Sequence[tuple[Card, tuple[str, ...]]]) 
             found.append(tie)
         elif interface or (words and words[0] in _OTHER_OF_RADIOSS):
             unknown.append(f"/{'/'.join(words)} ({card.file}:{card.line})")
-    return Joints(tuple(found), tuple(unknown))
+    named = {value.value for leg in run.legs for _, _, nodes in leg.switched for value in nodes}
+    for body in starter.bodies:
+        always = bool(run.legs) and not body.sensor and body.node.value not in named
+        members = starter.group_members(body.group)
+        if members:
+            held = Held("rigid body", frozenset(members[0] | {body.node.value}), frozenset(members[1]))
+            (found if always else switched).append(held)
+        elif always:
+            unknown.append(f"/RBODY/{body.id} ({body.card.file}:{body.card.line})")
+    return Joints(tuple(found), tuple(unknown), tuple(switched))
 
 
 def _of_interface(card: Card, starter: Starter, surfaces: dict[int, Card]) -> Held | None:

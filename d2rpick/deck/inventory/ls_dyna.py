@@ -94,7 +94,7 @@ def read(deck: Deck) -> Inventory:
     held = joints.of_ls_dyna(deck)
     return Inventory(
         "ls-dyna", _parts(deck, parts, elements), elements, np.concatenate([coordinates, beyond]), notes,
-        parts.all_known and not notes, joints=held.placed(table), ties=held.unknown,
+        parts.all_known and not notes, joints=joints.placed(held.found, table), ties=held.unknown,
         watched=places_of(_watched(deck), table), moved=_moves_nodes(deck), files=tuple(deck.sources),
     )  # fmt: skip
 

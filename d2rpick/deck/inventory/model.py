@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
 
 NO_NODE: Final = -1
-_ONE_BODY: Final = 0.75  # share of the nodes of some parts from which on one group of them is the body
 _LAYERS: Final = 3  # points through the thickness where the deck does not tell: most shells have 2 to 5
 _DENSE: Final = 50_000_000  # up to this id a table of all ids is small enough
-DISCRETE: Final = frozenset({"spring", "seatbelt"})  # kinds of elements that are not switched by part
+SPRING: Final = "spring"
+DISCRETE: Final = frozenset({SPRING, "seatbelt"})  # kinds of elements that are not switched by part
 
 
 class Formulation(NamedTuple):
@@ -99,7 +99,7 @@ class Elements:
 
 
 class Joint(NamedTuple):
-    """A weld, tie or nodal rigid body: ``kind`` is what to call it; places of its nodes, and parts that it names."""
+    """A weld, tie or rigid body: ``kind`` is what to call it; places of its nodes, and parts that it names."""
 
     kind: str
     nodes: Places
@@ -112,7 +112,8 @@ class Inventory:
 
     ``coordinates`` is (nodes, 3), NaN for a node that the deck does not place.  ``notes`` say what was not followed;
     ``complete`` is False where elements or parts may be missing because of it.  ``joints`` hold parts together that
-    share no nodes; ``ties`` do too, but it is not known which.  ``watched`` are the places of nodes whose motion is
+    share no nodes; ``ties`` do too, but it is not known which; ``switched`` are rigid bodies that are there to be
+    switched.  ``watched`` are the places of nodes whose motion is
     written.  ``moved``: something moves nodes away from the coordinates of the deck.  ``files`` are those of the deck.
     ``history_groups`` are the ids of /THPART: groups of elements that a time history lists among its parts.
     ``kept_off`` are main nodes of rigid bodies that a Radioss run keeps off, ``flaws`` what ruins it because of bodies.
@@ -125,6 +126,7 @@ class Inventory:
     notes: tuple[str, ...] = ()
     complete: bool = True
     joints: tuple[Joint, ...] = ()
+    switched: tuple[Joint, ...] = ()
     ties: tuple[str, ...] = ()
     watched: Places = field(default_factory=lambda: np.empty(0, np.int64))
     moved: bool = False
@@ -184,68 +186,77 @@ class Inventory:
 
     @cached_property
     def joined(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
-        """By part the others that welds, ties or nodal rigid bodies join to it, and what these are."""
+        """By part the others that welds, ties or rigid bodies join to it, and what these are."""
+        holds = (one for one, whole in zip(self.switched, self.ready, strict=True) if not whole)
+        return self._held_by([*self.joints, *holds])
+
+    @cached_property
+    def sprung(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
+        """By part the others that springs hold to it, which then move against it."""
+        ends = (elements.nodes for elements in self.elements if elements.kind == SPRING)
+        return self._held_by([Joint(SPRING, nodes[nodes != NO_NODE], frozenset()) for of in ends for nodes in of])
+
+    def _held_by(self, joints: Sequence[Joint]) -> Mapping[int, Mapping[int, frozenset[str]]]:
         wanted = np.zeros(len(self.coordinates), bool)
-        for _, nodes, _ in self.joints:
+        for _, nodes, _ in joints:
             wanted[nodes] = True
         owners: dict[int, set[int]] = {}
         for part, nodes in self.nodes_by_part.items():
             for node in nodes[wanted[nodes]].tolist():
                 owners.setdefault(node, set()).add(part)
         found: dict[int, dict[int, frozenset[str]]] = {}
-        for kind, nodes, parts in self.joints:
+        for kind, nodes, parts in joints:
             together = parts.union(*(owners.get(node, ()) for node in nodes.tolist()))
             for part in together:
                 own = found.setdefault(part, {})
                 own.update({other: own.get(other, frozenset()) | {kind} for other in together if other != part})
         return found
 
-    def bodies(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
-        """Rigid bodies that these parts make: one where most of their nodes hang together, else a body per group.
+    @cached_property
+    def ready(self) -> tuple[frozenset[int], ...]:
+        """Parts that lie whole in each of the rigid bodies that are there to be switched, springs left out."""
+        found = []
+        for _, nodes, parts in self.switched:
+            mask = self._mask(parts)
+            mask[nodes] = True
+            found.append(frozenset(part for part, own in self.nodes_by_part.items()
+                                   if not self._discrete(part) and mask[own].all()))  # fmt: skip
+        return tuple(found)
 
-        The parts of a car with an engine on its mounts are one body; an engine, a battery and wheels alone are several.
+    def bodies(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
+        """Rigid bodies that these parts make: what springs hold together is one too, what nothing joins never is.
+
+        A car with its engine on mounts is one body; engine, battery and wheels alone are several, as loose wheels are.
+        A rigid body that is there to be switched, and has none but these parts, makes one of those that it has;
+        parts on springs that it has in different ones stay apart.  Springs go with the body that has all their nodes.
         """
-        rigid = [part for part in parts if not self._discrete(part)] or parts
-        groups = self.groups(rigid)
-        largest = max((self.rigid_nodes(group) for group in groups), default=0)
-        if len(rigid) > 1 and (len(groups) == 1 or largest >= _ONE_BODY * self.rigid_nodes(rigid)):
-            return (tuple(sorted(parts)),)
-        return groups
+        rigid = {part for part in parts if not self._discrete(part)} or set(parts)
+        ready = [body for body in self.ready if body and body <= rigid]
+        of = {part: body for body in ready for part in body}
+
+        def linked(part: int) -> Iterable[int]:
+            own = of.get(part, frozenset[int]())
+            springs = (other for other in self.sprung.get(part, ()) if other in own or not (own and other in of))
+            return {*self._linked(part), *springs, *own}
+
+        springs = set(parts) - rigid
+        return tuple(tuple(sorted([*body, *self._within(body, springs)])) for body in _together(rigid, linked))
+
+    def _within(self, body: Collection[int], springs: Collection[int]) -> list[int]:
+        """Those of some parts of springs whose nodes are all nodes of a body."""
+        mask = self._mask(body if springs else ())
+        return [part for part in springs if mask[self.nodes_by_part[part]].all()]
 
     def _discrete(self, part: int) -> bool:
         """Whether a part has springs alone: these hold no rigid body together, and move with it."""
         return part in self.counts and set(self.counts[part]) <= DISCRETE
 
-    def pieces(self, part: int) -> int:
-        """Number of pieces of a part that share no nodes; none without elements."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        nodes = self.nodes_by_part.get(part, np.empty(0, np.int64))
-        rows, columns = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
-        for one in (elements.of(part) for elements in self.elements):
-            at, other = np.nonzero(one != NO_NODE)
-            first = np.repeat(one[:, :1], one.shape[1], axis=1)
-            rows.append(np.searchsorted(nodes, first[at, other]))
-            columns.append(np.searchsorted(nodes, one[at, other]))
-        # older versions of scipy take no wider numbers; a part has fewer nodes
-        joined = np.concatenate(rows).astype(np.int32), np.concatenate(columns).astype(np.int32)
-        links = coo_array((np.ones(joined[0].size, bool), joined), shape=(nodes.size, nodes.size))
-        return int(connected_components(links, directed=False, return_labels=False))
-
     def groups(self, parts: Collection[int]) -> tuple[tuple[int, ...], ...]:
         """Groups of these parts that share nodes or are joined, directly or not."""
-        left, found = set(parts), []
-        while left:
-            waiting, body = [min(left)], set[int]()
-            while waiting:
-                part = waiting.pop()
-                if part in left:
-                    left.discard(part)
-                    body.add(part)
-                    waiting += (self.neighbours.get(part, frozenset()) | self.joined.get(part, {}).keys()) & left
-            found.append(tuple(sorted(body)))
-        return tuple(sorted(found))
+        return _together(parts, self._linked)
+
+    def _linked(self, part: int) -> Iterable[int]:
+        return self.neighbours.get(part, frozenset()) | self.joined.get(part, {}).keys()
 
     def rigid_nodes(self, parts: Iterable[int]) -> int:
         """Number of nodes of some parts."""
@@ -279,6 +290,21 @@ class Inventory:
         for part in parts:
             mask[self.nodes_by_part.get(part, np.empty(0, np.int64))] = True
         return mask
+
+
+def _together(parts: Collection[int], linked: Callable[[int], Iterable[int]]) -> tuple[tuple[int, ...], ...]:
+    """Groups of parts that are linked to each other, directly or not."""
+    left, found = set(parts), []
+    while left:
+        waiting, body = [min(left)], set[int]()
+        while waiting:
+            part = waiting.pop()
+            if part in left:
+                left.discard(part)
+                body.add(part)
+                waiting += left.intersection(linked(part))
+        found.append(tuple(sorted(body)))
+    return tuple(sorted(found))
 
 
 def _distinct(values: Places) -> Places:

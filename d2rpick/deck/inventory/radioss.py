@@ -80,10 +80,10 @@ def read(run: Run) -> Inventory:
     beyond = np.full((table.size - ids.size, 3), np.nan)
     notes = tuple(_notes(run, worded, elements, starter, len(beyond)))
     parts = _parts(run, starter, worded, elements)
-    held = joints.of_radioss(starter, worded)
+    held = joints.of_radioss(run, starter, worded)
     return Inventory(
         "radioss", parts, elements, np.concatenate([coordinates, beyond]), notes, not notes,
-        joints=held.placed(table), ties=held.unknown,
+        joints=joints.placed(held.found, table), switched=joints.placed(held.switched, table), ties=held.unknown,
         watched=places_of(_watched(worded), table), moved=any(words[:1] == ("TRANSFORM",) for _, words in worded),
         files=tuple(run.deck.sources),
         history_groups=frozenset(whole(words[-1]) for _, words in worded if words[:1] == ("THPART",)),

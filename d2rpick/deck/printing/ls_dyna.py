@@ -39,7 +39,7 @@ _UNCAPPED = (
     "DTMAX is 0: with nothing deformable left the time step may grow without",
     "  limit and the second switch come late; set d2rpick card --step-cap.",
 )
-_UNMERGED = ("Parts that share nodes must be merged into one rigid body (d2rpick card --merge).",)
+_UNMERGED = ("Merge parts that share nodes (d2rpick card --merge), never loose ones.",)
 
 
 def cards(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.deck.inventory import ls_dyna, read_inventory
+from d2rpick.deck.inventory.pieces import pieces_of
 from d2rpick.deck.reader import read_deck
 from d2rpick.errors import DeckError
 from tests.decks import read, write
@@ -221,4 +222,4 @@ def test_pieces_of_a_part_are_those_that_share_no_nodes(tmp_path: Path) -> None:
     shells = [(7, 1, 2, 4, 3), (7, 3, 4, 6, 5), (7, 9, 10, 11, 11), (9, 13, 14, 15, 16), (9, 16, 17, 18, 18)]
     mesh = "".join(row(number, *one) for number, one in enumerate(shells, 1))
     found = inventory(tmp_path, HEAD + "*NODE\n" + nodes() + "*ELEMENT_SHELL\n" + mesh + "*END\n")
-    assert [found.pieces(part) for part in (7, 9, 3)] == [2, 1, 0]
+    assert [pieces_of(found, [part]) for part in (7, 9, 3)] == [2, 1, 0]
