@@ -61,13 +61,13 @@ def objections(
     else:
         yield Objection(tr < first_as_read(earliest), f"before {end_of_load(situation)}")
     yield from (Objection(everywhere, reason) for reason in _against_td(situation))
+    if situation.at_rest:
+        return
     compared = known.astype(bool)
     described = compared | bool(vibration.unknown)
     same_sign = column_of(known, "sign_match") != 0
     yield Objection(~described, vibration.undescribed)
     yield Objection(~same_sign, "opposite sign of the deformation")
-    if situation.at_rest:
-        return
     error, judged = np.where(compared, column_of(known, "lock_in_error"), level_error), described & same_sign
     yield Objection(judged & np.isnan(error), "the energy is not positive here, so there is nothing to compare")
     tolerance = situation.settings.tolerance

@@ -76,6 +76,7 @@ def suggest_of(
     RangeError
         If td or the window lies outside the record, or no flight is seen.
     """
+    _check_units(reference.history, td, settings)
     if td is None:
         from d2rpick.choice.suggest_td import suggest_in_longest_flight
 
@@ -96,6 +97,7 @@ def verify_of(reference: Reference, tr: float, td: float, settings: Settings) ->
     RangeError
         If a time lies outside the record or tr is not before td.
     """
+    _check_units(reference.history, td, settings)
     return _with_health(verify(reference.history, tr, td, settings), reference.run)
 
 
@@ -120,6 +122,16 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference) ->
         If one of the two runs does not go on after td.
     """
     return with_comparison(verdict, _comparison(verdict, reference.run, switched))
+
+
+def _check_units(history: History, td: float | tuple[float, float] | None, settings: Settings) -> None:
+    """RangeError where a time that was asked for looks to be in another unit than the record."""
+    if settings.after is not None:
+        history.check_unit(settings.after, argument="after")
+    if isinstance(td, tuple):
+        history.check_unit(*td, argument="td_window")
+    elif td is not None:
+        history.check_unit(td, argument="td")
 
 
 def _with_health(answer: _Answer, run: Run) -> _Answer:

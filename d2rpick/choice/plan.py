@@ -185,7 +185,7 @@ def plan_of(
     span = float(history.time[-1] - history.time[0])
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
     if settings.after is not None:
-        history.check(settings.after, argument="after")
+        history.check_unit(settings.after, argument="after")
     history, found, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
     fits = Fits()

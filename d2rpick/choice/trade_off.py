@@ -84,6 +84,8 @@ def explore_of(
         If td or the window lies outside the record, or no flight is seen and neither is given.
     """
     history, fits = reference.history, Fits()
+    if td is not None:
+        history.check_unit(td, argument="td")
     record = float(history.time[0]), float(history.time[-1])
     window = td_window or longest_flight(history, settings, fits, otherwise=None if td is None else record)
     look = looking(history, settings, fits, since)
