@@ -130,7 +130,7 @@ class Candidates(Sequence[Candidate]):
             level_error=level_error,
             same_swing=(situation.turns_since(tr) < 2) & (not still),
             position_error=situation.position_errors(tr),
-            objections=tuple(objections(situation, tr, measured, level_error)),
+            objections=tuple(objections(situation, tr, measured, energy, level_error)),
         )
 
     @cached_property
