@@ -152,8 +152,8 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
     health = assess(balance, window, locked, td)
-    cautions = cautions_of_health(health, at_rest=answer.situation.at_rest)
-    return answer._replace(health=health, cautions=(*answer.cautions, *cautions))
+    said = cautions_of_health(health, at_rest=answer.situation.at_rest)
+    return answer._replace(health=health, cautions=answer.cautions + tuple(said))
 
 
 def _comparison(verdict: Verdict, run: Run, switched: Reference) -> Comparison:
