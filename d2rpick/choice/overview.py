@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.choice.health import Health, assess, cautions_of_health
-from d2rpick.errors import FormatError
-from d2rpick.flight.flight import all_seen
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest_td import bounds, flights_of
+from d2rpick.errors import FormatError, RangeError
 from d2rpick.flight.flying_parts import with_parts_by_number
+from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.companions import doubts
 from d2rpick.histories.selection import select_parts
@@ -19,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.warnings import Caution
-    from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import Part
     from d2rpick.histories.opening import Run, Selection
@@ -49,7 +50,8 @@ class Overview:
     Times in the unit of the run, which ``time_unit`` gives only where a file names it.  ``sampling`` is None where
     there is a single state; it and the times are None where there is no state, and they and ``states`` where the time
     has to be chosen among several columns.
-    ``flights`` are the windows in which the parts asked for, or all, fly freely, each with its source; ``health`` is
+    ``flights`` are the windows in which the parts asked for, or all, fly freely, each with its source: those that
+    ``plan`` and ``suggest`` choose from, by the energy alone where nothing better is written; ``health`` is
     that of the run, with the longest of them as its window; None without energies.
     """
 
@@ -76,7 +78,7 @@ class Overview:
 
 
 def survey(run: Run, selection: Selection) -> Overview:
-    """Look at all databases of a run; of ``selection`` the parts matter, for the flights."""
+    """Look at all databases of a run; of ``selection`` parts and energy matter, for the flights."""
     first = run.databases[0]
     notes = [note for database in run.databases for note in _notes(database)]
     notes += doubts(run.databases)
@@ -157,7 +159,12 @@ def _flights(run: Run, selection: Selection) -> tuple[tuple[str, FreeFlight], ..
         if wanted:
             select_parts(wanted, run.parts, run.name)
     try:
-        history = run.history(selection._replace(energy=(), time=None))
-    except FormatError:  # an energy has to be chosen first, or there is no state
+        history = run.history(selection)
+        found = flights_of(history, Settings())
+    except (FormatError, RangeError):  # an energy has to be chosen first, or there are hardly any states
         return ()
-    return all_seen(history) if history.time.size > 1 else ()
+    return tuple(
+        (flight.source, FreeFlight(*bounds(history, flight), flight.parts, flight.end is not None, flight.damping))
+        for flight in found
+        if flight.source
+    )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.health import head, measures_of
+from d2rpick.report.situation import spoken
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
@@ -132,4 +133,4 @@ def _parts(overview: Overview) -> list[list[tables.Cell]]:
 def _flight(source: str, flight: FreeFlight) -> str:
     who = ", ".join(part.title or str(part.id) for part in flight.parts) if flight.parts else "the whole model"
     end = f"to {flight.end:.6g}" if flight.end_seen else f"to the end of the record, {flight.end:.6g}"
-    return f"{who} from {flight.start:.6g} {end} ({source})"
+    return f"{who} from {flight.start:.6g} {end} ({spoken(source)})"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from d2rpick.histories.writing import TABLE_WRITERS
-from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, run
 from tests.json_schemas import check_by_schema
 from tests.shared import shared
 
@@ -77,6 +77,29 @@ def test_info_lists_all_flights_of_the_parts_asked_for() -> None:
     assert first["end"] < second["start"]
     assert second["end"] is None
     assert "rotation_energy" in found["channels"]
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        (str(ROOT / "sample_data/rollover_box.matsum"), "--part", "box"),
+        (str(ROOT / "sample_data/rollover_box.glstat"),),
+        (str(ROOT / "sample_data/rolloverT01.gz"), "--part", "box"),
+        (ENERGY,),
+        (ROLLOVER, "--energy", "boxIE_J"),
+    ],
+)
+def test_info_lists_the_flights_that_plan_and_suggest_choose_from(args: tuple[str, ...]) -> None:
+    listed = info(*args)["flights"]
+    planned = answer("plan", *args)["windows"]
+    assert listed
+    for key in ("end", "source"):
+        assert [one[key] for one in listed] == [row[f"flight_{key}"] for row in planned]
+    chosen = answer("suggest", *args)["flight"]
+    assert chosen["source"] in [one["source"] for one in listed]
+    if chosen["source"] != "energy":  # that shows another flight to each td
+        assert [one["start"] for one in listed] == [row["flight_start"] for row in planned]
+        assert (chosen["start"], chosen["end"]) in [(one["start"], one["end"]) for one in listed]
 
 
 def test_companions_are_one_run(matsum: Path, tmp_path: Path) -> None:
