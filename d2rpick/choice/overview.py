@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -24,6 +24,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import Part
     from d2rpick.histories.opening import Run, Selection
+
+
+# Cards that write the momenta of parts.
+_RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
+_LS_DYNA: Final = "*DATABASE_MATSUM"
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,7 @@ class Overview:
     ``flights`` are the windows in which the parts asked for, or all, fly freely, each with its source: those that
     ``plan`` and ``suggest`` choose from, by the energy alone where nothing better is written; ``health`` is
     that of the run, with the longest of them as its window; None without energies.
+    ``should_write`` names the output that would show the flights for sure; None where it is there.
     """
 
     source: tuple[str, ...]
@@ -68,6 +74,7 @@ class Overview:
     channels: tuple[str, ...]
     parts: tuple[PartOverview, ...]
     flights: tuple[tuple[str, FreeFlight], ...]
+    should_write: str | None
     health: Health | None
     notes: tuple[str, ...]
 
@@ -107,9 +114,25 @@ def survey(run: Run, selection: Selection) -> Overview:
         channels=tuple(dict.fromkeys(name for database in run.databases for name in database.channels)),
         parts=tuple(_overviews(run)),
         flights=flights,
+        should_write=None if any(one.parts for one in run.momenta(None, None)) else _missing(run),
         health=_health(run, [flight for _, flight in flights]),
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _missing(run: Run) -> str:
+    """Say in the words of the solver how the momenta of parts are written, which these files do not have."""
+    written = {database.format for database in run.databases}
+    if written & {"radioss-th"}:
+        what = _RADIOSS
+    elif written & {"glstat", "matsum", "binout"}:
+        what = f"{_LS_DYNA}, with the DT of *DATABASE_GLSTAT"
+    else:
+        momentum = (
+            "" if run.momenta(None, None) else ", at least columns x_momentum, y_momentum, z_momentum of the model"
+        )
+        what = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
+    return f"{what}: only momenta of the parts show for sure when they fly"
 
 
 def _has_one_energy(database: Legs) -> bool:

@@ -53,6 +53,7 @@ def as_csv(overview: Overview) -> str:
         "channels": "; ".join(overview.channels),
         "parts": "; ".join(f"{one.part.id} {one.part.title}".rstrip() for one in overview.parts),
         "flights": "; ".join(_flight(*flight) for flight in overview.flights),
+        "should_write": overview.should_write,
         "health": "; ".join(f"{what} {value}" for what, value, *_ in _health(overview)),
         "notes": "; ".join(overview.notes),
     }
@@ -91,6 +92,7 @@ def as_json(overview: Overview, command: Sequence[str]) -> str:
                 }
                 for source, f in overview.flights
             ],
+            "should_write": overview.should_write,
             "health": keys.of_health(overview.health),
             "notes": overview.notes,
         }
@@ -115,6 +117,8 @@ def _rows(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("channels", ", ".join(overview.channels) or None),
     ]
     rows += [("flight", _flight(*flight)) for flight in overview.flights]
+    if overview.should_write:
+        rows.append(("should write", overview.should_write))
     return rows
 
 
