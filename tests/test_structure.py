@@ -189,7 +189,7 @@ UNNEEDED = {
     "tomllib", "difflib", "zlib", "importlib.metadata", "importlib.resources", "traceback",
 }  # fmt: skip
 # Each module costs start-up, too: one more is worth a thought.
-MOST_MODULES = 82
+MOST_MODULES = 83
 
 
 def test_a_plain_table_loads_only_what_its_answer_needs() -> None:

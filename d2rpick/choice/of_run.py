@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from d2rpick.choice.examine import examine
+from d2rpick.choice.sound import refuse_unsound
 from d2rpick.choice.suggest import Suggestion, suggest_at
 from d2rpick.choice.verify import Verdict, verify, verify_at, with_comparison
 from d2rpick.histories.balance_terms import balance_of
@@ -74,9 +75,9 @@ def suggest_of(
     Raises
     ------
     RangeError
-        If td or the window lies outside the record, or no flight is seen.
+        If td or the window lies outside the record, no flight is seen, or the run cannot be judged.
     """
-    _check_units(reference.history, td, settings)
+    _check(reference.history, td, settings, choosing=True)
     if td is None:
         from d2rpick.choice.suggest_td import suggest_in_longest_flight
 
@@ -97,7 +98,7 @@ def verify_of(reference: Reference, tr: float, td: float, settings: Settings) ->
     RangeError
         If a time lies outside the record or tr is not before td.
     """
-    _check_units(reference.history, td, settings)
+    _check(reference.history, td, settings)
     return _with_health(verify(reference.history, tr, td, settings), reference.run)
 
 
@@ -124,8 +125,11 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference) ->
     return with_comparison(verdict, _comparison(verdict, reference.run, switched))
 
 
-def _check_units(history: History, td: float | tuple[float, float] | None, settings: Settings) -> None:
-    """RangeError where a time that was asked for looks to be in another unit than the record."""
+def _check(
+    history: History, td: float | tuple[float, float] | None, settings: Settings, *, choosing: bool = False
+) -> None:
+    """RangeError where the run cannot be judged, or a time that was asked for looks to be in another unit."""
+    refuse_unsound(history, choosing=choosing)
     if settings.after is not None:
         history.check_unit(settings.after, argument="after")
     if isinstance(td, tuple):

@@ -9,6 +9,7 @@ import numpy as np
 
 from d2rpick.choice.health import Health, assess, cautions_of_health
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.sound import refuse_unsound, unsound
 from d2rpick.choice.suggest_td import bounds, flights_of
 from d2rpick.errors import FormatError, RangeError
 from d2rpick.flight.flying_parts import with_parts_by_number
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.warnings import Caution
     from d2rpick.histories.database import Legs
-    from d2rpick.histories.history import Part
+    from d2rpick.histories.history import History, Part
     from d2rpick.histories.opening import Run, Selection
 
 
@@ -77,11 +78,12 @@ class Overview:
     should_write: str | None
     health: Health | None
     notes: tuple[str, ...]
+    alarms: tuple[Caution, ...] = ()
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
-        """What to know of the health of the run."""
-        return tuple(cautions_of_health(self.health)) if self.health else ()
+        """What to know of the health of the run, and why it cannot be judged."""
+        return (*self.alarms, *(cautions_of_health(self.health) if self.health else ()))
 
 
 def survey(run: Run, selection: Selection) -> Overview:
@@ -99,7 +101,8 @@ def survey(run: Run, selection: Selection) -> Overview:
             raise  # the table cannot be read
         notes.append(str(error))
     steps = np.diff(time)
-    flights = _flights(run, selection)
+    history = _history(run, selection)
+    flights = _flights(history) if history else ()
     return Overview(
         source=run.sources,
         format=" + ".join(database.format for database in run.databases),
@@ -117,6 +120,7 @@ def survey(run: Run, selection: Selection) -> Overview:
         should_write=None if any(one.parts for one in run.momenta(None, None)) else _missing(run),
         health=_health(run, [flight for _, flight in flights]),
         notes=tuple(dict.fromkeys(notes)),
+        alarms=tuple(unsound(history)) if history else (),
     )
 
 
@@ -175,16 +179,25 @@ def _health(run: Run, flights: Sequence[FreeFlight]) -> Health | None:
     return assess(balance, (longest.start, longest.end) if longest else None, until=float(balance.time[-1]))
 
 
-def _flights(run: Run, selection: Selection) -> tuple[tuple[str, FreeFlight], ...]:
+def _history(run: Run, selection: Selection) -> History | None:
+    """Give what would be judged; None where an energy has to be chosen first, or there is no state."""
     if selection.parts:
         selection = with_parts_by_number(run, selection)
     for wanted in (selection.parts, selection.flying):
         if wanted:
             select_parts(wanted, run.parts, run.name)
     try:
-        history = run.history(selection)
+        return run.history(selection)
+    except FormatError:
+        return None
+
+
+def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
+    """Give those that ``plan`` and ``suggest`` choose from; none where they refuse the run."""
+    try:
+        refuse_unsound(history, choosing=True)
         found = flights_of(history, Settings())
-    except (FormatError, RangeError):  # an energy has to be chosen first, or there are hardly any states
+    except RangeError:
         return ()
     return tuple(
         (flight.source, FreeFlight(*bounds(history, flight), flight.parts, flight.end is not None, flight.damping))

@@ -293,8 +293,7 @@ class History:
         raise RangeError(f"{', '.join(self.source)}: {what} {found} outside the record, {first} to {last}{more}")
 
     def check_unit(self, *times: float, argument: str) -> None:
-        """Raise RangeError unless all times of an ``argument`` lie in the record, and look to be in its unit."""
-        self.check(*times, argument=argument)
+        """Raise RangeError where times of an ``argument`` that lie in the record look to be in another unit than it."""
         if times[-1] * 1e3 > self.time[-1]:  # as nearly always
             return
         from d2rpick.histories.units import in_larger_unit
