@@ -115,12 +115,13 @@ def suggest_in_window(
     """
     look = looking(history, settings, fits, since)
     situation, inside = within_flight(look, history, window)
-    last = _last_at_rest(situation, inside)
-    if last > inside[0] and look(last).at_rest:
-        return suggest_at(look(last))._replace(td_window=window)
     choose = _by_level if situation.vibration.unknown else _by_residual
     chosen, longest = choose(situation, inside, look)
-    found = suggest_at(look(chosen if chosen is not None else inside[1]))
+    td = chosen if chosen is not None else inside[1]
+    if look(td).at_rest:
+        last = _last_at_rest(situation, inside)
+        td = last if last > inside[0] and look(last).at_rest else td
+    found = suggest_at(look(td))
     return found._replace(td_window=window, longer=_given_up(longest, found.recommended, inside, look))
 
 
