@@ -74,7 +74,7 @@ def objections(
     yield Objection(judged & np.isnan(error), "the energy is not positive here, so there is nothing to compare")
     tolerance = situation.settings.tolerance
     yield Objection(judged & (error > tolerance), f"error {{}} above the tolerance {tolerance:g}", error, tolerance)
-    if situation.basis == "energy":
+    if situation.basis == "energy" and situation.td <= situation.latest_td:  # beyond, the flight tells nothing of it
         yield from _above_the_reference(situation, energy)
 
 

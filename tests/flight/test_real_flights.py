@@ -32,7 +32,7 @@ def test_nothing_fails_at_any_td_and_no_flight_contradicts_the_health(path: Path
         try:
             answer = suggest_of(reference, td, PLAIN)
         except D2RPickError:
-            assert reference.history.time.size < 3
+            assert reference.history.time.size < 3 or not reference.history.energy.any()
             continue
         if answer.situation.in_flight:
             assert not {"work-in-window", "contact-in-window"} & {caution.code for caution in answer.cautions}
