@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.choice.expectation import most_energy
 from d2rpick.choice.verify import approve
+from d2rpick.histories.crossings import passages
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.roots import narrow
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from d2rpick.choice.candidates import Candidate, Candidates
     from d2rpick.choice.situation import Situation
@@ -23,6 +27,7 @@ if TYPE_CHECKING:
 
 # Halvings of the sampling interval at an end of a window: to a millionth of it.
 _HALVINGS = 20
+_BELOW = 1e-12
 
 
 def acceptable_windows(situation: Situation, candidates: Candidates, recommended: float | None) -> Samples:
@@ -143,7 +148,9 @@ def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     if start is None or start >= td:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
-    times = np.concatenate([history.time, candidates.tr, situation.vibration.knots(), ends])
+    # what may be locked in at most is passed between the samples, and is just kept there in doubles too
+    most = passages(history.time, history.energy, (1 - _BELOW) * most_energy(situation))[0]
+    times = np.concatenate([history.time, candidates.tr, most, situation.vibration.knots(), ends])
     return np.unique(times[(times >= max(start, history.time[0])) & (times < td)])
 
 
@@ -159,13 +166,16 @@ def _residual_left(situation: Situation) -> float:
 
 def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples:
     """Windows in which the error stays at or below a level, shape (n, 2)."""
-    inside = np.pad(situation.errors(grid) <= level, 1)
+    most = most_energy(situation)
+
+    def keeps(times: Samples) -> NDArray[np.bool_]:
+        return (situation.errors(times) <= level) & (situation.vibration.energies(times) <= most)
+
+    inside = np.pad(keeps(grid), 1)
     first = np.flatnonzero(inside[1:-1] & ~inside[:-2])
     last = np.flatnonzero(inside[1:-1] & ~inside[2:])
     within = grid[np.stack([first, last], axis=1)]
     if not within.size:
         return within
     beyond = grid[np.clip([first - 1, last + 1], 0, grid.size - 1).T]
-    return narrow(
-        lambda t: situation.errors(t.ravel()).reshape(t.shape) <= level, within, beyond, steps=_HALVINGS
-    ).within
+    return narrow(lambda t: keeps(t.ravel()).reshape(t.shape), within, beyond, steps=_HALVINGS).within

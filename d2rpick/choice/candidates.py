@@ -115,9 +115,12 @@ class Candidates(Sequence[Candidate]):
 
     @classmethod
     def of(cls, situation: Situation, moments: Moments, known: Sequence[Measured | None]) -> Candidates:
-        """Hold each tr, of which is ``known`` what was measured, against flight, sign and tolerance."""
-        vibration = situation.vibration
-        tr, measured = moments.tr, np.fromiter(known, dtype=object, count=len(known))
+        """Hold each tr, of which is ``known`` what was measured, against flight, sign and tolerance.
+
+        Where nothing vibrates, nothing was.
+        """
+        vibration, still = situation.vibration, situation.at_rest
+        tr, measured = moments.tr, np.fromiter((None if still else one for one in known), object, len(known))
         energy = vibration.energies(tr)
         level_error = measures.level_errors(energy, situation.energy_td)
         return cls(
@@ -127,9 +130,9 @@ class Candidates(Sequence[Candidate]):
             tr=tr,
             energy=energy,
             level_error=level_error,
-            same_swing=(situation.turns_since(tr) < 2) & (not situation.at_rest),
+            same_swing=(situation.turns_since(tr) < 2) & (not still),
             position_error=situation.position_errors(tr),
-            objections=tuple(objections(situation, tr, measured, level_error)),
+            objections=tuple(objections(situation, tr, measured, energy, level_error)),
         )
 
     @cached_property
@@ -311,7 +314,7 @@ def _distinct(situation: Situation, moments: Sequence[Moment]) -> Moments:
 
 def _remarks(situation: Situation, reach: float, known: Measured | None, parts: Sequence[PartMatch]) -> Iterator[str]:
     """What to know of this tr beside its acceptance."""
-    if known is None:
+    if known is None and (situation.vibration.unknown or not situation.at_rest):
         reason = situation.vibration.unknown or situation.vibration.undescribed
         yield f"sign, lock-in error and residual unknown: {reason}"
     if known and known.lock_in_error > measures.TOLERATED_GROWTH and parts:

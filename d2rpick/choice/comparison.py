@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.choice.rigid_parts import SAME
 from d2rpick.errors import RangeError
 from d2rpick.vibration import measures
 
@@ -25,8 +26,9 @@ _AT_REST = 0.01
 # Some solvers report a wrong energy for rigid solid elements; beyond this share, and beyond what the energy changes
 # from state to state anyway, that is worth a note.
 _REPORTED_OFF = 0.01
-# While rigid the energy keeps its digits; a vibrating one changes by more than this share from state to state.
-_STILL = 1e-4
+# While rigid the energy keeps its digits; a vibrating one changes by more than this share from state to state.  Of an
+# energy that is mostly plastic the vibration is little: what stands still changes by less than that share of it, too.
+_STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # A solver switches at the first step from tr on, and output may miss it by a state or two: this share of the energy
 # about tr is left to that.
 _ABOUT = 0.05
@@ -104,8 +106,9 @@ def compare_runs(
         after, rest = after[1:], rest[1:]  # the switch comes at the first step from td on: this state was still rigid
     frozen, wanted = float(after[0]), reference.energy_at(td)
     notes = tuple(note for note in switched.notes if note not in reference.notes)
-    error, rigid = _relative(*momenta, td, end), _rigid_window(switched, tr, td)
-    objections = [*_not_rigid(switched, rigid, tr, td)]
+    still = _still(reference, switched, tr, td)
+    error, rigid = _relative(*momenta, td, end), _rigid_window(switched, tr, td, still)
+    objections = [*_not_rigid(reference, switched, rigid, tr, td, still)]
     if known:
         objections += [*_not_of_tr(reference, tr, frozen), *_not_of_td(frozen, wanted, tolerance)]
     objections += _moved_otherwise(error)
@@ -139,28 +142,49 @@ def _refuse_few(reference: History, switched: History, states: int, td: float, e
         raise RangeError(f"{name}: {found}; too few to compare the runs")
 
 
-def _rigid_window(switched: History, tr: float, td: float) -> tuple[float, float] | None:
+def _still(reference: History, switched: History, tr: float, td: float) -> float:
+    """Give the change up to which an energy stands still: beside what vibrates it is nothing, or digits [energy]."""
+    level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
+    digits = max(SAME * level, switched.energy_precision.quantum(level))
+    return max(digits, min(_STILL * level, _STILL_OF_VIBRATION * _range(reference, tr, td)))
+
+
+def _range(history: History, start: float, end: float) -> float:
+    """Range of the energy between two times [energy]."""
+    return float(np.ptp(np.append(history.between(start, end)[1], history.energies_at(np.array([start, end])))))
+
+
+def _rigid_window(switched: History, tr: float, td: float, limit: float) -> tuple[float, float] | None:
     """First and last state around the middle of (tr, td) between which the energy stands still; None without any."""
     time, energy = switched.time, switched.energy
     middle = int(np.argmin(np.abs(time - (tr + td) / 2)))
     if not tr <= time[middle] <= td:
         return None
-    still = np.abs(energy - energy[middle]) <= _STILL * abs(energy[middle])
-    moving = np.flatnonzero(~still)
+    moving = np.flatnonzero(np.abs(energy - energy[middle]) > limit)
     first = int(moving[moving < middle].max(initial=-1)) + 1
     last = int(moving[moving > middle].min(initial=time.size)) - 1
     return float(time[first]), float(time[last])
 
 
-def _not_rigid(switched: History, rigid: tuple[float, float] | None, tr: float, td: float) -> Iterator[str]:
-    """Object when the energy does not stand still from about tr to about td, as far as the states tell."""
+def _not_rigid(
+    reference: History, switched: History, rigid: tuple[float, float] | None, tr: float, td: float, limit: float
+) -> Iterator[str]:
+    """Object when the energy does not stand still from about tr to about td, as far as the states tell.
+
+    That it does so before or after as well tells something only where that of the reference does not.
+    """
     if rigid is None:
         yield f"the switched run has no state between tr {tr:g} and td {td:g}: it may not have been rigid"
         return
     room = 2 * switched.step
     if rigid[1] - rigid[0] <= room < td - tr:
         yield f"the energy of the switched run does not stand still from tr {tr:g} to td {td:g}: was it switched?"
-    elif rigid[0] > tr + room or rigid[1] < td - room or rigid[0] < tr - room or rigid[1] > td + room:
+        return
+
+    def longer(start: float, end: float) -> bool:
+        return end - start > room and _range(reference, start, end) > limit
+
+    if rigid[0] > tr + room or rigid[1] < td - room or longer(rigid[0], tr) or longer(td, rigid[1]):
         found = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
         yield f"{found}, not from tr {tr:g} to td {td:g}"
 

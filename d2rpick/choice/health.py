@@ -119,19 +119,14 @@ def _too_short(balance: Balance, window: tuple[float, float]) -> str | None:
     return f"the window holds {states} states: at least {FEWEST_STATES} are needed to tell a load from gravity"
 
 
-def cautions_of_health(health: Health) -> Iterator[Caution]:
-    """What of the health of a run should be known, with stable codes."""
-    rest = "do not rely on the internal energy"
+def cautions_of_health(health: Health, *, at_rest: bool = False) -> Iterator[Caution]:
+    """What of the health of a run should be known, with stable codes.
+
+    Where nothing vibrates (``at_rest``) no level of the internal energy is matched, so hourglass does not matter.
+    """
     up_to = "" if health.until is None else f" up to {health.until:.6g}"
-    if _above(health.hourglass_share, MOST_HOURGLASS):
-        share = f"{health.hourglass_share:.0%}"
-        yield Caution("hourglass", f"hourglass energy reaches {share} of the internal energy{up_to}: {rest}")
-    if health.part and _above(health.part_hourglass_share, MOST_HOURGLASS):
-        who = health.part.title or f"part {health.part.id}"
-        share = f"{health.part_hourglass_share:.0%}"
-        yield Caution(
-            "part-hourglass", f"hourglass energy of {who} reaches {share} of its internal energy{up_to}: {rest}"
-        )
+    if not at_rest:
+        yield from _of_hourglass(health, up_to)
     low, high = health.energy_ratio_min, health.energy_ratio_max
     if low is not None and high is not None and (low < 1 - MOST_IMBALANCE or high > 1 + MOST_IMBALANCE):
         found = f"total energy over initial energy and external work ranges from {low:.3g} to {high:.3g}{up_to}"
@@ -149,6 +144,19 @@ def cautions_of_health(health: Health) -> Iterator[Caution]:
         found = f"deleted elements hold {health.eroded_share:.0%} of the internal energy{up_to}"
         yield Caution("eroded-energy", f"{found}: it counts as internal energy of the model but does not spring back")
     yield from _of_window(health)
+
+
+def _of_hourglass(health: Health, up_to: str) -> Iterator[Caution]:
+    rest = "do not rely on the internal energy"
+    if _above(health.hourglass_share, MOST_HOURGLASS):
+        share = f"{health.hourglass_share:.0%}"
+        yield Caution("hourglass", f"hourglass energy reaches {share} of the internal energy{up_to}: {rest}")
+    if health.part and _above(health.part_hourglass_share, MOST_HOURGLASS):
+        who = health.part.title or f"part {health.part.id}"
+        share = f"{health.part_hourglass_share:.0%}"
+        yield Caution(
+            "part-hourglass", f"hourglass energy of {who} reaches {share} of its internal energy{up_to}: {rest}"
+        )
 
 
 def _of_window(health: Health) -> Iterator[Caution]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Objection(NamedTuple):
     """A reason and the candidates that it ``holds`` for, of shape (n,).
 
-    ``error`` (n,) and the ``limit`` that it is above where the sentence names them.
+    ``error`` (n,) and the ``limit`` that it is above where the reason names them, the error as {}.
     """
 
     holds: NDArray[np.bool_]
@@ -32,7 +32,7 @@ class Objection(NamedTuple):
 
     def sentence(self, place: int) -> str:
         """Say it of the candidate at a place."""
-        return self.reason if self.error is None else f"error {above(self.error[place], self.limit)} {self.reason}"
+        return self.reason if self.error is None else self.reason.format(above(self.error[place], self.limit))
 
     def ordered(self, order: NDArray[np.intp]) -> Objection:
         """Give the same for candidates in another order."""
@@ -40,7 +40,7 @@ class Objection(NamedTuple):
 
 
 def objections(
-    situation: Situation, tr: Samples, known: NDArray[np.object_], level_error: Samples
+    situation: Situation, tr: Samples, known: NDArray[np.object_], energy: Samples, level_error: Samples
 ) -> Iterator[Objection]:
     """Give every reason against some of the candidates.
 
@@ -51,6 +51,8 @@ def objections(
         [time]
     known : array of shape (n,)
         `Measured` of each, None where it cannot be compared with td.
+    energy : array of shape (n,)
+        [energy]
     level_error : array of shape (n,)
         NaN where an energy is not positive [-].
     """
@@ -61,17 +63,30 @@ def objections(
     else:
         yield Objection(tr < first_as_read(earliest), f"before {end_of_load(situation)}")
     yield from (Objection(everywhere, reason) for reason in _against_td(situation))
+    if situation.at_rest:
+        return
     compared = known.astype(bool)
     described = compared | bool(vibration.unknown)
     same_sign = column_of(known, "sign_match") != 0
     yield Objection(~described, vibration.undescribed)
     yield Objection(~same_sign, "opposite sign of the deformation")
-    if situation.at_rest:
-        return
     error, judged = np.where(compared, column_of(known, "lock_in_error"), level_error), described & same_sign
     yield Objection(judged & np.isnan(error), "the energy is not positive here, so there is nothing to compare")
     tolerance = situation.settings.tolerance
-    yield Objection(judged & (error > tolerance), f"above the tolerance {tolerance:g}", error, tolerance)
+    yield Objection(judged & (error > tolerance), f"error {{}} above the tolerance {tolerance:g}", error, tolerance)
+    if situation.basis == "energy" and situation.td <= situation.latest_td:  # beyond, the flight tells nothing of it
+        yield from _above_the_reference(situation, energy)
+
+
+def _above_the_reference(situation: Situation, energy: Samples) -> Iterator[Objection]:
+    """Object where more energy would come back after td than the reference has."""
+    from d2rpick.choice.expectation import MOST_KEPT, means_of  # not above: an oscillator does without it
+
+    means = means_of(situation)
+    if means:
+        found = "the mean energy after td is expected to be {} times that of the reference, more than"
+        kept = means.ratio(energy)
+        yield Objection(energy > means.most, f"{found} {MOST_KEPT:g} times", kept, MOST_KEPT)
 
 
 def _against_td(situation: Situation) -> Iterator[str]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from d2rpick.choice.examine import examine
+from d2rpick.choice.sound import refuse_unsound
 from d2rpick.choice.suggest import Suggestion, suggest_at
 from d2rpick.choice.verify import Verdict, verify, verify_at, with_comparison
 from d2rpick.choice.warnings import cautions_of_engine
@@ -75,8 +76,9 @@ def suggest_of(
     Raises
     ------
     RangeError
-        If td or the window lies outside the record, or no flight is seen.
+        If td or the window lies outside the record, no flight is seen, or the run cannot be judged.
     """
+    _check(reference.history, td, settings, choosing=True)
     if td is None:
         from d2rpick.choice.suggest_td import suggest_in_longest_flight
 
@@ -97,6 +99,7 @@ def verify_of(reference: Reference, tr: float, td: float, settings: Settings) ->
     RangeError
         If a time lies outside the record or tr is not before td.
     """
+    _check(reference.history, td, settings)
     return _with_health(verify(reference.history, tr, td, settings), reference.run)
 
 
@@ -124,6 +127,19 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference) ->
     return with_comparison(verdict, _comparison(verdict, reference.run, switched))
 
 
+def _check(
+    history: History, td: float | tuple[float, float] | None, settings: Settings, *, choosing: bool = False
+) -> None:
+    """RangeError where the run cannot be judged, or a time that was asked for looks to be in another unit."""
+    refuse_unsound(history, choosing=choosing)
+    if settings.after is not None:
+        history.check_unit(settings.after, argument="after")
+    if isinstance(td, tuple):
+        history.check_unit(*td, argument="td_window")
+    elif td is not None:
+        history.check_unit(td, argument="td")
+
+
 def _with_health(answer: _Answer, run: Run) -> _Answer:
     """Add how far the run can be trusted, above all in the rigid window, else in the flight up to td.
 
@@ -143,7 +159,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
     health = assess(balance, window, locked, td)
-    cautions = tuple(cautions_of_health(health))
+    cautions = tuple(cautions_of_health(health, at_rest=answer.situation.at_rest))
     flight = answer.situation.flight
     if (
         window

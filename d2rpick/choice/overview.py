@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.choice.health import Health, assess, cautions_of_health
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.sound import refuse_unsound, unsound
+from d2rpick.choice.suggest_td import bounds, flights_of
 from d2rpick.choice.warnings import cautions_of_engine
-from d2rpick.errors import FormatError
-from d2rpick.flight.flight import all_seen
+from d2rpick.errors import FormatError, RangeError
 from d2rpick.flight.flying_parts import with_parts_by_number
+from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance_terms import balance_of
 from d2rpick.histories.companions import doubts
 from d2rpick.histories.selection import select_parts
@@ -20,10 +23,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.warnings import Caution
-    from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.database import Legs
-    from d2rpick.histories.history import Part
+    from d2rpick.histories.history import History, Part
     from d2rpick.histories.opening import Run, Selection
+
+
+# Cards that write the momenta of parts.
+_RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
+_LS_DYNA: Final = "*DATABASE_MATSUM"
 
 
 @dataclass(frozen=True)
@@ -50,8 +57,10 @@ class Overview:
     Times in the unit of the run, which ``time_unit`` gives only where a file names it.  ``sampling`` is None where
     there is a single state; it and the times are None where there is no state, and they and ``states`` where the time
     has to be chosen among several columns.
-    ``flights`` are the windows in which the parts asked for, or all, fly freely, each with its source; ``health`` is
+    ``flights`` are the windows in which the parts asked for, or all, fly freely, each with its source: those that
+    ``plan`` and ``suggest`` choose from, by the energy alone where nothing better is written; ``health`` is
     that of the run, with the longest of them as its window; None without energies.
+    ``should_write`` names the output that would show the flights for sure; None where it is there.
     """
 
     source: tuple[str, ...]
@@ -67,17 +76,20 @@ class Overview:
     channels: tuple[str, ...]
     parts: tuple[PartOverview, ...]
     flights: tuple[tuple[str, FreeFlight], ...]
+    should_write: str | None
     health: Health | None
     notes: tuple[str, ...]
+    alarms: tuple[Caution, ...] = ()
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
-        """What to know of the health of the run, and of the engine that computed it."""
-        return (*(cautions_of_health(self.health) if self.health else ()), *cautions_of_engine(self.source))
+        """What to know of the health of the run and of its engine, and why it cannot be judged."""
+        health = cautions_of_health(self.health) if self.health else ()
+        return (*self.alarms, *health, *cautions_of_engine(self.source))
 
 
 def survey(run: Run, selection: Selection) -> Overview:
-    """Look at all databases of a run; of ``selection`` the parts matter, for the flights."""
+    """Look at all databases of a run; of ``selection`` parts and energy matter, for the flights."""
     first = run.databases[0]
     notes = [note for database in run.databases for note in _notes(database)]
     notes += doubts(run.databases)
@@ -91,7 +103,8 @@ def survey(run: Run, selection: Selection) -> Overview:
             raise  # the table cannot be read
         notes.append(str(error))
     steps = np.diff(time)
-    flights = _flights(run, selection)
+    history = _history(run, selection)
+    flights = _flights(history) if history else ()
     return Overview(
         source=run.sources,
         format=" + ".join(database.format for database in run.databases),
@@ -106,9 +119,26 @@ def survey(run: Run, selection: Selection) -> Overview:
         channels=tuple(dict.fromkeys(name for database in run.databases for name in database.channels)),
         parts=tuple(_overviews(run)),
         flights=flights,
+        should_write=None if any(one.parts for one in run.momenta(None, None)) else _missing(run),
         health=_health(run, [flight for _, flight in flights]),
         notes=tuple(dict.fromkeys(notes)),
+        alarms=tuple(unsound(history)) if history else (),
     )
+
+
+def _missing(run: Run) -> str:
+    """Say in the words of the solver how the momenta of parts are written, which these files do not have."""
+    written = {database.format for database in run.databases}
+    if written & {"radioss-th"}:
+        what = _RADIOSS
+    elif written & {"glstat", "matsum", "binout"}:
+        what = f"{_LS_DYNA}, with the DT of *DATABASE_GLSTAT"
+    else:
+        momentum = (
+            "" if run.momenta(None, None) else ", at least columns x_momentum, y_momentum, z_momentum of the model"
+        )
+        what = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
+    return f"{what}: only momenta of the parts show for sure when they fly"
 
 
 def _has_one_energy(database: Legs) -> bool:
@@ -151,14 +181,28 @@ def _health(run: Run, flights: Sequence[FreeFlight]) -> Health | None:
     return assess(balance, (longest.start, longest.end) if longest else None, until=float(balance.time[-1]))
 
 
-def _flights(run: Run, selection: Selection) -> tuple[tuple[str, FreeFlight], ...]:
+def _history(run: Run, selection: Selection) -> History | None:
+    """Give what would be judged; None where an energy has to be chosen first, or there is no state."""
     if selection.parts:
         selection = with_parts_by_number(run, selection)
     for wanted in (selection.parts, selection.flying):
         if wanted:
             select_parts(wanted, run.parts, run.name)
     try:
-        history = run.history(selection._replace(energy=(), time=None))
-    except FormatError:  # an energy has to be chosen first, or there is no state
+        return run.history(selection)
+    except FormatError:
+        return None
+
+
+def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
+    """Give those that ``plan`` and ``suggest`` choose from; none where they refuse the run."""
+    try:
+        refuse_unsound(history, choosing=True)
+        found = flights_of(history, Settings())
+    except RangeError:
         return ()
-    return all_seen(history) if history.time.size > 1 else ()
+    return tuple(
+        (flight.source, FreeFlight(*bounds(history, flight), flight.parts, flight.end is not None, flight.damping))
+        for flight in found
+        if flight.source
+    )

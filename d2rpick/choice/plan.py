@@ -18,6 +18,7 @@ import numpy as np
 
 from d2rpick.choice.margin import Margin, margin_before_contact
 from d2rpick.choice.of_run import Reference, suggest_of
+from d2rpick.choice.sound import refuse_unsound
 from d2rpick.choice.suggest_td import bounds, flights_of, last_td
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
 from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
@@ -183,10 +184,11 @@ def plan_of(
         If ``after`` or a window lies outside the record, or the parts were deformable in a window that is done.
     """
     history = reference.history
+    refuse_unsound(history, choosing=True)
     span = float(history.time[-1] - history.time[0])
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
     if settings.after is not None:
-        history.check(settings.after, argument="after")
+        history.check_unit(settings.after, argument="after")
     history, found, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
     fits = Fits()

@@ -31,13 +31,11 @@ def nothing_vibrates(
     start, end = flight
     last = td if end is None else max(td, end - _BEFORE_CONTACT * (end - start))
     _, inside = history.between(start, last)
-    if not inside.size:
+    if inside.size < MIN_SAMPLES_PER_PERIOD:  # between so few a vibration is not seen
         return False
     least = round_off(history)  # 0 where no energy is written at all: that tells nothing
     if least > 0 and float(np.abs(inside).max()) <= least:
         return True
-    if inside.size < MIN_SAMPLES_PER_PERIOD:  # between so few a vibration is not seen
-        return False
     level = history.energy_at(td)
     low, high = float(inside.min()), float(inside.max())
     if deformed or level <= 0 or low < 0:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # Of a part that is deformable fewer states follow each other without kinetic energy, or with one internal energy.
 FEWEST: Final = 12
 # An internal energy that changes by less is one value: solvers write single precision.
-_SAME: Final = 1e-6
+SAME: Final = 1e-6
 
 
 def with_energy(run: Run, parts: Sequence[Part], history: History) -> tuple[Part, ...]:
@@ -54,6 +54,6 @@ def rigid_parts(run: Run, parts: Sequence[Part], time: Samples, tr: float, td: f
     if not parts or len(time[inside]) < FEWEST:
         return None
     energies, kinetic = run.part_energies(parts)[inside], kinetic_energies(run, parts)
-    still = np.ptp(energies, axis=0) <= _SAME * np.abs(energies).max(axis=0)
+    still = np.ptp(energies, axis=0) <= SAME * np.abs(energies).max(axis=0)
     absent = (kinetic[inside] == 0).all(axis=0) if kinetic is not None else np.zeros(len(parts), dtype=bool)
     return np.asarray(still | absent)

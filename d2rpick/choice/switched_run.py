@@ -101,7 +101,7 @@ def switched_history(
     history : History
         Without the momenta of parts where a rigid body had taken these over.
     windows : tuple of (float, float)
-        Those that are done: ``done``, and others in which the parts have no kinetic energy.
+        Those that are done: ``done``, and others in which the parts asked for were rigid, all of them.
     cautions : tuple of Caution
         What was recognised beside ``done``, and parts that were not rigid in it.
 
@@ -116,14 +116,9 @@ def switched_history(
             history.energy_at(time)
         cautions += _partly_rigid(reference, tr, td)
     absent = _absent_times(reference)
-    more = tuple(one for one in absent if not any(tr < one[1] and one[0] < td for tr, td in done))
-    cautions += [
-        Caution(
-            "rigid-times",
-            f"the parts were rigid from {a:.6g} to {b:.6g}, give or take an output interval: taken as done",
-        )
-        for a, b in more
-    ]
+    new = [one for one in absent if not any(tr < one.end and one.start < td for tr, td in done)]
+    cautions += [one.caution for one in new]
+    more = tuple((one.start, one.end) for one in new if one.whole)
     if absent:
         # energies of solids are garbage while they are rigid: nothing but the momentum is asked whether the model flies
         whole = tuple(replace(one, flying=one.chosen) for one in history.momenta if one.parts is None)
@@ -171,16 +166,43 @@ def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Cautio
     raise RangeError(f"{where}, a window that is said to be done; give the run that was switched so")
 
 
-def _absent_times(reference: Reference) -> tuple[Times, ...]:
+class _Absent(NamedTuple):
+    """A time in which some of the parts were ``rigid``; ``whole``: none of the others deforms."""
+
+    start: float
+    end: float
+    rigid: str
+    whole: bool
+
+    @property
+    def caution(self) -> Caution:
+        """What was recognised."""
+        when = f"from {self.start:.6g} to {self.end:.6g}"
+        if self.whole:
+            found = f"the parts were rigid {when}, give or take an output interval: taken as done"
+            return Caution("rigid-times", found)
+        found = f"{when} these parts were rigid: {self.rigid}; others deform, so that is no window that is done"
+        return Caution("partly-rigid", found)
+
+
+def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     """Times in which parts have no kinetic energy although the run moves: a rigid body has it instead."""
     parts, balance = _deformable(reference), reference.history.balance
     kinetic = kinetic_energies(reference.run, parts) if parts else None
     if kinetic is None or balance is None or balance.kinetic is None:
         return ()
-    time = reference.history.time
-    moves = np.interp(time, balance.time, balance.kinetic) > round_off(reference.history)
+    time, least = reference.history.time, round_off(reference.history)
+    moves = np.interp(time, balance.time, balance.kinetic) > least
     gone = ((kinetic == 0) & kinetic.any(axis=0)).any(axis=1) & moves
-    return tuple((float(time[a]), float(time[b])) for a, b in _stretches(gone))
+    energies, found = reference.run.part_energies(parts), []
+    for first, last in _stretches(gone):
+        start, end = float(time[first]), float(time[last])
+        rigid = rigid_parts(reference.run, parts, time, start, end)
+        rigid = (kinetic[first : last + 1] == 0).all(axis=0) if rigid is None else rigid
+        names = [part.title or f"part {part.id}" for part, one in zip(parts, rigid.tolist(), strict=True) if one]
+        deform = ~rigid & (np.ptp(energies[first : last + 1], axis=0) > least)
+        found.append(_Absent(start, end, listing(names), not deform.any()))
+    return tuple(found)
 
 
 def _stretches(states: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -10,6 +10,7 @@ import numpy as np
 from d2rpick.choice.of_run import suggest_of
 from d2rpick.choice.offer import offers_of
 from d2rpick.choice.ranking import EQUALLY_GOOD
+from d2rpick.choice.sound import refuse_unsound
 from d2rpick.choice.suggest_td import longest_flight, looking, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
 from d2rpick.vibration.fits import Fits
@@ -84,6 +85,9 @@ def explore_of(
         If td or the window lies outside the record, or no flight is seen and neither is given.
     """
     history, fits = reference.history, Fits()
+    refuse_unsound(history, choosing=True)
+    if td is not None:
+        history.check_unit(td, argument="td")
     record = float(history.time[0]), float(history.time[-1])
     window = td_window or longest_flight(history, settings, fits, otherwise=None if td is None else record)
     look = looking(history, settings, fits, since)

@@ -26,8 +26,6 @@ Samples: TypeAlias = "NDArray[np.float64]"
 
 # Parts slower than this share of the fastest stand still: single precision leaves them a speed.
 _STILL: Final = 1e-6
-# Nobody means a time in this first share of a record: a number that lies there in another unit was given in this one.
-_NEVER_MEANT: Final = 0.01
 
 
 class Precision(NamedTuple):
@@ -340,14 +338,27 @@ class History:
         if all(low <= time <= high for time in times):
             return
         from d2rpick.histories.legs import later_legs  # not above: pathlib costs start-up
+        from d2rpick.histories.units import in_smaller_unit
 
         legs = later_legs(self.source) if max(times) > high else []
         more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
-        more = more or (self._in_another_unit(times, argument) if argument else "")
+        more = more or (in_smaller_unit(self.time, times, argument) if argument else "")
         *asked, first, last = told_apart((*times, low, high))
         what = f"{f'`{argument}`' if argument else 'time'} {' '.join(asked)}"
         found = "reaches" if any(low <= time <= high for time in times) else "lies"
         raise RangeError(f"{', '.join(self.source)}: {what} {found} outside the record, {first} to {last}{more}")
+
+    def check_unit(self, *times: float, argument: str) -> None:
+        """Raise RangeError where times of an ``argument`` that lie in the record look to be in another unit than it."""
+        if times[-1] * 1e3 > self.time[-1]:  # as nearly always
+            return
+        from d2rpick.histories.units import in_larger_unit
+
+        meant = in_larger_unit(self.time, times, argument, self.time_unit)
+        if meant:
+            *asked, first, last = told_apart((*times, self.time[0], self.time[-1]))
+            where = f"`{argument}` {' '.join(asked)} lies within the first ten states of the record"
+            raise RangeError(f"{', '.join(self.source)}: {where}, {first} to {last}{meant}")
 
     def energy_at(self, time: float, argument: str = "") -> float:
         """Energy at ``time``, linear between the states; RangeError outside the record, naming the ``argument``."""
@@ -355,22 +366,6 @@ class History:
         before = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
         cell = slice(before, before + 2)  # of whole arrays that are read-only, numpy would make copies
         return float(np.interp(time, self.time[cell], self.energy[cell]))
-
-    def _in_another_unit(self, times: Sequence[float], argument: str) -> str:
-        """Ask whether an argument was given in another unit, in which it lies in the record as it does not now.
-
-        One that misses the record by less than its length does so in the record's own unit.
-        """
-        span = self.time[-1] - self.time[0]
-        if any(self.time[0] <= time <= self.time[-1] for time in times if time) or times[-1] < self.time[-1] + span:
-            return ""
-        least = max(float(self.time[0]), 0.0) + _NEVER_MEANT * float(np.ptp(self.time))
-        for unit, size in (("ms", 1e-3), ("us", 1e-6)):
-            values = [float(f"{time * size:.12g}") for time in times]
-            if least <= values[-1] and all(self.time[0] <= value <= self.time[-1] for value in values):
-                shown = " ".join(f"{value:g}" for value in values)
-                return f"; was it meant in {unit}? Then give `{argument}` {shown}, in the unit of the record"
-        return ""
 
     def energies_at(self, times: Samples) -> Samples:
         """Energies at many times within the record, linear between the states, of their shape."""

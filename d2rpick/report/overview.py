@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.health import head, measures_of
+from d2rpick.report.situation import spoken
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ def as_csv(overview: Overview) -> str:
         "channels": "; ".join(overview.channels),
         "parts": "; ".join(f"{one.part.id} {one.part.title}".rstrip() for one in overview.parts),
         "flights": "; ".join(_flight(*flight) for flight in overview.flights),
+        "should_write": overview.should_write,
         "health": "; ".join(f"{what} {value}" for what, value, *_ in _health(overview)),
         "notes": "; ".join(overview.notes),
     }
@@ -90,6 +92,7 @@ def as_json(overview: Overview, command: Sequence[str]) -> str:
                 }
                 for source, f in overview.flights
             ],
+            "should_write": overview.should_write,
             "health": keys.of_health(overview.health),
             "notes": overview.notes,
         }
@@ -114,6 +117,8 @@ def _rows(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("channels", ", ".join(overview.channels) or None),
     ]
     rows += [("flight", _flight(*flight)) for flight in overview.flights]
+    if overview.should_write:
+        rows.append(("should write", overview.should_write))
     return rows
 
 
@@ -136,4 +141,4 @@ def _flight(source: str, flight: FreeFlight) -> str:
         else "the whole model"
     )
     end = f"to {flight.end:.6g}" if flight.end_seen else f"to the end of the record, {flight.end:.6g}"
-    return f"{who} from {flight.start:.6g} {end} ({source})"
+    return f"{who} from {flight.start:.6g} {end} ({spoken(source)})"

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.warnings import Caution
-    from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
 
 # Parts that a line names of those that are switched or fly together; the JSON document has all.
@@ -56,12 +55,13 @@ def heading(situation: Situation) -> list[str]:
         end = "no next contact found" if flight.end is None else f"to {flight.end:.6g}"
         parts = [part.name if part.title else str(part.id) for part in flight.parts or ()]
         who = f" of {listing(parts, most=_NAMED)}" if parts else ""
-        lines.append(f"flight   from {flight.start:.6g} ({_source(flight)}{who}), {end}")
+        lines.append(f"flight   from {flight.start:.6g} ({spoken(flight.source)}{who}), {end}")
     return [printable(line) for line in lines]
 
 
-def _source(flight: Flight) -> str:
-    return "energy alone, not certain" if flight.source == "energy" else str(flight.source)
+def spoken(source: str | None) -> str:
+    """Name the source of a flight for people."""
+    return "energy alone, not certain" if source == "energy" else str(source)
 
 
 def _basis(situation: Situation) -> str:

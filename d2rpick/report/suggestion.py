@@ -165,7 +165,7 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     if answer.longer and answer.recommended:
         lines.append(("longer", given_up(answer.longer, answer.recommended)))
     expected = answer.expected
-    if expected and expected.ratio is None:
+    if expected and expected.ratio is None and not expected.above_the_reference:
         lines.append(("mean after", f"about {expected.ratio_at_level:.0%} of the reference's with the energy of td"))
     return lines
 

@@ -128,7 +128,8 @@ RULES: Final = (
         "D2R205",
         Severity.ERROR,
         "tr or td outside the reference history",
-        "The energy at such a time is unknown, and so is that of a part that the history does not have.",
+        "The energy at such a time is unknown, and so is that of a part that the history does not have. A td within "
+        "the first ten states, whose thousandfold lies in the history, was given in another unit.",
         partial(_faults, "D2R205"),
         _PASSING,
         (_pair(".0135867", "0.16"),),

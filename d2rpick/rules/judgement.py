@@ -14,6 +14,7 @@ from d2rpick.choice.suggest import find_better_pair, suggest_at
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, Caution, end_of_flight, end_of_load
 from d2rpick.errors import FormatError, name_units
 from d2rpick.histories.digits import above, first_as_read
+from d2rpick.histories.units import in_the_record
 from d2rpick.rules.base import Fault
 
 if TYPE_CHECKING:
@@ -133,6 +134,10 @@ class HistoryJudge:
             return
         if td is None:
             yield from _of_load(history, tr, self.settings)
+            return
+        if meant := in_the_record(history.time, [td], history.time_unit):
+            found = f"td = {td:.6g} lies within the first ten states of the history, {first:.6g} to {last:.6g}"
+            yield Fault("D2R205", True, f"{found}; is the deck in s and the history not? {meant[0]:.6g} lies in it too")
             return
         if (tr, td) in self.done:
             return

@@ -308,6 +308,38 @@ def test_a_reference_without_energy_at_td_has_no_ratio() -> None:
     assert compare_runs(history(0 * TIME), history(1 + TIME), (0.1, 0.5), 1.0, 0.2, NONE, NONE).energy_ratio is None
 
 
+LONG: Samples = np.linspace(0.0, 1.0, 1001)
+
+
+def crushed(vibration: float) -> Samples:
+    """Energy of a body that was crushed, mostly plastic: it goes on falling and rising while it vibrates."""
+    return np.asarray(29000 + vibration * np.sin(20 * LONG))
+
+
+@pytest.mark.parametrize("vibration", [3.0, 300.0, 20000.0])
+def test_a_right_switched_run_of_a_crushed_body_was_rigid_from_tr_to_td(vibration: float) -> None:
+    """By 1e-4 of an energy that is plastic a vibration of 3 would stand still all along."""
+    energy = crushed(vibration)
+    frozen = np.interp(0.3, LONG, energy)
+    after = np.where(LONG > 0.8, energy[800] - frozen, 0)
+    switched = np.where((LONG >= 0.3) & (LONG <= 0.8), frozen, energy - after)
+    found = compare_runs(history(energy, LONG), history(switched, LONG), (0.3, 0.8), np.inf, 1.0, NONE, NONE)
+    assert found.rigid_from == pytest.approx(0.3, abs=2e-3)
+    assert found.rigid_to == pytest.approx(0.8, abs=2e-3)
+    assert found.objections == ()
+    for pair in ((0.2, 0.8), (0.3, 0.9), (0.4, 0.8), (0.3, 0.7)):
+        found = compare_runs(history(energy, LONG), history(switched, LONG), pair, np.inf, 1.0, NONE, NONE)
+        assert any("is rigid from" in one for one in found.objections)
+
+
+def test_where_the_reference_stands_still_too_a_longer_stillness_is_no_objection() -> None:
+    """A body that flies in from the start, and hardly vibrates: its energy does not tell when it was switched."""
+    energy = 5 + np.where(LONG > 0.9, LONG - 0.9, 0.0)
+    found = compare_runs(history(energy, LONG), history(energy, LONG), (0.3, 0.8), 0.89, 1.0, NONE, NONE)
+    assert found.rigid_from == 0.0
+    assert found.objections == ()
+
+
 @pytest.mark.parametrize("short", ["reference", "switched"])
 def test_a_run_that_ends_at_td_is_named(short: str) -> None:
     runs = {name: history(1 + TIME, name=name) for name in ("reference", "switched")}

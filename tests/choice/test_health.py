@@ -199,6 +199,20 @@ def test_a_window_that_reaches_into_the_next_contact_is_warned_of() -> None:
     assert "contact-in-window" in codes(found)
 
 
+@pytest.mark.parametrize("swing", [0.0, 3.0])
+def test_hourglass_is_an_alarm_only_where_a_level_is_matched(swing: float, tmp_path: Path) -> None:
+    time = np.linspace(0, 1, 401)
+    internal = np.where(time < 0.2, 250 * time, 50 + swing * np.sin(90 * time) * np.sin(61 * time))
+    columns = np.stack([time, internal, 200 - 0 * time, 0.2 * internal], axis=1)
+    file = tmp_path / "glass.csv"
+    np.savetxt(file, columns, "%.9g", ",", header="time,internal_energy,kinetic_energy,hourglass_energy", comments="")
+    for args in (("suggest",), ("verify", "--tr", "0.41")):
+        found = answer(*args, "--td", "0.9", "--after", "0.3", str(file))
+        assert ("at-rest" in codes(found)) == (swing == 0)
+        assert ("hourglass" in codes(found)) == (swing > 0)
+        assert found["health"]["hourglass_share"] == pytest.approx(0.2, abs=1e-3)
+
+
 def test_of_files_with_nothing_to_judge_nothing_is_said() -> None:
     assert answer("suggest", "--td", "0.064", ENERGY)["health"] is None
     assert answer("info", ENERGY)["health"] is None

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from d2rpick.histories.writing import TABLE_WRITERS
-from tests.command import BOX, ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run
+from tests.command import BOX, ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, run
 from tests.json_schemas import check_by_schema
+from tests.made_t01 import t01
 
 REPLAY = ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4")
 FORMATS = ("table", "json", "csv", "markdown")
@@ -76,6 +77,56 @@ def test_info_lists_all_flights_of_the_parts_asked_for() -> None:
     assert first["end"] < second["start"]
     assert second["end"] is None
     assert "rotation_energy" in found["channels"]
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        (str(ROOT / "sample_data/rollover_box.matsum"), "--part", "box"),
+        (str(ROOT / "sample_data/rollover_box.glstat"),),
+        (str(ROOT / "sample_data/rolloverT01.gz"), "--part", "box"),
+        (ENERGY,),
+        (ROLLOVER, "--energy", "boxIE_J"),
+    ],
+)
+def test_info_lists_the_flights_that_plan_and_suggest_choose_from(args: tuple[str, ...]) -> None:
+    listed = info(*args)["flights"]
+    planned = answer("plan", *args)["windows"]
+    assert listed
+    for key in ("end", "source"):
+        assert [one[key] for one in listed] == [row[f"flight_{key}"] for row in planned]
+    chosen = answer("suggest", *args)["flight"]
+    assert chosen["source"] in [one["source"] for one in listed]
+    if chosen["source"] != "energy":  # that shows another flight to each td
+        assert [one["start"] for one in listed] == [row["flight_start"] for row in planned]
+        assert (chosen["start"], chosen["end"]) in [(one["start"], one["end"]) for one in listed]
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("rolloverT01.gz", None),
+        ("rollover_box.matsum", None),
+        ("rollover_box.binout", None),
+        ("rollover_box.glstat", "*DATABASE_MATSUM, with the DT of *DATABASE_GLSTAT: only momenta of the parts show"),
+        ("rollover_box.csv", "LS-DYNA: *DATABASE_MATSUM): only momenta"),
+        ("energy.csv", "LS-DYNA: *DATABASE_MATSUM), at least columns x_momentum, y_momentum, z_momentum of the model:"),
+    ],
+)
+def test_info_says_in_the_solver_s_words_what_the_run_should_write(name: str, told: str | None) -> None:
+    source = str(ROOT / "sample_data" / name)
+    found = info(source)["should_write"]
+    lines = [line for line in run("info", source).stdout.splitlines() if line.startswith("should write")]
+    if told is None:
+        assert (found, lines) == (None, [])
+    else:
+        assert told in found
+        assert [line.split(maxsplit=2)[2] for line in lines] == [found]
+
+
+def test_a_t01_without_parts_should_have_them(tmp_path: Path) -> None:
+    (tmp_path / "RUNT01").write_bytes(bytes(t01(40, parts=()).data))
+    assert info(str(tmp_path / "RUNT01"))["should_write"].startswith("/TH/PART with DEF, MASS and HE for all parts:")
 
 
 def test_companions_are_one_run(matsum: Path, tmp_path: Path) -> None:

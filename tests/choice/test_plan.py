@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from d2rpick.choice import explored
 from d2rpick.choice.of_run import Reference, read, suggest_of
 from d2rpick.choice.plan import Plan, plan_of
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.errors import RangeError
 from d2rpick.histories.opening import Selection
 from tests.computed import stored
@@ -151,6 +153,21 @@ def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
     reasons = [row.reason or "" for row in found.rows if row.status == "re-plan"]
     assert reasons
     assert all(f"in the window {window[0]:.6g} to {window[1]:.6g}" in reason for reason in reasons)
+
+
+def test_where_nothing_vibrates_td_lies_as_late_as_the_margin_allows(reference: Reference, plan: Plan) -> None:
+    resting = [row for row in plan.rows if row.window and row.answer and row.answer.situation.at_rest]
+    assert len(resting) > 1
+    for row in resting:
+        assert row.window is not None
+        room = max(row.margin.time, 2 * (row.margin.spread or 0.0))
+        assert row.window[1] == pytest.approx(row.end - room, abs=1e-5)
+    flight = resting[0].flight
+    cut = reference.history.between(0, 0.9 * (flight.end or 0))[0].size  # a record that ends before the landing
+    short = replace(reference.history, time=reference.history.time[:cut], energy=reference.history.energy[:cut])
+    found = suggest_in_window(short, (0.0, float(short.time[-1])), Settings(after=0.0)).recommended
+    assert found is not None
+    assert short.time[-3] < found.td <= short.time[-2]
 
 
 def test_a_window_that_is_done_where_nothing_flies_is_told(tmp_path: Path) -> None:

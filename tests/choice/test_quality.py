@@ -162,3 +162,28 @@ def test_between_few_states_nothing_is_called_at_rest() -> None:
     found = suggest(record, 2.2, Settings(after=2.15))
     assert not found.situation.at_rest
     assert found.quality is None or found.quality.grade != "good"
+
+
+def test_between_few_states_not_even_round_off_is_called_rest() -> None:
+    energy = np.where(np.arange(400) < 12, 1e-12, 1.0 + np.sin(np.arange(400)) ** 2)
+    record = History(np.linspace(0, 39.9, 400), energy, ("early",), "made", "E")
+    early, later = (suggest(record, td, Settings(after=0.0)).situation for td in (0.85, 1.05))
+    assert not early.at_rest
+    assert later.at_rest
+
+
+def test_where_nothing_vibrates_there_is_no_residual() -> None:
+    """What is left of a vibration when its energy is round-off is described by the oscillator, and is nothing."""
+    time = np.linspace(0, 1, 4001)
+    energy = (np.exp(-25 * time) * np.sin(120 * time)) ** 2
+    found = suggest(History(time, energy, ("decayed",), "made", "E"), 0.95, Settings(after=0.6))
+    assert found.situation.vibration.unknown is None
+    assert found.situation.at_rest
+    assert found.situation.kinetic_share is None
+    best = found.chosen
+    assert best is not None
+    assert (best.residual, best.sign_match, best.notes) == (None, None, ())
+    assert found.quality == Quality("good")
+    verdict = verify(found.situation.history, 0.7, 0.95, Settings(after=0.6))
+    assert verdict.verified
+    assert verdict.candidate.residual is None

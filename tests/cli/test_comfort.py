@@ -7,7 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -15,9 +15,6 @@ from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.manual import manual
 from d2rpick.version import __version__
 from tests.command import ENERGY, GLSTAT, ROLLOVER, ROOT, TIME_LIMIT, answer, run
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
 
@@ -115,6 +112,51 @@ def test_a_near_miss_is_named(args: tuple[str, ...], told: str) -> None:
 def test_a_td_far_outside_is_not_explained_by_a_unit() -> None:
     assert "meant" not in run("suggest", "--td", "1e9", ENERGY).stderr
     assert "meant" not in run("suggest", "--td", "-64", ENERGY).stderr
+
+
+@pytest.fixture
+def in_ms(tmp_path: Path) -> str:
+    """The record of the oscillator with its times in ms, which no header names."""
+    rows = [line.split(",") for line in Path(ENERGY).read_text().splitlines()[1:]]
+    lines = ["time,internal_energy", *(f"{1000 * float(row[0]):.10g},{row[5]}" for row in rows)]
+    (tmp_path / "ms.csv").write_text("\n".join(lines) + "\n")
+    return str(tmp_path / "ms.csv")
+
+
+@pytest.mark.parametrize(
+    ("args", "told"),
+    [
+        (("suggest", "--td", "0.064"), "--td 64,"),
+        (("suggest", "--td", "64", "--after", "0.013"), "--after 13,"),
+        (("suggest", "--td-window", "0.05", "0.07"), "--td-window 50 70,"),
+        (("verify", "--tr", "0.0129", "--td", "0.064"), "--td 64,"),
+        (("explore", "--td", "0.064"), "--td 64,"),
+        (("study", "--td", "0.064"), "--td 64,"),
+        (("plan", "--after", "0.06"), "--after 60,"),
+        (("card", "--tr", "0.0129", "--td", "0.064", "--solver", "ls-dyna", "--part", "1", "--history"), "--td 64,"),
+    ],
+)
+def test_a_time_in_s_is_not_taken_for_one_in_ms(in_ms: str, args: tuple[str, ...], told: str) -> None:
+    result = run(*args, in_ms)
+    assert result.exit_code == 2
+    assert "within the first ten states of the record, 0 to 150; was it meant in s? Then give " + told in result.stderr
+
+
+def test_early_times_that_are_meant_are_kept(in_ms: str) -> None:
+    # a flight may begin at once, and so may a tr; of 0.4 the thousandfold is no time of the record
+    for args in (("suggest", "--td", "64", "--after", "0"), ("verify", "--tr", "0.0129", "--td", "64")):
+        assert run(*args, in_ms).exit_code in (0, 1)
+    assert run("suggest", "--td", "0.4", in_ms).exit_code in (0, 1)
+    named = Path(in_ms).read_text().replace("time,", "time [s],")
+    Path(in_ms).write_text(named)  # there is no larger unit that a time would be given in
+    assert run("suggest", "--td", "0.064", in_ms).exit_code in (0, 1)
+
+
+def test_a_deck_in_s_is_not_judged_by_a_history_in_ms(in_ms: str) -> None:
+    result = run("check", str(ROOT / "sample_data/switching.k"), "--history", in_ms)
+    assert result.exit_code == 1
+    assert "D2R205" in result.stdout
+    assert "is the deck in s and the history not? 64 lies in it too" in result.stdout
 
 
 def test_ndjson_is_the_json_in_one_line() -> None:

@@ -21,13 +21,13 @@ DRIVEN = (
     f"{QA}LOIS-LOI38-DMAFNLIN-input_44-isolid_1-reference-DMAFNLINT01",
     f"{QA}RESSORT-couple-reference-TYPE8MT01",
     f"{QA}RESSORT-kjoint2-reference-JOINTT01",
-    f"{QA}SUBMODEL-TRANSF-reference-BOULE1V5T01",
 )
 FILES = [
     *(f"histories/{name}" for name in (*READABLE, *REFUSED)),
     *(f"more-histories/{name}" for name in (*MORE, *PAIRS)),
     f"{QA}IMPOSED-IMPDISP_FGEO-reference-mapSimpleT01",
     f"{QA}OPTIONS-damp-new_test_v11-reference-FFO25SCBT01",
+    f"{QA}SUBMODEL-TRANSF-reference-BOULE1V5T01",
     *DRIVEN,
 ]
 PLAIN = Settings(replay=False)
@@ -44,7 +44,7 @@ def test_nothing_fails_at_any_td_and_no_flight_contradicts_the_health(name: str)
         try:
             answer = suggest_of(reference, td, PLAIN)
         except D2RPickError:
-            assert reference.history.time.size < 3
+            assert reference.history.time.size < 3 or not reference.history.energy.any()
             continue
         if answer.situation.in_flight:
             assert not {"work-in-window", "contact-in-window"} & {caution.code for caution in answer.cautions}

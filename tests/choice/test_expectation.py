@@ -1,0 +1,72 @@
+"""More energy than the reference has never comes back: where the estimate says so, the pair is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.acceptable_windows import acceptable_windows
+from d2rpick.choice.examine import examine
+from d2rpick.choice.expectation import MOST_KEPT, expectation, most_energy
+from d2rpick.choice.offer import offers_of
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest_at
+from d2rpick.choice.verify import approve, verify_at
+from d2rpick.histories.history import History
+from d2rpick.report.suggestion import as_table
+from d2rpick.rules.judgement import faults_of
+
+if TYPE_CHECKING:
+    from d2rpick.choice.situation import Situation
+
+TIME = np.linspace(0, 1, 2001)
+# Two modes in flight up to 0.8, and a crash of which nothing is told; the mean up to td is far below the energy there.
+ENERGY = (2 + np.sin(90 * TIME) + 0.8 * np.sin(173 * TIME)) * np.where(TIME > 0.8, 50.0, 1.0)
+
+
+def situation_at(td: float, energy: np.ndarray = ENERGY) -> Situation:
+    """See the record from a td in a flight from 0.1 of which no end is known."""
+    found = examine(History(TIME, energy, ("made",), "made", "E"), td, Settings(after=0.1, replay=False))
+    return replace(found, flight=found.flight._replace(start=0.1, end=None, refusal=None))
+
+
+def test_a_pair_that_gives_back_more_than_there_is_is_refused_by_all_that_judge_it() -> None:
+    situation = situation_at(0.95)
+    assert expectation(situation, situation.energy_td).ratio > 2  # type: ignore[union-attr, operator]
+    answer = suggest_at(situation, with_better=False)
+    assert answer.recommended is None
+    (why,) = (one.message for one in answer.cautions if one.code == "no-candidate")
+    assert "times that of the reference, more than 1.2 times" in why
+    assert "mean after" not in as_table(answer, 5)
+    crossing = next(one for one in answer.candidates if one.level_error == pytest.approx(0, abs=1e-6))
+    verdict = verify_at(situation, crossing.tr)
+    assert not verdict.verified
+    assert "times that of the reference" in verdict.reasons[0]
+    assert [fault.rule for fault in faults_of(verdict)] == ["D2R201"]
+    (offer,) = offers_of([situation], set())
+    assert offer.best is None
+    assert not acceptable_windows(situation, answer.candidates, None).size
+
+
+def test_up_to_the_limit_it_is_accepted_and_the_windows_end_there() -> None:
+    """A td on the highest peak: of the levels within the tolerance the higher ones give back too much."""
+    energy = 0.1 + np.sin(61 * TIME) ** 2 * (1 + 0.9 * np.sin(4.4 * TIME + 0.4))
+    peak = TIME[np.argmax(energy * (TIME < 0.6))]
+    situation = situation_at(float(peak), energy)
+    candidates = suggest_at(situation, with_better=False).candidates
+    windows = acceptable_windows(situation, candidates, None)
+    grid = np.linspace(0.1, float(windows[-1, 1]), 3000)
+    kept = np.array(approve(situation, grid.tolist()))
+    levels = situation.vibration.energies(grid)
+    assert kept.any()
+    assert levels[kept].max() <= most_energy(situation)
+    within = np.abs(np.sqrt(levels / situation.energy_td) - 1) <= 0.2
+    assert (kept == (within & (levels <= most_energy(situation)))).all()
+    found = expectation(situation, most_energy(situation))
+    assert found is not None
+    assert found.ratio == pytest.approx(MOST_KEPT)
+    inside = (windows[:, :1] <= grid) & (grid <= windows[:, 1:])
+    assert (inside.any(axis=0) == kept).mean() > 0.999

@@ -1,0 +1,58 @@
+"""When the parts of a question were rigid, and when only others were."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.of_run import read
+from d2rpick.choice.switched_run import switched_history
+from d2rpick.histories.formats import glstat, matsum
+from d2rpick.histories.opening import Selection
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from d2rpick.histories.history import Samples
+
+TIME = np.linspace(0, 1, 501)
+
+
+def column(energy: Samples, kinetic: Samples, title: str) -> matsum.PartColumns:
+    return matsum.PartColumns(title, energy, kinetic, 0 * TIME, 0 * TIME + 3)
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[str]:
+    """Three bodies: of one a rigid body has the kinetic energy for a while, one goes on, one never matters."""
+    off = (TIME > 0.299) & (TIME < 0.701)
+    swing, moves = 5 + np.sin(40 * TIME), 100 + np.cos(40 * TIME)
+    parts = (
+        column(np.where(off, swing[150], swing), np.where(off, 0.0, moves), "engine"),
+        column(3 + np.cos(31 * TIME), moves, "car"),
+        column(1e-9 * swing, moves, "dust"),
+    )
+    lines = {"time": TIME, "kinetic energy": 2 * moves, "internal energy": parts[0][1] + parts[1][1]}
+    for name, content in (("matsum", matsum.write("bodies", TIME, parts)), ("glstat", glstat.write("bodies", lines))):
+        (tmp_path / name).write_bytes(content)
+    return [str(tmp_path / name) for name in ("matsum", "glstat")]
+
+
+@pytest.mark.parametrize(
+    ("asked", "done"),
+    [((), False), (("engine",), True), (("car",), None), (("engine", "car"), False), (("engine", "dust"), True)],
+)
+def test_a_window_is_done_only_where_the_parts_of_the_question_were_rigid(
+    files: list[str], asked: tuple[str, ...], done: bool | None
+) -> None:
+    reference = read(files, Selection(parts=asked))
+    history, windows, cautions = switched_history(reference, ())
+    assert [time for window in windows for time in window] == pytest.approx([0.3, 0.7] * bool(done))
+    said = {None: [], True: ["rigid-times"], False: ["partly-rigid"]}[done]
+    assert [one.code for one in cautions] == said
+    if done is False:
+        assert "these parts were rigid: engine; others deform" in cautions[0].message
+    # where a rigid body has taken momenta over, those of the parts tell no flight
+    assert (history.evidence is reference.history.evidence) == (done is None)
