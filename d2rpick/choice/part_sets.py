@@ -95,8 +95,8 @@ class PartSet:
     @property
     def out_of_place(self) -> bool:
         """Whether the position error is beyond its limit, or a part flies away from the body it is to be one with."""
-        known = self.position_error is not None and self.position_limit is not None
-        return self.apart or (known and self.position_error > self.position_limit)  # type: ignore[operator]
+        error, limit = self.position_error, self.position_limit
+        return self.apart or (error is not None and limit is not None and error > limit)
 
 
 class Parts(NamedTuple):

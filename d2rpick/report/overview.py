@@ -135,10 +135,7 @@ def _parts(overview: Overview) -> list[list[tables.Cell]]:
 
 
 def _flight(source: str, flight: FreeFlight) -> str:
-    who = (
-        ", ".join(part.name if part.title else str(part.id) for part in flight.parts)
-        if flight.parts
-        else "the whole model"
-    )
+    names = [part.name if part.title else str(part.id) for part in flight.parts or ()]
+    who = ", ".join(names) or "the whole model"
     end = f"to {flight.end:.6g}" if flight.end_seen else f"to the end of the record, {flight.end:.6g}"
     return f"{who} from {flight.start:.6g} {end} ({spoken(source)})"
