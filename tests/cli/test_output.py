@@ -22,14 +22,15 @@ from tests.json_schemas import check_by_schema
 
 SUGGEST = ("suggest", "--td", "0.064")
 VERIFY = ("verify", "--tr", "0.0135867", "--td", "0.0687534")
+ALONE = ("--no-verify", "--energy", "boxIE_J", ROLLOVER)  # judged by the energy alone
 NOTHING = (*SUGGEST, "--max-residual", "0.5", ENERGY)  # an objection
 ANSWERS = [
     (*SUGGEST, ENERGY),
     (*SUGGEST, GLSTAT),
     NOTHING,
-    ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER),
+    ("suggest", "--td", "0.37", *ALONE),
     (*VERIFY, ENERGY),
-    ("verify", "--tr", "0.1", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER),
+    ("verify", "--tr", "0.1", "--td", "0.37", *ALONE),
 ]
 FORMATS = {"suggest": ("table", "json", "csv", "markdown", "value"), "verify": ("table", "json", "csv", "markdown")}
 
@@ -288,7 +289,7 @@ FIRST_BYTES = {"png": b"\x89PNG\r\n", "svg": b"<?xml", "pdf": b"%PDF-"}
     [
         (*SUGGEST, ENERGY),
         NOTHING,
-        ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER),
+        ("suggest", "--td", "0.37", *ALONE),
         (*VERIFY, ENERGY),
         ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "--tr", "0.013", "--td", "0.064"),
     ],

@@ -277,7 +277,7 @@ def test_sources_that_contradict_each_other_are_both_named_and_the_shorter_fligh
     assert "by the contact energy" in doubt
 
 
-ALONE = ("--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
+ALONE = ("--td", "0.37", "--no-verify", "--energy", "boxIE_J", ROLLOVER)
 
 
 def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> None:
