@@ -154,9 +154,6 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
     if float(np.abs(momentum[(first + last) // 2 : last + 1]).max()) <= TOLERANCE * extent + noise:
         return None  # held, or at rest
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
-    largest = float(np.abs(momentum[: last + 1]).max())
-    if damping * (time[last] - time[first]) > _DAMPED and float(np.abs(momentum[first]).max()) < _LEFT * largest:
-        return None  # what is left of a motion that a brake has taken looks like damping
     return FreeFlight(float(time[first]), float(time[last]), parts, last < time.size - 1, damping, gravity or 0.0)
 
 
@@ -194,13 +191,19 @@ class Laws:
     def window(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
         """Give the states around ``td`` in free flight, and its gravity [length/time^2]; None where nothing acts."""
         window = lasting_window(self._falling, td, self.extent, self.noise, fades=True)
-        gravity = self._gravity(window) if window else None
+        gravity = self._gravity(window) if window and not self._braked(*window) else None
         if gravity is not None:
             return window, gravity
         window = lasting_window(self._steady, td, self.extent, self.noise, fades=True, enough=_ENOUGH)
         if window:
             return (None if self.fall else window), None
         return self._under_gravity(td)
+
+    def _braked(self, first: int, last: int) -> bool:
+        """Whether what is left of a motion that a brake has taken looks like damping."""
+        largest, left = (float(np.abs(self.fit.momentum[slice(at, last + 1)]).max()) for at in (0, first))
+        length = float(self.fit.time[last] - self.fit.time[first])
+        return left < _LEFT * largest and self.fit.damping(first, last) * length > _DAMPED
 
     def _under_gravity(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
         """Give the window around ``td`` under one of the accelerations that decks have for gravity: a load may fade."""

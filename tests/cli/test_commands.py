@@ -132,7 +132,7 @@ def test_after_moves_the_start_of_the_flight_and_says_so() -> None:
 
 @pytest.mark.parametrize("tolerance", [0.001, 0.05, 0.2])
 def test_the_tolerance_bounds_what_is_acceptable(tolerance: float) -> None:
-    candidates = answer(*ROLLING, "--tolerance", str(tolerance))["candidates"]
+    candidates = answer(*ROLLING, "--no-verify", "--tolerance", str(tolerance))["candidates"]
     assert max(c["level_error"] for c in candidates if c["acceptable"]) <= tolerance
     assert all(c["level_error"] <= tolerance for c in candidates if c["kind"] == "extremum")
 

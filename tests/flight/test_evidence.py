@@ -265,7 +265,7 @@ def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_
     assert "by the contact energy" in doubt
 
 
-ALONE = ("--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
+ALONE = ("--td", "0.37", "--no-verify", "--energy", "boxIE_J", ROLLOVER)
 
 
 def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> None:

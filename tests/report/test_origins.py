@@ -15,10 +15,10 @@ from tests.sample_deck import DECK
 BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 WEIGHTS = 'source = "our cluster"\n[per_element]\nBT = 1\nQBAT = 2\n'
 ASKED = {
-    "suggest": ("--td", "0.37", "--part", "all"),
-    "verify": ("--tr", "0.1", "--td", "0.37", "--part", "all"),
-    "explore": ("--steps", "3", "--part", "all"),
-    "plan": ("--part", "all"),
+    "suggest": ("--td", "0.37", "--part", "all", "--no-verify"),
+    "verify": ("--tr", "0.1", "--td", "0.37", "--part", "all", "--no-verify"),
+    "explore": ("--steps", "3", "--part", "all", "--no-verify"),
+    "plan": ("--part", "all", "--no-verify"),
     "parts": (),
 }
 
@@ -79,7 +79,7 @@ def test_of_a_deck_of_many_files_a_page_names_the_first() -> None:
         Path(name).write_text("*TITLE\nnothing\n", "utf-8")
     includes = "".join(f"*INCLUDE\n{name}\n" for name in names)
     Path("main.k").write_text(DECK.read_text("utf-8").replace("*END", f"{includes}*END"), "utf-8")
-    asked = ("suggest", "--td", "0.37", "--part", "all", "--deck", "main.k", BOX)
+    asked = ("suggest", *ASKED["suggest"], "--deck", "main.k", BOX)
     assert answer(*asked, "--report", "page.html")["deck"]["source"] == ["main.k", *names]
     page = Path("page.html").read_text("utf-8")
     assert ("part18.k: " in page, "part19.k: " in page) == (True, False)
