@@ -54,7 +54,7 @@ def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | N
         free.append(elapsed)
         gravity = elapsed**2
     else:
-        from d2rpick.flight.momentum import FreeFall
+        from d2rpick.flight.free_fall import FreeFall
 
         velocity = balance.velocity[inside]
         gravity = integral(time, velocity @ FreeFall(time, velocity).gravity())
