@@ -29,10 +29,14 @@ _REACH_OF_DIGITS = 10.0
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
 # Damping that takes so much of the momentum in a window is believed where there is so much of the largest momentum.
 _DAMPED, _LEFT = 0.2, 0.05
+# It takes less than this from one state to the next.
+_SHOWN = 0.1
 # So little of the range may still change in a window where nothing but gravity is admitted, although a load fades on.
 _ENOUGH = TOLERANCE
 # A change of momentum that no gravity explains is none up to so many times what a window leaves open.
 _UNSEEN = 2.0
+# What the work of gravity leaves open of the energies: samples are far apart, and a solver adds up by steps.
+_OF_WORK = 2e-3
 # States that tell a work from none: twice the unknowns.
 _LEAST_STATES = 6
 
@@ -62,10 +66,13 @@ class Laws:
         return self._under_gravity(td)
 
     def _braked(self, first: int, last: int) -> bool:
-        """Whether what is left of a motion that a brake has taken looks like damping."""
+        """Whether what looks like damping is a brake: faster than the states show, or it has taken nearly all."""
         largest, left = (float(np.abs(self.fit.momentum[slice(at, last + 1)]).max()) for at in (0, first))
         length = float(self.fit.time[last] - self.fit.time[first])
-        return left < _LEFT * largest and self.fit.damping(first, last) * length > _DAMPED
+        damping = self.fit.damping(first, last)
+        return damping * length > max(_DAMPED, _SHOWN * (last - first)) or (
+            left < _LEFT * largest and damping * length > _DAMPED
+        )
 
     def _under_gravity(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
         """Give the window around ``td`` under one of the accelerations that decks have for gravity: a load may fade."""
@@ -159,7 +166,7 @@ def acceleration_by_work(balance: Balance, time: Samples, momentum: Samples, sta
     Returns
     -------
     float or None
-        None where none of them is written.
+        None where none of them is written, 0 where they do not follow.
     """
     worked = balance.external_work is not None and bool(np.ptp(balance.external_work))
     work = balance.external_work if worked else balance.kinetic_and_internal
@@ -170,8 +177,10 @@ def acceleration_by_work(balance: Balance, time: Samples, momentum: Samples, sta
     columns = [np.ones_like(impulse), impulse]
     if balance.kinetic is not None:
         columns.append(integral(balance.time[inside], balance.kinetic[inside]))
-    factors, *_ = np.linalg.lstsq(np.stack(columns, axis=1), work[inside], rcond=None)
-    return float(factors[1])
+    table = np.stack(columns, axis=1)
+    factors, *_ = np.linalg.lstsq(table, work[inside], rcond=None)
+    rest = float(np.abs(work[inside] - table @ factors).max())
+    return float(factors[1]) if rest <= _OF_WORK * float(np.ptp(work[inside])) else 0.0
 
 
 class FreeFall:

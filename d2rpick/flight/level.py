@@ -17,10 +17,10 @@ from d2rpick.histories.samples import window
 if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Samples
 
-# The band of the second half of a flight, widened by this share of its width on both sides, holds the first half too.
+# The band of the last quarter of a flight, widened on both sides by this share of its width, holds all before it.
 _RESERVE: Final = 0.5
-# The means of its last two quarters differ by at most this share of that width.  Of a steady drift they differ by half,
-# of a vibration that shows three quarters of a period in each by 0.3.
+# The means of its last two quarters differ by at most this share of that width: of a steady drift by all of it, of a
+# vibration that shows three quarters of a period in each by 0.3.
 _DRIFT: Final = 0.35
 # Below this share of the largest energy a width is round-off: tables and single precision have seven digits.
 _ROUND_OFF: Final = 1e-6
@@ -53,16 +53,16 @@ def settled_from(time: Samples, energy: Samples, whole: Samples | None, start: f
 
 
 def _kept_from(energy: Samples, whole: Samples | None, least: float) -> int | None:
-    """First state from which an energy keeps the level of its second half; None where that drifts."""
-    half, quarter = energy.size // 2, 3 * energy.size // 4
-    low, high = float(energy[half:].min()), float(energy[half:].max())
+    """First state from which an energy keeps the level of its last quarter; None where that drifts."""
+    half, last = energy.size // 2, 3 * energy.size // 4
+    low, high = float(energy[last:].min()), float(energy[last:].max())
     width = max(high - low, least)
-    lost = np.full(energy.size, np.inf) if whole is None else np.maximum(whole - whole[half:].mean(), 0.0)
-    drift = float(energy[quarter:].mean() - energy[half:quarter].mean())
-    if abs(drift) > _DRIFT * width + (float(lost[half:quarter].mean()) if drift < 0 else 0.0):
+    lost = np.full(energy.size, np.inf) if whole is None else np.maximum(whole - whole[last:].mean(), 0.0)
+    drift = float(energy[last:].mean() - energy[half:last].mean())
+    if abs(drift) > _DRIFT * width + (float(lost[half:last].mean()) if drift < 0 else 0.0):
         return None
-    below = low - _RESERVE * width - (0.0 if whole is None else lost[:half])
-    outside = np.flatnonzero((energy[:half] < below) | (energy[:half] > high + _RESERVE * width + lost[:half]))
+    below = low - _RESERVE * width - (0.0 if whole is None else lost[:last])
+    outside = np.flatnonzero((energy[:last] < below) | (energy[:last] > high + _RESERVE * width + lost[:last]))
     return int(outside[-1]) + 1 if outside.size else 0
 
 

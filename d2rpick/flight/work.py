@@ -30,6 +30,8 @@ _SLOW: Final = 1e-2
 # Mass so found is a bound already; a table may hold the kinetic energy of the chosen parts only, and a load that works
 # like gravity without moving the model exceeds it by orders of magnitude.
 _MASS_ERROR: Final = 2.0
+# What deviates by less than the tolerance of this share of the range of the internal energy shows no work.
+_OF_INTERNAL: Final = 0.1
 # Momentum changes by half the share of the kinetic energy that is gained or lost along the motion.  A loss of this much
 # of it is told from that by friction.
 _LITTLE, _MUCH = 5e-3, 0.5
@@ -135,6 +137,8 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
         return None
     largest = max(float(np.abs(term).max()) for term in terms)
     extent = min(float(np.ptp(term)) for term in terms)
+    if balance.internal is not None:  # a crash into a fixed wall leaves the sum as it was
+        extent = max(extent, _OF_INTERNAL * float(np.ptp(balance.internal)))
     noise = balance.precision.quantum(largest) / 2
     if noise > _OWN_ERROR * extent:
         return None
@@ -171,10 +175,11 @@ def _terms(balance: Balance) -> list[Samples]:
     found = []
     if balance.external_work is not None:
         found.append(balance.external_work)
+    found = [term for term in found if np.ptp(term) > 0]
     whole = balance.kinetic_and_internal
-    if whole is not None:
+    if whole is not None and balance.internal is not None and (np.ptp(whole) > 0 or np.ptp(balance.internal) > 0):
         found.append(whole)
-    return [term for term in found if np.ptp(term) > 0]
+    return found
 
 
 class _Parabola:

@@ -1,0 +1,152 @@
+"""No flight is claimed where forces act: walls that do no work, loads that fade, friction, supports, other bodies."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.choice.examine import examine
+from d2rpick.choice.flights import find_flights
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.flight.level import moves_as_a_whole, settled_from
+from d2rpick.flight.momentum import bodies_apart, flight_around
+from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Part
+from tests.benchmarks import flights as campaign
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import Samples
+
+PLAIN = Settings(replay=False)
+TIME = np.linspace(0.0, 1.0, 1001)
+PARTS = (Part(1, "body"), Part(2, "other"))
+
+
+def momenta(*columns: Samples, masses: tuple[float, ...] = (10.0, 4.0), axis: int = 2) -> Momenta:
+    """Momenta of parts along one axis."""
+    values = np.zeros((TIME.size, len(columns), 3))
+    values[:, :, axis] = np.stack(columns, axis=1)
+    chosen = tuple(range(len(columns)))
+    return Momenta(TIME, values, PARTS[: len(columns)], EXACT, chosen, masses=np.array(masses[: len(columns)]))
+
+
+def totals(internal: Samples, kinetic: Samples, **terms: Samples) -> History:
+    """A table of energies."""
+    evidence = Given((), Balance(TIME, internal, kinetic, **terms))  # type: ignore[arg-type]
+    return History(TIME, internal, ("totals.csv",), "csv", "E", evidence=evidence)
+
+
+@pytest.mark.parametrize("load", campaign.CLASSES)
+def test_under_random_loads_no_flight_is_claimed_in_which_the_momentum_still_changes(load: str) -> None:
+    random = np.random.default_rng(5)
+    runs = campaign.computed(random, 6, campaign.CLASSES[load](random, 6), falling=load != "friction")
+    counts = [(form, campaign.counted(one, form)) for one in runs for form in campaign.FORMS]
+    assert not [form for form, count in counts if count["wrong"]]
+    assert load in ("friction", "fading") or sum(count["claimed"] for _, count in counts) > 10
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81, 9.81e-3, 386.4])
+@pytest.mark.parametrize("fade", [lambda t: np.exp(-t / 0.04), lambda t: (1 + t / 0.05) ** -5.0])
+def test_the_flight_behind_a_load_that_fades_is_found(gravity: float, fade: np.ufunc) -> None:
+    force = 1e4 * (gravity or 1.0) * fade(TIME)
+    impulse = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2) * np.diff(TIME)])
+    found = flight_around(momenta(impulse - 10.0 * gravity * TIME), 0.9)
+    assert found
+    start = int(np.searchsorted(TIME, found.start))
+    assert impulse[-1] - impulse[start] < 0.01 * np.abs(impulse).max()
+    assert found.start < 0.6
+    assert found.end == 1.0
+
+
+@pytest.mark.parametrize("acceleration", [5.0, 20.0, 0.3])
+def test_a_constant_force_is_gravity_only_if_it_is_as_large(acceleration: float) -> None:
+    push = np.where(TIME < 0.2, 400 * np.sin(np.pi * TIME / 0.2), 0.0).cumsum() / 1000
+    assert flight_around(momenta(push - 10 * acceleration * TIME), 0.6) is None
+    assert flight_around(momenta(push - 10 * 9.81 * TIME), 0.6)
+
+
+def test_what_is_carried_does_not_fly_and_does_not_hide_what_falls() -> None:
+    falling = np.where(TIME < 0.1, -2e3 * TIME, -200 - 40 * 9.81 * (TIME - 0.1))
+    carried = 30 + 20 * np.sin(np.minimum(TIME, 0.3) * 40)
+    both = momenta(carried, falling, masses=(10.0, 40.0))
+    assert flight_around(both.choosing((0,)), 0.6) is None
+    found = flight_around(both.choosing((1,)), 0.6)
+    assert found
+    assert found.gravity == pytest.approx(9.81, rel=1e-3)
+
+
+def test_bodies_that_hit_each_other_fly_each_for_itself() -> None:
+    hit = np.clip((TIME - 0.3) / 0.1, 0, 1)
+    body = momenta(50 - 60 * hit, 60 * hit - 10, axis=0)
+    assert bodies_apart(body, (0, 1)) == (0, 1)
+    found = flight_around(body, 0.7)
+    assert found
+    assert found.start == pytest.approx(0.4, abs=0.01)
+    assert flight_around(body, 0.35) is None
+
+
+def test_a_motion_that_has_ended_is_no_flight() -> None:
+    stopped = np.where(TIME < 0.4, 50 * np.cos(np.pi * TIME / 0.8), 0.0)  # a motion that is prescribed, then none
+    assert flight_around(momenta(stopped), 0.8) is None
+
+
+def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are() -> None:
+    """Springs back from 0.2 to 0.8: kinetic energy comes from the internal one, and both together stay."""
+    pushed = 500 * np.clip((TIME - 0.2) / 0.6, 0, 1) ** 2
+    ringing = 3 * np.sin(300 * TIME) ** 2
+    history = totals(900 - pushed + ringing, 100 + pushed - ringing)
+    for td in (0.4, 0.6):
+        assert not examine(history, td, PLAIN).in_flight
+    flights = find_flights(history, PLAIN)
+    assert [flight for flight in flights if flight.start and flight.start > 0.75]
+    assert not [flight for flight in flights if flight.certain]
+
+
+@pytest.mark.parametrize("kept", [0.0, 40.0])
+def test_a_spring_to_ground_does_not_fly(kept: float) -> None:
+    """All of its kinetic energy is that of the vibration; what flies keeps some where the deformation turns."""
+    internal = 100 * np.sin(60 * TIME) ** 2
+    history = totals(internal, 100 - internal + kept - 10 * np.maximum(0.05 - TIME, 0))
+    balance = history.balance
+    assert balance
+    assert moves_as_a_whole(balance, 0.1, 1.0) is (kept > 0)
+    assert bool(find_flights(history, PLAIN)) is (kept > 0)
+
+
+def test_a_level_is_kept_by_a_vibration_and_by_one_that_damping_takes_but_not_by_a_drift() -> None:
+    ringing = np.sin(200 * TIME) ** 2
+    assert settled_from(TIME, 5 + ringing, 50 + 0 * TIME, 0.0, 1.0) == 0.0
+    lost = np.exp(-4 * TIME)
+    assert settled_from(TIME, 2 * lost * ringing, 50 + 2 * lost, 0.0, 1.0) == 0.0
+    assert settled_from(TIME, 5 + 3 * TIME, 50 + 0 * TIME, 0.0, 1.0) is None
+    assert settled_from(TIME, 5 - 3 * TIME, 50 + 0 * TIME, 0.0, 1.0) is None
+    late = settled_from(TIME, np.where(TIME < 0.4, 2.5 * TIME, 1.0) + 0.01 * ringing, 50 + 0 * TIME, 0.0, 1.0)
+    assert late == pytest.approx(0.4, abs=0.02)
+
+
+def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor() -> None:
+    kinetic = 50 + 20 * TIME + 30 * TIME**2
+    found = suggest(totals(1 + 0.001 * np.sin(300 * TIME) ** 2, kinetic), 0.8, PLAIN)
+    assert found.quality
+    assert found.quality.grade == "poor"
+    assert "by gravity or by another load" in found.quality.told
+
+
+def test_the_landing_is_found_where_the_end_of_the_load_is_given() -> None:
+    ringing = 2 + np.sin(300 * TIME) ** 2
+    history = History(TIME, ringing + 500 * np.maximum(TIME - 0.6, 0), ("run.csv",), "csv", "E")
+    for td in (0.5, 0.8):
+        flight = examine(history, td, Settings(after=0.1, replay=False)).flight
+        assert flight.end == pytest.approx(0.6, abs=0.01)
+    assert suggest(history, 0.8, Settings(after=0.1, replay=False)).recommended is None
+
+
+def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_it_begins() -> None:
+    hit = np.clip((TIME - 0.5) / 0.02, 0, 5)
+    both = momenta(np.where(TIME < 0.1, 10 * np.sin(60 * TIME), 10 * np.sin(6)) - hit**1.5)
+    history = History(TIME, 1 + np.sin(300 * TIME) ** 2, ("made",), "made", "E", evidence=Given((both,)))
+    flight = examine(history, 0.3, Settings(after=0.7, replay=False)).flight
+    assert flight.start is None
+    assert flight.refusal
