@@ -85,6 +85,7 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
         yield Caution("no-free-flight", f"{flight.refusal}{_nearest_flight(situation)}")
     for doubt in flight.doubts:
         yield Caution("flight-sources-disagree", doubt)
+    yield from _of_evidence(situation)
     if flight.source == "energy":
         found = f"the end of the load, {flight.start:.6g}, was found from the energy alone, which is not certain"
         if flight.settled is not None and flight.start is not None and flight.settled < flight.start:
@@ -98,6 +99,21 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
         )
     if td > situation.latest_td:
         yield Caution("td-after-contact", f"td = {td:.6g} lies after {end_of_flight(situation)}")
+
+
+def _of_evidence(situation: Situation) -> Iterator[Caution]:
+    """Say why a flight that more than the energy of the parts shows is not certain, and what would make it so."""
+    flight = situation.flight
+    if flight.start is None or flight.source in ("energy", "given") or flight.certain:
+        return
+    if flight.source == "momentum":
+        found = "the momentum changes at a constant rate in the flight, which was taken for gravity"
+        yield Caution("gravity-assumed", f"{found}; the mass, or kinetic and internal energy, would show whether it is")
+        return
+    found = "nothing but energies shows the flight, and a fixed wall does no work"
+    if flight.unknown_load:
+        found = "nothing but energies shows the flight, in which gravity or another load works"
+    yield Caution("flight-uncertain", f"{found}; momenta of the parts would make it sure")
 
 
 def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:

@@ -65,7 +65,7 @@ class Flight(NamedTuple):
     @property
     def unknown_load(self) -> bool:
         """Whether energies alone show it, while a load acts that may be gravity, or a pull, or friction."""
-        return isnan(self.gravity) and self.source in (*_BY_ENERGIES, "energy")
+        return isnan(self.gravity) and not self.described and self.source in (*_BY_ENERGIES, "energy")
 
     @property
     def certain(self) -> bool:
@@ -74,8 +74,9 @@ class Flight(NamedTuple):
         A fixed rigid wall does no work and has no contact energy: without the momentum, only an oscillator that swings
         on tells a flight from a crash into it.
         """
-        sure = self.source in _SURE or (self.described and self.source in _BY_ENERGIES)
-        return sure and not isnan(self.gravity)
+        if self.source in _BY_ENERGIES:
+            return self.described
+        return self.source in _SURE and not isnan(self.gravity)
 
 
 class Witness(NamedTuple):

@@ -33,6 +33,8 @@ _DAMPED, _LEFT = 0.2, 0.05
 _SHOWN = 0.1
 # So little of the range may still change in a window where nothing but gravity is admitted, although a load fades on.
 _ENOUGH = TOLERANCE
+# There, what acts beside gravity falls to this share from the first third to the last, and to that of the weight.
+_FADED, _LITTLE = 0.6, 0.02
 # A change of momentum that no gravity explains is none up to so many times what a window leaves open.
 _UNSEEN = 2.0
 # What the work of gravity leaves open of the energies: samples are far apart, and a solver adds up by steps.
@@ -92,9 +94,24 @@ class Laws:
                 weight = (time - time[0])[:, np.newaxis] * direction * (self.mass * gravity)
                 self._given[gravity] = Remembered(Constant(time, momentum - weight))
             law = self._given[gravity]
-            found.append((lasting_window(law, td, self.extent, self.noise, fades=True), gravity))
+            window = lasting_window(law, td, self.extent, self.noise, fades=True)
+            if window is None:
+                window = lasting_window(law, td, self.extent, self.noise, fades=True, enough=_ENOUGH)
+                window = window if window and self._fades_out(window, direction * (self.mass * gravity)) else None
+            found.append((window, gravity))
         windows = [(one, gravity) for one, gravity in found if one]
         return max(windows, key=lambda one: float(np.ptp(time[[*one[0]]])), default=(None, None))
+
+    def _fades_out(self, window: tuple[int, int], weight: Samples) -> bool:
+        """Whether what acts in a window beside the ``weight`` (3,) fades, and is little of it at the end."""
+        third = (window[1] - window[0]) // 3
+        at = [window[0], window[0] + third, window[1] - third, window[1]]
+        time, momentum = (
+            self.fit.time[at],
+            self.fit.momentum[at] - (self.fit.time[at] - self.fit.time[0])[:, np.newaxis] * weight,
+        )
+        first, _, last = np.linalg.norm(np.diff(momentum, axis=0), axis=1) / np.diff(time)
+        return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
 
     def _gravity(self, window: tuple[int, int]) -> float | None:
         """Acceleration in a window: 0 where none is seen, None where it is not that of gravity [length/time^2].
