@@ -107,7 +107,7 @@ def test_the_runs_of_a_scan_are_counted_until_it_is_interrupted(quiet: bool) -> 
         os.close(slave)
         told = b""
         if quiet:
-            time.sleep(3)  # others have told something by now
+            time.sleep(2.5)  # others have told something by now
         while not quiet and b" runs" not in told:
             told += os.read(master, 1000)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too

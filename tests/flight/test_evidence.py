@@ -104,7 +104,7 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
 
 
 @pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])
-def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, form: str, tmp_path: Path) -> None:
+def test_td_after_the_contact_is_refused(rolled: Rolled, form: str) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
     file, td = str(rolled.files[form]), rolled.end + 0.02
     result = run("suggest", "--td", str(td), "-f", "json", *part, file)
@@ -112,9 +112,13 @@ def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, form: 
     assert "no free flight at td" in result.stderr
     flight = json.loads(result.stdout)["flight"]
     assert window_as_read(flight["start"], flight["end"]) in result.stderr
-    judged = answer("verify", "--tr", "0.2", "--td", str(td), *part, file)
+
+
+def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, tmp_path: Path) -> None:
+    file, td = str(rolled.files["glstat"]), rolled.end + 0.02
+    judged = answer("verify", "--tr", "0.2", "--td", str(td), file)
     assert (judged["verified"], judged["td_ok"]) == (False, False)
-    rows = answer("study", "--td", str(td), *part, file)["runs"]
+    rows = answer("study", "--td", str(td), file)["runs"]
     assert [row["status"] for row in rows] == ["none"]
     assert "after the end of the flight" in rows[0]["message"]
     deck = tmp_path / "deck.k"
