@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Final, Protocol
 import numpy as np
 
 from d2rpick.errors import FormatError, listing
-from d2rpick.histories.history import Precision, newest_states, with_namesakes
+from d2rpick.histories.history import Precision, with_namesakes
 from d2rpick.histories.names import quantity_of, resolve
+from d2rpick.histories.samples import newest_states
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
