@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache, partial
-from math import isnan, nan
+from math import isinf, isnan, nan
 from typing import TYPE_CHECKING, Final, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -65,7 +65,8 @@ class Flight(NamedTuple):
     @property
     def unknown_load(self) -> bool:
         """Whether energies alone show it, while a load acts that may be gravity, or a pull, or friction."""
-        return isnan(self.gravity) and not self.described and self.source in (*_BY_ENERGIES, "energy")
+        lost = isnan(self.gravity) and not self.described
+        return (lost or isinf(self.gravity)) and self.source in (*_BY_ENERGIES, "energy")
 
     @property
     def certain(self) -> bool:

@@ -37,7 +37,7 @@ class FreeFlight(NamedTuple):
 
     ``end_seen`` is False where the record ends while it still flies.  ``damping`` is alpha, by which the momentum
     decays there [1/time]; ``gravity`` the acceleration that was taken for gravity, 0 where there is none, NaN where
-    nothing but its constancy shows it [length/time^2].
+    nothing but its constancy shows it, infinite where energies grow under a load of unknown size [length/time^2].
     """
 
     start: float

@@ -149,25 +149,29 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
         return None
     first, last = window
     start, end = float(time[first]), float(time[last])
-    unknown = _unexplained(balance, first, last)
-    return FreeFlight(start, end, None, last < time.size - 1, gravity=np.nan if unknown else 0.0)
+    return FreeFlight(start, end, None, last < time.size - 1, gravity=_unexplained(balance, first, last))
 
 
-def _unexplained(balance: Balance, first: int, last: int) -> bool:
-    """Whether energies change in a window as under a constant load, which may be gravity, a pull or friction.
+def _unexplained(balance: Balance, first: int, last: int) -> float:
+    """What stands for gravity in a window: 0 where energies change by nothing or damping alone, else of unknown size.
 
-    What they lose by damping falls off with the kinetic energy, which shows when much of it is gone.
+    NaN where they are lost, by gravity, friction or damping: what damping takes falls off with the kinetic energy,
+    which shows when much of it is gone.  Infinity where they grow, by gravity or another load.
     """
     whole, kinetic = balance.kinetic_and_internal, balance.kinetic
     if whole is None or kinetic is None:
-        return False
+        return 0.0
     states = slice(first, last + 1)
     largest = float(kinetic[states].max())
+    grown = float((whole[states] - np.minimum.accumulate(whole[states])).max())
+    if grown > _LITTLE * largest:
+        return np.inf
     spent = -integral(balance.time[states], kinetic[states])
     rest, _ = _least_squares(whole[states], [np.ones(last - first + 1)], [spent] if spent.any() else [])
     lost = float(whole[first] - whole[last])
     bent = float(np.ptp(rest)) / largest if largest > 0 else 0.0
-    return not (bent <= _LITTLE and lost <= _LITTLE * largest) and not (bent <= _OWN_ERROR and lost >= _MUCH * largest)
+    damped = bent <= _OWN_ERROR and lost >= _MUCH * largest
+    return 0.0 if damped or (bent <= _LITTLE and lost <= _LITTLE * largest) else np.nan
 
 
 def _terms(balance: Balance) -> list[Samples]:
