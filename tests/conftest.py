@@ -13,6 +13,8 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 import pytest
 from hypothesis import settings
 
+from d2rpick.studies.workers import cores
+
 # A busy machine is no finding.
 settings.register_profile("d2rpick", deadline=None)
 settings.load_profile("d2rpick")
@@ -40,6 +42,12 @@ pytest_plugins = ["tests.alone"]
 
 # Looking for garbage as often as Python does by itself takes a tenth of the time of all tests.
 gc.set_threshold(20_000, 20, 50)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Run one process more than there are cores: in many tests it waits for the clock, a child or a browser."""
+    return cores() + 1
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
