@@ -112,7 +112,7 @@ def test_a_body_of_the_deck_that_holds_what_flies_away_is_not_recommended(folder
     assert found["recommended"]["parts"] == list(made_car.BODY)
 
 
-@pytest.mark.parametrize(("periods", "bound"), [(0.4, True), (0.8, True), (2.0, False), (3.0, False)])
+@pytest.mark.parametrize(("periods", "bound"), [(0.8, True), (2.0, False)])
 @pytest.mark.parametrize("deck", [False, True])
 def test_a_slow_swing_makes_the_error_a_lower_bound(tmp_path: Path, periods: float, bound: bool, deck: bool) -> None:
     history = made_car.t01(tmp_path, periods)

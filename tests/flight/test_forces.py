@@ -41,7 +41,7 @@ def totals(internal: Samples, kinetic: Samples, **terms: Samples) -> History:
 @pytest.mark.parametrize("load", campaign.CLASSES)
 def test_under_random_loads_no_flight_is_claimed_in_which_the_momentum_still_changes(load: str) -> None:
     random = np.random.default_rng(5)
-    runs = campaign.computed(random, 6, campaign.CLASSES[load](random, 6), falling=load != "friction")
+    runs = campaign.computed(random, 4, campaign.CLASSES[load](random, 4), falling=load != "friction")
     counts = [(form, campaign.counted(one, form)) for one in runs for form in campaign.FORMS]
     assert not [form for form, count in counts if count["wrong"]]
     assert load in ("friction", "fading") or sum(count["claimed"] for _, count in counts) > 10

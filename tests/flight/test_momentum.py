@@ -119,7 +119,7 @@ def smooth(seed: int, waves: int, digits: int) -> Momenta:
 # Motions made up of pieces.
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     start=st.floats(0.04, 0.16),
     end=st.floats(0.26, 0.36),
@@ -157,7 +157,7 @@ def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchang
     assert found.end_seen
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     td=st.floats(0.1, 0.32),
     frequency=st.floats(20.0, 300.0),
