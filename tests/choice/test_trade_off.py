@@ -101,7 +101,7 @@ def histories(draw: st.DrawFn) -> History:
     return History(time, energy + share * noise, ("made",), "made", "E")
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(histories(), st.floats(0.3, 0.7), st.sampled_from([None, 0.1]))
 def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     history: History, td: float, after: float | None
