@@ -86,6 +86,6 @@ def _momentum(history: History) -> dict[str, Samples]:
         longest = max(flights, key=lambda flight: flight.end - flight.start)
         members = tuple(momenta.parts.index(part) for part in longest.parts or momenta.parts)
     mass = momenta.mass(members)
-    name = "velocity" if mass == 1.0 else "momentum"
+    name = "velocity" if momenta.velocity else "momentum"
     columns = {f"{axis}_{name}": column for axis, column in zip("xyz", momenta.of(members).T.copy(), strict=True)}
-    return columns | ({"mass": np.full(history.time.shape, mass)} if mass > 0 and name == "momentum" else {})
+    return columns | ({"mass": np.full(history.time.shape, mass)} if mass > 0 else {})

@@ -294,8 +294,8 @@ def _keeping_level(history: History, flight: FreeFlight | None) -> FreeFlight | 
     if flight is None:
         return None
     balance, whole, time, energy = history.balance, None, history.time, history.energy
-    if balance and balance.kinetic is not None and balance.internal is not None:
-        whole = np.interp(time, balance.time, balance.kinetic + balance.internal)
+    if balance and balance.kinetic_and_internal is not None and balance.internal is not None:
+        whole = np.interp(time, balance.time, balance.kinetic_and_internal)
         if history.parts is not None:
             energy = np.interp(time, balance.time, balance.internal)
     start = settled_from(time, energy, whole, flight.start, flight.end)

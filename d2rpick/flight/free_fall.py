@@ -50,11 +50,14 @@ class Laws:
     force.  So it is believed only if it is the mass times the gravity of the earth, in whatever units.
     """
 
-    def __init__(self, time: Samples, momentum: Samples, mass: float, noise: float, balance: Balance | None) -> None:
-        self.fit, self.mass, self.noise, self.balance = FreeFall(time, momentum), mass, noise, balance
+    def __init__(
+        self, time: Samples, momentum: Samples, mass: float, noise: float, balance: Balance | None, *, velocity: bool
+    ) -> None:
+        self.fit, self.noise, self.balance, self.velocity = FreeFall(time, momentum), noise, balance, velocity
+        self.mass = 1.0 if velocity else mass
         self.extent = float(np.ptp(momentum, axis=0).max())
         self._falling, self._steady = Remembered(self.fit), Remembered(Constant(time, momentum))
-        self._given: dict[float, Remembered] = {}
+        self._given: dict[tuple[float, ...], Remembered] = {}
 
     def window(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
         """Give the states around ``td`` in free flight, and its gravity [length/time^2]; None where nothing acts."""
@@ -90,14 +93,15 @@ class Laws:
         direction = np.round(slope / size) if np.abs(slope / size).max() > _ALONG_AXIS else slope / size
         found = []
         for gravity in _gravities_near(size):
-            if gravity not in self._given:
-                weight = (time - time[0])[:, np.newaxis] * direction * (self.mass * gravity)
-                self._given[gravity] = Remembered(Constant(time, momentum - weight))
-            law = self._given[gravity]
+            weight, key = direction * (self.mass * gravity), (gravity, *direction.tolist())
+            if key not in self._given:
+                impulse = (time - time[0])[:, np.newaxis] * weight
+                self._given[key] = Remembered(Constant(time, momentum - impulse))
+            law = self._given[key]
             window = lasting_window(law, td, self.extent, self.noise, fades=True)
             if window is None:
                 window = lasting_window(law, td, self.extent, self.noise, fades=True, enough=_ENOUGH)
-                window = window if window and self._fades_out(window, direction * (self.mass * gravity)) else None
+                window = window if window and self._fades_out(window, weight) else None
             found.append((window, gravity))
         windows = [(one, gravity) for one, gravity in found if one]
         return max(windows, key=lambda one: float(np.ptp(time[[*one[0]]])), default=(None, None))
@@ -106,11 +110,9 @@ class Laws:
         """Whether what acts in a window beside the ``weight`` (3,) fades, and is little of it at the end."""
         third = (window[1] - window[0]) // 3
         at = [window[0], window[0] + third, window[1] - third, window[1]]
-        time, momentum = (
-            self.fit.time[at],
-            self.fit.momentum[at] - (self.fit.time[at] - self.fit.time[0])[:, np.newaxis] * weight,
-        )
-        first, _, last = np.linalg.norm(np.diff(momentum, axis=0), axis=1) / np.diff(time)
+        time = self.fit.time[at]
+        beside = np.diff(self.fit.momentum[at], axis=0) / np.diff(time)[:, np.newaxis] - weight
+        first, _, last = np.linalg.norm(beside, axis=1)
         return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
 
     def _gravity(self, window: tuple[int, int]) -> float | None:
@@ -128,10 +130,9 @@ class Laws:
         found = None
         if self.balance is not None:
             found = acceleration_by_work(self.balance, self.fit.time, self.fit.momentum @ (vector / force), start, end)
-        velocity = self.mass == 1.0
         if found is None:
-            return float("nan") if velocity or np.isnan(mass) else None
-        return found if is_gravity(found) or (velocity and found > 0) else None
+            return float("nan") if self.velocity or np.isnan(mass) else None
+        return found if is_gravity(found) or (self.velocity and found > 0) else None
 
     @cached_property
     def fall(self) -> bool:

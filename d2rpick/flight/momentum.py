@@ -147,7 +147,8 @@ def _laws(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = 
     whole = balance if momenta.parts is None or np.isnan(mass) else None
     key = "laws", members, whole is None
     if key not in momenta.known:
-        momenta.known[key] = Laws(momenta.time, momenta.of(members), mass, momenta.noise(members), whole)
+        noise, velocity = momenta.noise(members), momenta.velocity
+        momenta.known[key] = Laws(momenta.time, momenta.of(members), mass, noise, whole, velocity=velocity)
     laws: Laws = momenta.known[key]
     return laws
 

@@ -81,12 +81,12 @@ def terms_of(run: Files) -> Balance | None:
 class Velocity(NamedTuple):
     """Velocity of the centre of mass times a ``mass``, shape (n, 3), and how finely it was printed.
 
-    The mass is 1 of a velocity, NaN of a momentum whose mass is not known.
+    The mass is None of a velocity itself, NaN of a momentum whose mass is not known.
     """
 
     values: Samples
     precision: Precision
-    mass: float
+    mass: float | None
 
 
 def velocity_of(database: Legs) -> Velocity | None:
@@ -102,7 +102,7 @@ def velocity_of(database: Legs) -> Velocity | None:
     if values is None:
         return None
     precision = database.precisions(columns.used)[1]
-    return Velocity(values, precision, columns.mass(values) if columns.momentum else 1.0)
+    return Velocity(values, precision, columns.mass(values) if columns.momentum else None)
 
 
 def _whole(run: Files) -> Legs | None:

@@ -108,8 +108,8 @@ class Momenta:
 
     ``precision`` is that of the printed numbers; ``chosen`` are the indices of the parts to switch, ``flying``
     those of the set that is known to fly together, if it is.  ``masses`` of shape (parts,), NaN where unknown; None
-    where none are, 1 where velocities stand for momenta [mass].  ``known``: what was found of sets of parts: the same
-    few are asked for at many times.
+    where none are [mass].  ``velocity``: velocities stand for the momenta, of a mass that is not known.
+    ``known``: what was found of sets of parts: the same few are asked for at many times.
     """
 
     time: Samples
@@ -119,6 +119,7 @@ class Momenta:
     chosen: tuple[int, ...]
     flying: tuple[int, ...] | None = None
     masses: Samples | None = None
+    velocity: bool = False
     known: dict[Hashable, Any] = field(default_factory=dict, init=False)
 
     def choosing(self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None) -> Momenta:
@@ -142,7 +143,7 @@ class Momenta:
 
     def mass(self, members: Sequence[int]) -> float:
         """Mass of those of the parts with these indices that ever move, NaN where one is unknown [mass]."""
-        if self.masses is None:
+        if self.masses is None or self.velocity:
             return float("nan")
         largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]
         masses = self.masses[list(members)]

@@ -132,8 +132,10 @@ class Run:
         for database in self.databases:
             velocity = velocity_of(database) if database.channels else None
             if velocity:
-                values, mass = velocity.values[:, np.newaxis], np.array([velocity.mass])
-                return Momenta(database.time, values, None, velocity.precision, (0,), masses=mass)
+                values, mass = velocity.values[:, np.newaxis], np.array([velocity.mass or np.nan])
+                return Momenta(
+                    database.time, values, None, velocity.precision, (0,), masses=mass, velocity=velocity.mass is None
+                )
         return None
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
