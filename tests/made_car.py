@@ -24,7 +24,7 @@ TITLES: Final = {**dict.fromkeys(BODY, "panel"), 6: "engine", 7: "hubs", 8: "tyr
 MASSES: Final = np.array([70.0, 80.0, 90.0, 75.0, 85.0, 200.0, 30.0, 10.0, 10.0])
 ENGINE: Final = BODY.index(6)
 LANDS, WHEELS_LAND = 0.15, 0.06
-TIME: Final = np.arange(2001) * 1e-4
+TIME: Final = np.arange(801) * 2.5e-4
 _CODES: Final = (1, 2, 3, 4, 5, 6)  # energies, momentum, mass
 
 

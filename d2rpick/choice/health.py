@@ -152,11 +152,8 @@ def _of_hourglass(health: Health, up_to: str) -> Iterator[Caution]:
         share = f"{health.hourglass_share:.0%}"
         yield Caution("hourglass", f"hourglass energy reaches {share} of the internal energy{up_to}: {rest}")
     if health.part and _above(health.part_hourglass_share, MOST_HOURGLASS):
-        who = health.part.title or f"part {health.part.id}"
-        share = f"{health.part_hourglass_share:.0%}"
-        yield Caution(
-            "part-hourglass", f"hourglass energy of {who} reaches {share} of its internal energy{up_to}: {rest}"
-        )
+        found = f"hourglass energy of {health.part.name} reaches {health.part_hourglass_share:.0%}"
+        yield Caution("part-hourglass", f"{found} of its internal energy{up_to}: {rest}")
 
 
 def _of_window(health: Health) -> Iterator[Caution]:

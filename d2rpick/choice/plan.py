@@ -80,9 +80,7 @@ class Planned:
     @property
     def candidate(self) -> Candidate | None:
         """The recommended tr with its measures."""
-        if self.answer is None or self.window is None:
-            return None
-        return next((one for one in self.answer.candidates if one.recommended), None)
+        return self.answer.chosen if self.answer and self.window else None
 
     @property
     def quality(self) -> Quality | None:
