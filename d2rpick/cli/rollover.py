@@ -30,8 +30,8 @@ EXAMPLES = """\b
 Examples:
   d2rpick rollover --t-end 0.05 -o rollover.matsum
   d2rpick rollover --mesh 8 --tr 0.09 --td 0.37 -o switched.csv --plot switched.png
-  d2rpick rollover --scan --mesh 4 --plot scan.png
-  d2rpick rollover --drop 0.4 --tilt 30 --mesh 6 --tr 0 --td 0.27 --tr 0.4 --td 0.5 -o tumbling.matsum
+  d2rpick rollover --scan --mesh 4 --td 0.15 --t-end 0.16 --plot scan.png
+  d2rpick rollover --drop 0.4 --tilt 30 --mesh 4 --tr 0 --td 0.27 --tr 0.4 --td 0.5 -o tumbling.matsum
 """
 
 
