@@ -29,8 +29,10 @@ RUN: Final = 84  # bytes of the first record: a code and a title of 80
 
 _MARK: Final = b"ZZZZZEOR"
 _BEGIN: Final = re.compile(rb"([^\r\n]* FORMAT)(\r?\n)ZZZZZEOR    1I   72C\r?\n")
-_SHAPE: Final = re.compile(rb"ZZZZZEOR(?: *(\d+)I)?(?: *(\d+)C)?(?: *(\d+)([IR]))?")
+_SHAPE: Final = re.compile(rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?")
 _LONG, _SHORT = 10, 5  # columns of integers
+_STARS: Final = b"*" * _SHORT  # what Fortran shows of a number that is too long
+_ROOM: Final = 1024  # more than a record of the head has but for integers [byte]
 _RUN_TITLE: Final = 72  # characters of the title of the run, of the 80 of the binary form
 _REAL: Final = 16  # columns of a real, and its point is the fourth
 _DECIMALS: Final = 8
@@ -50,7 +52,7 @@ def is_text(head: bytes) -> bool:
 
 def records_of(data: Content, source: str) -> Records:
     """Records of a file; FormatError where it is text of another form, as ``/TFILE/2`` writes it."""
-    head = data[:1024]
+    head = data[:_ROOM]
     begin = _BEGIN.match(head)
     if begin:
         return _TextRecords(data, begin[1], begin[2])
@@ -107,25 +109,28 @@ class _TextRecords(Records):
     width = _REAL
 
     def __init__(self, data: Content, name: bytes, line_end: bytes) -> None:
-        self._name, self._line_end = name + line_end, line_end
+        self._name, self._line_end = line_end + name, line_end
         super().__init__(data, len(self._name))
 
     def take(self) -> bytes | None:
-        begin = self._data.find(self._line_end, self.at) + len(self._line_end)
-        shape = _SHAPE.fullmatch(self._data[self.at : begin - len(self._line_end)])
-        behind = self._data.find(self._line_end + _MARK, begin)  # a title may hold line ends
-        end = behind + len(self._line_end) if behind >= 0 else len(self._data)
-        body = self._data[begin:end].removesuffix(self._name)  # which stands between the first two records
-        if shape is None or not body.endswith(self._line_end):
+        line, _, _ = self._data[self.at : self.at + _ROOM].partition(self._line_end)
+        shape = _SHAPE.fullmatch(line)
+        if shape is None:
             return None
-        self.at = end
-        return self._packed(shape, body.removesuffix(self._line_end))
-
-    def _packed(self, shape: re.Match[bytes], body: bytes) -> bytes | None:
-        """Make one record what it is in binary; None where it does not hold what its shape says."""
         first, characters, last = (int(count or 0) for count in shape.group(1, 2, 3))
+        begin = self.at + len(line) + len(self._line_end)
+        room = self._data[begin : begin + _ROOM + (_LONG + 1) * first]
+        body, mark, _ = room.partition(self._line_end + _MARK)  # a title may hold line ends
+        if not mark and not body.endswith(self._line_end):
+            return None
+        body = body.removesuffix(b"" if mark else self._line_end)
+        self.at = begin + len(body) + len(self._line_end)
         if shape[4] == b"R":  # factors of the units, which are not used
             return bytes(WIDTH * last)
+        return self._packed(body.removesuffix(self._name), first, characters, last)
+
+    def _packed(self, body: bytes, first: int, characters: int, last: int) -> bytes | None:
+        """Make one record what it is in binary; None where it does not hold what its shape says."""
         if not characters:
             body = body.replace(self._line_end, b"")
         is_run = characters == _RUN_TITLE
@@ -148,8 +153,7 @@ class _TextRecords(Records):
         return [(0, self._mark(count))]
 
     def _mark(self, count: int) -> bytes:
-        shown = b"%5d" % count if count < 10**_SHORT else b"*" * _SHORT  # as Fortran shows what is too long
-        return _MARK + shown + b"R" + self._line_end
+        return _MARK + (b"%5d" % count if count < 10**_SHORT else _STARS) + b"R" + self._line_end
 
     def values(self, fields: Bytes) -> Samples:
         values = decode(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
@@ -172,8 +176,8 @@ def integers(record: bytes) -> tuple[int, ...]:
 
 
 def _binary(text: bytes, count: int, width: int) -> bytes:
-    """Pack integers of so many columns; what Fortran shows as stars is the number of something, and never 0."""
-    fields = [text[at : at + width] for at in range(0, len(text), width)]
+    """Pack integers of so many columns; a material or property that shows as stars is one, and not 0."""
     if len(text) != count * width:
-        raise ValueError(text)
-    return struct.pack(f">{count}i", *(1 if field == b"*" * width else int(field) for field in fields))
+        raise ValueError
+    fields = (text[at : at + width] for at in range(0, len(text), width))
+    return struct.pack(f">{count}i", *(1 if field == _STARS else int(field) for field in fields))

@@ -18,7 +18,7 @@ from d2rpick.histories.opening import Selection, open_run
 from tests.faults import cases, some
 from tests.histories.formats.test_faults_binary import bounded_memory, t01_value, true_columns
 from tests.made_t01 import MadePart, T01TextWriter, real, t01, value
-from tests.reading import run_of
+from tests.reading import run_of, run_on_disk
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -108,6 +108,39 @@ def test_a_packed_text_is_read_like_one_on_a_disk(tmp_path: Path) -> None:
     read = [open_run([str(file)]).history(Selection(parts=("7",))) for file in (plain, packed)]
     assert [history.format for history in read] == ["radioss-th"] * 2
     assert read[0].energy.tolist() == read[1].energy.tolist() == [printed(value(s, 7, 1)) for s in range(STATES)]
+
+
+def test_what_a_running_solver_appends_to_a_file_on_its_disk_does_not_count(tmp_path: Path) -> None:
+    file = tmp_path / "runT01"
+    file.write_bytes(DATA[:-10])
+    run = run_on_disk(file)
+    with file.open("ab") as end:
+        end.write(DATA[-10:])
+    history = run.history(Selection(parts=("7",)))
+    assert history.energy.tolist() == [printed(value(s, 7, 1)) for s in range(STATES - 1)]
+    assert not history.complete
+    assert "the file ends within state 3, which was left out" in history.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("line", "damaged"),
+    [
+        (b"ZZZZZEOR    6I", b"ZZZZZEOR" + b"9" * 5000 + b"I"),
+        (b"ZZZZZEOR    6I", b"ZZZZZEOR99999I"),
+        (b"ZZZZZEOR    6I", b"ZZZZZEOR    6C"),
+        (b"         7part 7", b"**********part 7"),
+        (b"         7part 7", b"9999999999part 7"),
+        (b"         7part 7", b"       1 7part 7"),
+    ],
+)
+def test_a_head_that_does_not_hold_what_it_says_is_refused(line: bytes, damaged: bytes) -> None:
+    with pytest.raises(FormatError, match="was expected in the head of the time history near byte"):
+        TimeHistory(DATA.replace(line, damaged), "runT01")
+
+
+def test_control_bytes_in_titles_are_blanks() -> None:
+    run = TimeHistory(DATA.replace(b"part 7", b"p\nrt\x007"), "runT01")
+    assert [part.title for part in run.parts] == ["p rt 7", "part 3"]
 
 
 CODED = "runT01\n00000318a title\nWed Apr 10 13:20:15 2024 RADIOSS Open\n0000000A0000000MZZZZZEOR\n"
