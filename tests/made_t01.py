@@ -1,4 +1,4 @@
-"""Writes Radioss time histories for tests: any number of globals, parts with variables, subsets, groups."""
+"""Writes Radioss time histories for tests, binary or text: any number of globals, parts with variables, groups."""
 
 from __future__ import annotations
 
@@ -23,9 +23,15 @@ class T01Writer:
         self.marks.append(len(self.data))
         self.data += struct.pack(">i", len(body)) + body + struct.pack(">i", len(body))
 
+    def titled(self, first: Sequence[int], title: str, last: Sequence[int] = ()) -> None:
+        self.record(np.array(first, ">i4").tobytes() + title.encode() + np.array(last, ">i4").tobytes())
+
     def integers(self, *numbers: int) -> None:
         if numbers:
             self.record(np.array(numbers, ">i4").tobytes())
+
+    def setting(self, number: int) -> None:
+        self.integers(number)
 
     def reals(self, numbers: Sequence[float]) -> None:
         if numbers:
@@ -39,12 +45,61 @@ class T01Writer:
         self.reals([0.0] * 18)
 
 
+@dataclass
+class T01TextWriter(T01Writer):
+    """The same as text, with the columns of ``/TFILE/3``; ``marks`` are where the lines with the shapes begin."""
+
+    line_end: bytes = b"\n"
+
+    def line(self, text: str) -> None:
+        self.data += text.encode() + self.line_end
+
+    def titled(self, first: Sequence[int], title: str, last: Sequence[int] = ()) -> None:
+        is_run = not last and len(self.marks) < 2  # then the name of the file stands before it
+        if is_run:
+            self.line("runT01 FORMAT")
+            title = title[:72] if first else title
+        self.marks.append(len(self.data))
+        said = 40 if last else len(title)  # of a part the solver says 40, whatever there is
+        count = [f"{len(first):5d}I"] * bool(first) + [f"{said:5d}C"] + [f"{len(last):5d}I"] * bool(last)
+        self.line("ZZZZZEOR" + "".join(count))
+        width = 5 if is_run else 10
+        self.line("".join(f"{n:{width}d}" for n in first) + title + "".join(_five(n) for n in last))
+
+    def integers(self, *numbers: int) -> None:
+        self._numbers("I", [f"{n:10d}" for n in numbers], 16)
+
+    def setting(self, number: int) -> None:
+        self._numbers("I", [f"{number:5d}"], 1)
+
+    def reals(self, numbers: Sequence[float]) -> None:
+        self._numbers("R", [real(number) for number in numbers], 5)
+
+    def _numbers(self, kind: str, fields: Sequence[str], per_line: int) -> None:
+        if fields:
+            self.marks.append(len(self.data))
+            self.line(f"ZZZZZEOR{_five(len(fields))}{kind}")
+            for begin in range(0, len(fields), per_line):
+                self.line("".join(fields[begin : begin + per_line]))
+
+
+def _five(number: int) -> str:
+    return f"{number:5d}" if number < 10**5 else "*****"
+
+
+def real(number: float) -> str:
+    """1PE15.8 behind a blank; Fortran leaves out the E of an exponent of three digits."""
+    mantissa, _, exponent = f"{number:.8E}".partition("E")
+    return f"{mantissa + exponent if len(exponent) > 3 else f'{number:.8E}':>16}"
+
+
 @dataclass(frozen=True)
 class MadePart:
     id: int
     title: str
     codes: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7, 28)
     is_group: bool = False
+    material: int = 1
 
 
 def value(state: int, part: int, code: int) -> float:
@@ -61,8 +116,9 @@ def t01(
     title: int = 40,
     subset_variables: int = 2,
     start: int = 0,
+    made: T01Writer | None = None,
 ) -> T01Writer:
-    made = headed(parts, globals_=globals_, code=code, title=title, subset_variables=subset_variables)
+    made = headed(parts, globals_=globals_, code=code, title=title, subset_variables=subset_variables, made=made)
     for state in range(start, start + states):
         globals_of = [value(state, 0, code) for code in range(1, globals_ + 1)]
         of_parts = [value(state, part.id, code) for part in parts for code in part.codes]
@@ -71,29 +127,35 @@ def t01(
 
 
 def headed(
-    parts: Sequence[MadePart], *, globals_: int, code: int = 3040, title: int = 40, subset_variables: int = 2
+    parts: Sequence[MadePart],
+    *,
+    globals_: int,
+    code: int = 3040,
+    title: int = 40,
+    subset_variables: int = 2,
+    made: T01Writer | None = None,
 ) -> T01Writer:
-    """Write what stands before the states."""
-    made = T01Writer()
-    made.record(struct.pack(">i", code) + b"made for tests".ljust(80))
-    made.record(b"Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss,       linuxa64 gf".ljust(80))
+    """Write what stands before the states, into ``made`` where it is given: a text."""
+    made = T01Writer() if made is None else made
+    made.titled([code], "made for tests".ljust(80))
+    made.titled([], "Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss,       linuxa64 gf".ljust(80))
     if code >= 3050:
-        made.integers(2)
-        made.integers(title)
-        made.record(np.array([1, 1, 1], ">f4").tobytes())
+        made.setting(2)
+        made.setting(title)
+        made.reals([1, 1, 1])
     made.integers(len(parts), 2, 1, 1, 1, globals_)
     made.integers(*range(1, globals_ + 1))
     for part in parts:
-        numbers = (0, 0 if part.is_group else 1, 0 if part.is_group else 2, len(part.codes))
-        made.record(struct.pack(">i", part.id) + part.title.encode().ljust(title) + struct.pack(">4i", *numbers))
+        numbers = (0, 0 if part.is_group else part.material, 0 if part.is_group else 2, len(part.codes))
+        made.titled([part.id], part.title.ljust(title), numbers)
         made.integers(*part.codes)
     for number in (1, 2, 3):
-        made.record(struct.pack(">i", number) + b"steel".ljust(title))
-    made.record(struct.pack(">5i", 0, 0, 0, len(parts), subset_variables) + b"GLOBAL MODEL".ljust(title))
+        made.titled([number], "steel".ljust(title))
+    made.titled([0, 0, 0, len(parts), subset_variables], "GLOBAL MODEL".ljust(title))
     made.integers(*(part.id for part in parts))
     made.integers(*range(1, subset_variables + 1))
-    made.record(struct.pack(">5i", 1, 0, 0, 3, 6) + b"nodes".ljust(title))
+    made.titled([1, 0, 0, 3, 6], "nodes".ljust(title))
     for node in (5, 6, 7):
-        made.record(struct.pack(">i", node) + b"corner".ljust(title))
+        made.titled([node], "corner".ljust(title))
     made.integers(*range(1, 7))
     return made

@@ -52,7 +52,7 @@ class Listed(NamedTuple):
 # holds more digits; csv takes any text, so it comes last.
 READERS: Final[Mapping[str, Listed]] = {
     "binout": Listed("binout", (b"\0",)),
-    "radioss-th": Listed("radioss_th", (b"\0",)),
+    "radioss-th": Listed("radioss_th", (b"\0", b"ZZZZZEOR")),
     "glstat": Listed("glstat", (b" time.", b"ls-dyna")),
     "matsum": Listed("matsum", (b" time =", b"{BEGIN LEGEND}")),
     "hdf5": Listed("hdf5_file", (b"\x89HDF",)),

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.opening import Selection
+from d2rpick.histories.opening import Selection, open_run
 from tests.reading import read_history
 from tests.real.files import real
 
@@ -274,12 +274,23 @@ MORE = {
     "FV_crashworthiness__F28_validation-plot-data.csv": r":14: time steps back from 12\.011 to 0\.967",
     "FV_crashworthiness__ovalization_study-e=030-AT3_Floor.csv": ":303: a second header, another curve begins here",
     "Masters-Project__Steel_Implicit-Energy_Ratio.head6": "'Energy Ratio', by its name not an internal energy",
-    "luchete80__radioss_tutorials-test-testT01.ascii": "a time history of Radioss as text",
 }
 PAIRS = {
     "UMAT_2scale_LSDYNA__curve.txt": (300, (0.0, 4e7), (4.2000001606841885e-06, 42607482.295758456)),
     "UMAT_2scale_LSDYNA__stress_x_av.csv": (24, (0.0, 922.56408691), (0.50034189224, 667.45178223)),
 }
+
+
+def test_a_time_history_as_text_is_read() -> None:
+    """One state, whose second line of numbers begins with the mass, as the file shows."""
+    file = real("more-histories/luchete80__radioss_tutorials-test-testT01.ascii")
+    history = read_history([file])
+    assert (history.format, history.channel, history.time.tolist()) == ("radioss-th", "internal_energy", [0.0])
+    run = open_run([file])
+    assert run.databases[0].channel("mass").tolist() == [0.500980584]
+    assert run.databases[0].channel("contact_energy").tolist() == [381.780503]
+    assert run.databases[0].complete
+    assert "no variables of parts 1, 2, 4, 5" in history.notes[0]
 
 
 @pytest.mark.parametrize("file", MORE)

@@ -12,7 +12,7 @@ values are there and the last of them is not used, or is certainly whole (`print
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.selection import Selection
     from d2rpick.histories.source import Source
 
-_RADIOSS: Final = "ZZZZZEOR"  # stands before each record
-
 
 def recognises(head: bytes) -> bool:
     """Whether this is text: what it says is seen when it is read."""
@@ -43,16 +41,7 @@ def recognises(head: bytes) -> bool:
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | Curves]:
     """Open tables; the selection tells their time column, and which values must be whole in a last line."""
-    return [_opened(Text(source), selection) for source in sources]
-
-
-def _opened(text: Text, selection: Selection) -> Table | Curves:
-    if any(line.startswith(_RADIOSS) for line in text.head[:2]):
-        raise FormatError(
-            f"{text.name}: a time history of Radioss as text, which is not read; let the run write it in binary, or "
-            "export its energies as CSV"
-        )
-    return find_curves(text, selection) or Table(text, selection)
+    return [find_curves(text, selection) or Table(text, selection) for text in map(Text, sources)]
 
 
 class Table:

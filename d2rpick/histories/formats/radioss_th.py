@@ -1,38 +1,36 @@
-"""Radioss and OpenRadioss time histories, T01, T02, ... (one per leg of a run): big-endian Fortran records.
+"""Radioss and OpenRadioss time histories, T01, T02, ... (one per leg of a run), binary or text.
 
-A record is its length, its bytes and its length again.  The head names the run, then says how many parts,
-materials, properties, subsets, groups and global variables there are and describes each; every state after
-it is a record with the time and one for the global variables, the parts, the subsets and each group, if there
-are any.  All states have the same lengths, so a column is a strided view of the file.
+The head names the run, then says how many parts, materials, properties, subsets, groups and global variables there
+are and describes each; every state after it is a record with the time and one for the global variables, the parts, the
+subsets and each group, if there are any.  All states have the same lengths, so a column is a strided view of the file.
+How a record lies in the file is said in `radioss_records`.
 """
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from itertools import accumulate
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.errors import FormatError, listing
 from d2rpick.histories.content import Content, content_of
-from d2rpick.histories.database import DIGITS, SolverFile
+from d2rpick.histories.database import SolverFile
+from d2rpick.histories.formats.radioss_records import INT, RUN, WIDTH, integers, is_binary, is_text, records_of
 from d2rpick.histories.history import Part
 from d2rpick.histories.names import plain_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from d2rpick.histories.content import Addresses
+    from d2rpick.histories.formats.radioss_records import Records
     from d2rpick.histories.history import Samples
     from d2rpick.histories.selection import Selection
     from d2rpick.histories.source import Source
 
-_INT: Final = struct.Struct(">i")
-_WIDTH: Final = 4  # bytes of a number, and of the length before and behind a record
-_RUN: Final = 84  # bytes of the first record: a code and a title of 80
 _TITLES: Final = (40, 80, 100)  # bytes of the other titles, by age of the format
 
 # Global variables by their number in the file: 12 up to 2024, 16 in 2025, 22 from 2026 on.
@@ -60,8 +58,7 @@ class _Head:
     globals: tuple[str, ...]
     parts: tuple[Part, ...]
     columns: dict[tuple[int, str], int]  # number of a part's variable among those of all parts
-    lengths: tuple[int, ...]  # of the records of one state
-    size: int
+    counts: tuple[int, ...]  # of numbers in the records of one state
 
 
 def recognises(head: bytes) -> bool:
@@ -72,7 +69,7 @@ def recognises(head: bytes) -> bool:
     >>> recognises(bytes([0, 0, 0, 84, 0, 0, 11, 224]) + b"a title"), recognises(b"time,internal energy")
     (True, False)
     """
-    return len(head) >= 8 and _INT.unpack_from(head)[0] == _RUN and 3000 <= _INT.unpack_from(head, 4)[0] < 6000
+    return is_binary(head) or is_text(head)
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
@@ -93,16 +90,17 @@ class TimeHistory(SolverFile):
     Raises
     ------
     FormatError
-        If the head is not whole, or a record is not as long as the head says.
+        If the head is not whole, a record is not as long as the head says, or it is coded text.
     """
 
     format = "radioss-th"
-    digits = DIGITS[_WIDTH]
 
     def __init__(self, content: bytes | Content, source: str) -> None:
         self._data = content_of(content)
         self.source = source
-        self._head = _Records(self._data, source).head()
+        self._records = records_of(self._data, source)
+        self._head = _HeadRecords(self._records, len(self._data), source).head()
+        *self._begins, self._stride = accumulate(map(self._records.size, self._head.counts), initial=0)
         self._states, stop = self._whole_states()
         self.complete = not stop
         self.notes = (*stop, *self._silent_parts())
@@ -127,6 +125,11 @@ class TimeHistory(SolverFile):
         """Parts with variables of their own (card /TH/PART)."""
         known = {id_ for id_, _ in self._head.columns}
         return tuple(part for part in self._head.parts if part.id in known)
+
+    @cached_property
+    def digits(self) -> int:  # type: ignore[override]
+        """Significant decimal digits of all numbers."""
+        return self._records.digits(self.time)
 
     @cached_property
     def time(self) -> Samples:
@@ -166,41 +169,41 @@ class TimeHistory(SolverFile):
 
     def _columns(self, record: int, places: Sequence[int]) -> Samples:
         """Some numbers of one record of each state, shape (n, places)."""
-        before = sum(length + 2 * _WIDTH for length in self._head.lengths[:record]) + _WIDTH
-        found = self._numbers(">f4", [before + _WIDTH * place for place in places], self._states)
-        with np.errstate(invalid="ignore"):  # a NaN of any kind is refused, or not used
-            return found.astype(np.float64)
-
-    def _numbers(self, dtype: str, offsets: Sequence[int], states: int) -> NDArray[Any]:
-        """Numbers at some bytes of each of the first states, shape (states, offsets)."""
-        stride = sum(length + 2 * _WIDTH for length in self._head.lengths)
-        starts = self._head.size + stride * np.arange(states)
-        addresses = np.add.outer(starts, np.array(offsets, np.int64))
-        found = self._data.fields(addresses.ravel(), _WIDTH)
+        offsets = [self._begins[record] + self._records.place(place) for place in places]
+        addresses = self._addresses(self._states, offsets)
+        found = self._data.fields(addresses, self._records.width)
         self._data.check()
-        return found.view(dtype).reshape(addresses.shape)
+        return self._records.values(found).reshape(self._states, len(places))
+
+    def _addresses(self, states: int, offsets: Sequence[int]) -> Addresses:
+        """Where some bytes of each of the first states lie, shape (states * offsets,)."""
+        return np.add.outer(self._records.at + self._stride * np.arange(states), np.array(offsets, np.int64)).ravel()
 
     def _whole_states(self) -> tuple[int, tuple[str, ...]]:
         """Count the states; the file may stop inside one, but nothing else may stand between them.
 
         Records carry no name or number: where one is lost or put in, no state of the file is above suspicion.
         """
-        lengths = np.array(self._head.lengths)
-        ends = np.cumsum(lengths + 2 * _WIDTH)
-        stride = int(ends[-1])
-        states, rest = divmod(len(self._data) - self._head.size, stride)
-        marks = np.stack([ends - lengths - 2 * _WIDTH, ends - _WIDTH], axis=1).ravel()
-        places = np.add.outer(self._head.size + stride * np.arange(states + 1), marks).ravel()
-        places = places[places + _WIDTH <= len(self._data)]
-        found = self._data.fields(places, _WIDTH).view(">i4").ravel()
+        states, rest = divmod(len(self._data) - self._records.at, self._stride)
+        marks = [
+            (begin, begin + place, count, mark)
+            for begin, count in zip(self._begins, self._head.counts, strict=True)
+            for place, mark in self._records.marks(count)
+        ]
+        width = len(marks[0][-1])
+        expected = np.frombuffer(b"".join(mark for *_, mark in marks), f"V{width}")
+        places = self._addresses(states + 1, [place for _, place, *_ in marks])
+        places = places[places + width <= len(self._data)]
+        found = self._data.fields(places, width).view(expected.dtype).ravel()
         self._data.check()
-        bad = np.flatnonzero(found != np.resize(np.repeat(lengths, 2), found.size))
+        bad = np.flatnonzero(found != np.resize(expected, found.size))
         if bad.size:
-            state, mark = divmod(int(bad[0]), marks.size)
-            begin = self._head.size + state * stride
-            where = f"{self.source}: state {state + 1}: a record of {lengths[mark // 2]} bytes was expected"
-            cure = f"if the states before are good, cut the file to {begin} bytes"
-            raise FormatError(f"{where} at byte {begin + marks[2 * (mark // 2)]}; {cure}")
+            state, mark = divmod(int(bad[0]), len(marks))
+            begin, _, count, _ = marks[mark]
+            start = self._records.at + state * self._stride
+            where = f"{self.source}: state {state + 1}: a record of {count} numbers was expected"
+            cure = f"if the states before are good, cut the file to {start} bytes"
+            raise FormatError(f"{where} at byte {start + begin}; {cure}")
         stop = f"{self.source}: the file ends within state {states + 1}, which was left out"
         return states, (stop,) if rest else ()
 
@@ -212,27 +215,27 @@ class TimeHistory(SolverFile):
         return (f"{self.source}: no variables of {which} in the file (card /TH/PART)",)
 
 
-class _Records:
+class _HeadRecords:
     """The records of the head, taken one after the other."""
 
-    def __init__(self, data: Content, source: str) -> None:
-        self._data = data
+    def __init__(self, records: Records, file_size: int, source: str) -> None:
+        self._records = records
+        self._most = file_size
         self._source = source
-        self._at = 0
         self._title = 0  # bytes of a title, the same in all records; 0 until the first was seen
 
     def head(self) -> _Head:
         """Read everything up to the first state."""
-        run = self._next(_RUN)
+        run = self._next(RUN)
         version = plain_text(self._next(80))
         hierarchy = self._next()
-        if len(hierarchy) == _WIDTH:  # newer codes put records between, as many as this one says
-            for _ in range(self._count(_INT.unpack(hierarchy)[0])):
+        if len(hierarchy) == WIDTH:  # newer codes put records between, as many as this one says
+            for _ in range(self._count(INT.unpack(hierarchy)[0])):
                 self._next()
             hierarchy = self._next()
-        if len(hierarchy) != 6 * _WIDTH:
+        if len(hierarchy) != 6 * WIDTH:
             raise self._broken("a record of 6 counts")
-        parts, materials, properties, subsets, groups, variables = (self._count(n) for n in _integers(hierarchy))
+        parts, materials, properties, subsets, groups, variables = (self._count(n) for n in integers(hierarchy))
         if self._integers(variables) != tuple(range(1, variables + 1)):
             raise self._broken("a numbering of the global variables")
         described, columns, part_values = self._parts(parts)
@@ -241,13 +244,12 @@ class _Records:
         subset_values = sum(self._subset() for _ in range(subsets))
         values = [1, variables, part_values, subset_values, *(self._group() for _ in range(groups))]
         return _Head(
-            title=plain_text(run[_WIDTH:]),
+            title=plain_text(run[WIDTH:]),
             version=" ".join(version.split()),
             globals=(*_GLOBALS[:variables], *(f"global_{n + 1}" for n in range(len(_GLOBALS), variables))),
             parts=described,
             columns=columns,
-            lengths=tuple(_WIDTH * count for count in values if count),
-            size=self._at,
+            counts=tuple(count for count in values if count),
         )
 
     def _parts(self, count: int) -> tuple[tuple[Part, ...], dict[tuple[int, str], int], int]:
@@ -257,15 +259,15 @@ class _Records:
         values = 0
         for _ in range(count):
             record = self._titled(5)
-            id_ = _INT.unpack_from(record)[0]
-            material, properties, variables = _integers(record[-3 * _WIDTH :])
+            id_ = INT.unpack_from(record)[0]
+            material, properties, variables = integers(record[-3 * WIDTH :])
             codes = self._integers(self._count(variables))
             # A group of elements with a history is listed like a part, but without material and property.
             if material or properties:
                 known_codes = [code for code in codes if code]  # a solver may write 0 for every variable
                 if id_ in described or len(set(known_codes)) < len(known_codes):
                     raise self._broken("a part, and a variable of it, only once")
-                described[id_] = Part(id_, plain_text(record[_WIDTH : -4 * _WIDTH]))
+                described[id_] = Part(id_, plain_text(record[WIDTH : -4 * WIDTH]))
                 known = ((_PART_VARIABLES.get(code), place) for place, code in enumerate(codes, start=values))
                 columns.update({(id_, name): place for name, place in known if name})
             values += variables
@@ -273,14 +275,14 @@ class _Records:
 
     def _subset(self) -> int:
         """Pass over a subset and its lists of children, parts and variables; the number of variables."""
-        children, parts, variables = (self._count(n) for n in _integers(self._titled(5)[2 * _WIDTH : 5 * _WIDTH]))
+        children, parts, variables = (self._count(n) for n in integers(self._titled(5)[2 * WIDTH : 5 * WIDTH]))
         for count in (children, parts, variables):
             self._integers(count)
         return variables
 
     def _group(self) -> int:
         """Pass over a group, its elements and its list of variables; the number of values per state."""
-        elements, variables = (self._count(n) for n in _integers(self._titled(5)[3 * _WIDTH : 5 * _WIDTH]))
+        elements, variables = (self._count(n) for n in integers(self._titled(5)[3 * WIDTH : 5 * WIDTH]))
         for _ in range(elements):
             self._titled(1)
         self._integers(variables)
@@ -288,40 +290,33 @@ class _Records:
 
     def _titled(self, numbers: int) -> bytes:
         """Read a record of a title and so many integers."""
-        record = self._next(_WIDTH * numbers + self._title if self._title else None)
-        self._title = len(record) - _WIDTH * numbers
+        record = self._next(WIDTH * numbers + self._title if self._title else None)
+        self._title = len(record) - WIDTH * numbers
         if self._title not in _TITLES:
             raise self._broken("a title")
         return record
 
     def _integers(self, count: int) -> tuple[int, ...]:
         """Read a record of so many integers; there is none for 0."""
-        return _integers(self._next(_WIDTH * count)) if count else ()
+        return integers(self._next(WIDTH * count)) if count else ()
 
     def _count(self, number: int) -> int:
         """Check a count from the file against what the file could hold."""
-        if not 0 <= number <= len(self._data):
+        if not 0 <= number <= self._most:
             raise self._broken("a count")
         return number
 
     def _next(self, length: int | None = None) -> bytes:
         """Take one record, of a known length if it is given."""
-        begin = self._at + _WIDTH
-        found = _INT.unpack(self._data[self._at : begin])[0] if begin <= len(self._data) else -1
-        end = begin + found
-        if found < 0 or end + _WIDTH > len(self._data) or _INT.unpack(self._data[end : end + _WIDTH])[0] != found:
+        record = self._records.take()
+        if record is None:
             raise self._broken("a complete record")
-        if length is not None and found != length:
+        if length is not None and len(record) != length:
             raise self._broken(f"a record of {length} bytes")
-        self._at = end + _WIDTH
-        return self._data[begin:end]
+        return record
 
     def _broken(self, expected: str) -> FormatError:
         return FormatError(
-            f"{self._source}: {expected} was expected in the head of the time history near byte {self._at}; "
+            f"{self._source}: {expected} was expected in the head of the time history near byte {self._records.at}; "
             "the file is cut or damaged, copy it again"
         )
-
-
-def _integers(record: bytes) -> tuple[int, ...]:
-    return tuple(number for (number,) in _INT.iter_unpack(record[: len(record) // _WIDTH * _WIDTH]))

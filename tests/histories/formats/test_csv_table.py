@@ -218,11 +218,6 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
         read(text, *asked)
 
 
-def test_a_time_history_of_radioss_as_text_is_refused_with_what_to_do() -> None:
-    with pytest.raises(FormatError, match="table: a time history of Radioss as text, which is not read; let the run"):
-        read("ZZZZZEOR      84\n      3041a title\nZZZZZEOR      80\n")
-
-
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
