@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import click
 
 from d2rpick.cli.wording import with_options
-from d2rpick.errors import D2RPickError, printable
+from d2rpick.errors import FORESEEN, D2RPickError, listing, one_line, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from d2rpick.choice.warnings import Caution
@@ -145,6 +145,20 @@ def _meant(name: str) -> str | None:
 def tell(message: str) -> None:
     """Print a message of one line to stderr, with the options of the command line and without control codes."""
     click.echo(printable(with_options(message)), err=True)
+
+
+def explained(error: BaseException, inputs: Sequence[str] = ()) -> str:
+    """Say any error in one line, with the options of the command line; ``--debug`` shows its traceback before.
+
+    ``inputs`` are named where nobody foresaw it, since it names none.
+    """
+    if click.get_current_context().meta.get("d2rpick.debug"):
+        import traceback
+
+        click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+    if isinstance(error, FORESEEN):
+        return with_options(one_line(error))
+    return f"{listing(inputs)}{': ' * bool(inputs)}{one_line(error)}; --debug shows where"
 
 
 def text_bytes(text: str) -> bytes:

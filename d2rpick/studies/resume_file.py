@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import INTERNAL_ERROR, FormatError
 from d2rpick.studies.row import FAILED, UNREADABLE, Stamp, StudyRow
 from d2rpick.studies.study import stamps
 
@@ -141,7 +141,7 @@ class Ledger:
 
     def add(self, row: StudyRow) -> None:
         """Append the row of a run that was judged; it is in the file when this returns."""
-        if row.status in (FAILED, UNREADABLE):  # asked again next time
+        if row.status in (FAILED, UNREADABLE, INTERNAL_ERROR):  # asked again next time
             return
         try:
             with Path(self.name).open("ab") as file:

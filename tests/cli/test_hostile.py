@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,18 @@ def test_a_study_of_a_name_that_is_no_text_can_be_reported(tmp_path: Path) -> No
     result = run("study", "--td", "0.064", "--report", str(tmp_path / "page.html"), name, ENERGY)
     assert result.exit_code == 0
     assert "run\ufffd.csv" in (tmp_path / "page.html").read_text("utf-8")
+
+
+def test_an_unforeseen_error_names_the_files_of_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.csv").write_bytes(Path(ENERGY).read_bytes())
+    Path("b.csv.gz").write_bytes(gzip.compress(Path(ENERGY).read_bytes()))
+    monkeypatch.setattr(zlib, "decompressobj", lambda **_: 1 / 0)
+    for command in (("plan",), ("info",), ("suggest", "--td", "0.064")):
+        result = run(*command, "a.csv", "b.csv.gz")
+        told = "d2rpick: a.csv, b.csv.gz: internal error, please report it (ZeroDivisionError: division by zero)"
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert result.stderr == f"{told}; --debug shows where\n"
 
 
 def test_links_in_a_circle_give_each_run_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
