@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from errno import EBADF
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ def one_line(error: BaseException) -> str:
         return f"internal error, please report it ({type(error).__name__}: {' '.join(str(error).split())})"
     if isinstance(error, FileNotFoundError) and error.filename:
         return f"{error.filename}: no such file; check the name and the folder"
+    if isinstance(error, OSError) and error.errno == EBADF:
+        return "standard output is closed; open it, or name a file for the result"
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or 'standard output'}: {error.strerror}"
     return (

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import click
 
-from d2rpick.errors import printable
+from d2rpick.errors import one_line, printable
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
@@ -106,6 +106,8 @@ class _Group(click.Group):
             _fail(error.format_message().rstrip(".") + where)
         except click.ClickException as error:
             _fail(error.format_message())
+        except OSError as error:  # from a help or a version that cannot be written
+            _fail(one_line(error))
         except click.Abort:
             _fail("interrupted")
         except _PipeClosed:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, run
+from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, run, started
 from tests.made_binout import binout as made_binout
 from tests.made_t01 import t01, value
 from tests.text_files import glstat_text, matsum_text
@@ -43,6 +43,29 @@ def test_standard_input_that_is_closed_is_told() -> None:
     assert "-: standard input is closed" in one_line(child("d2rpick study --td 1 --from - <&-"))
 
 
+@pytest.mark.parametrize("args", ["--help", "suggest --td 0.064 -q", "study --td 0.064 -qf ndjson"])
+def test_a_result_that_nobody_can_get_is_no_success(args: str) -> None:
+    for closed, said in ((">&-", "standard output is closed; open it"), (">/dev/full", "No space left on device")):
+        if Path("/dev/full").exists() or closed == ">&-":
+            assert said in one_line(child(f'd2rpick {args} "$@" {closed}', ENERGY))
+
+
+def test_a_closed_stdout_is_not_missed_where_nothing_is_written_to_it(tmp_path: Path) -> None:
+    found = child('d2rpick suggest --td 0.064 -qf value "$1" -o "$2" >&-', ENERGY, tmp_path / "tr")
+    assert (found.returncode, found.stderr) == (0, "")
+    assert float((tmp_path / "tr").read_text()) == pytest.approx(0.0128852793630525)
+
+
+def test_an_interrupt_during_the_imports_ends_the_program_without_a_word(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "click.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhile True: pass\n")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
+    with started("info", ENERGY) as process:
+        assert process.communicate() == (b"", b"")
+    assert process.returncode == 130
+
+
 def test_a_closed_stderr_loses_no_result() -> None:
     found = child('d2rpick suggest --td 0.064 -f value "$@" 2>&-', ENERGY)
     assert found.returncode == 0
@@ -60,9 +83,27 @@ def test_a_full_disk_is_told_of_the_file_that_it_holds(tmp_path: Path) -> None:
     ledger = tmp_path / "ledger"
     message = one_line(child('ulimit -f 0; d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY))
     assert f"{ledger}: cannot be written (File too large); make room" in message
-    ledger.unlink()
+    assert not ledger.exists()
     ledger.symlink_to(os.devnull)
     assert "not a regular file" in one_line(child('d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY))
+
+
+def test_a_disk_that_fills_up_leaves_the_rows_that_fitted(tmp_path: Path) -> None:
+    """The size of a file is limited in blocks of 1 kB, which the second row exceeds."""
+    ledger, again = tmp_path / "ledger", tmp_path / "again.csv"
+    again.write_bytes(Path(ENERGY).read_bytes())
+    assert run("study", "--td", "0.064", "--jobs", "1", "--resume", str(ledger), ENERGY).exit_code == 0
+    first = ledger.read_bytes()
+    blocks = -(-len(first) // 1024)
+    study = 'ulimit -f "$1"; d2rpick study -q --td 0.064 --jobs 1 --resume "$2" "$3" "$4"'
+    assert "make room" in one_line(child(study, str(blocks), ledger, ENERGY, again))
+    assert ledger.read_bytes() == first
+
+
+@pytest.mark.parametrize("args", [("absent.csv",), ("absent.csv", "--after", "-1")])
+def test_a_study_without_a_finished_run_leaves_no_ledger(tmp_path: Path, args: tuple[str, ...]) -> None:
+    assert run("study", "--td", "0.064", "--resume", str(tmp_path / "ledger"), *args).exit_code == 2
+    assert not (tmp_path / "ledger").exists()
 
 
 def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> None:
