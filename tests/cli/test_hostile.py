@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import io
 import json
 import os
 import re
@@ -10,7 +11,9 @@ import subprocess
 import sys
 import zlib
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -18,6 +21,9 @@ from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, run, started
 from tests.made_binout import binout as made_binout
 from tests.made_t01 import t01, value
 from tests.text_files import glstat_text, matsum_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
 
 HOSTILE = "energy\n\x1b[31mred.csv"
 
@@ -109,8 +115,82 @@ def test_a_study_without_a_finished_run_leaves_no_ledger(tmp_path: Path, args: t
 def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> None:
     packed = tmp_path / "zeros.gz"
     packed.write_bytes(50 * gzip.compress(bytes(1 << 24)))
-    message = one_line(child('ulimit -v 700000; d2rpick info "$1"', packed))
+    message = one_line(child('ulimit -v 700000; D2RPICK_MAX_RATIO=2e3 d2rpick info "$1"', packed))
     assert "zeros.gz: its unpacked data do not fit into memory" in message
+
+
+def deep(groups: int) -> bytes:
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        place = file.create_group("/".join(["g"] * groups))
+        place["time"], place["internal_energy"] = np.arange(9.0), np.arange(9.0) ** 2
+    return content.getvalue()
+
+
+def dense(sizes: Sequence[int], **options: Any) -> bytes:
+    """A file with columns of zeros, which are packed; what is not written is not there at all."""
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        for number, size in enumerate(sizes):
+            file.create_dataset(f"e{number}", data=np.zeros(size), chunks=(1 << 17,), **options)
+    return content.getvalue()
+
+
+BEYOND: dict[str, tuple[Callable[[], bytes], str, str]] = {
+    "zeros.gz": (lambda: gzip.compress(bytes(1 << 24)) * 2, "RATIO", "its packed data become more than 100 times"),
+    "deep.h5": (lambda: deep(101), "DEPTH", "its data lie in more than 100 groups"),
+    "one.h5": (lambda: dense([1 << 22], compression="gzip"), "RATIO", "its packed data become more than 100 times"),
+    "all.h5": (lambda: dense([1 << 20] * 3, compression="gzip"), "RATIO", "become more than 100 times as many bytes"),
+    "head.csv": (lambda: b"time,energy" + b" " * 1_000_000 + b"\n0,1\n", "LINE", "head.csv:1: the line has more than"),
+    "row.csv": (lambda: b"time,energy\n0,1\n1," + b" " * 1_000_001 + b"2\n", "LINE", "row.csv:3: the line has more"),
+    "end.csv": (
+        lambda: b"time,energy\n0,1\n" + b"1" * 1_000_001,
+        "LINE",
+        "end.csv:3: the line has more than 1,000,000",
+    ),
+    "utf16.csv": (lambda: ("x" * 1_000_001).encode("utf-16"), "LINE", "utf16.csv:1: the line has more than 1,000,000"),
+    "line.k": (lambda: b"*PART\n" + b"1," * 500_001 + b"\n", "LINE", "line.k:2: the line has more than 1,000,000"),
+    "long.k": (lambda: b"*SET_PART\n1\n" + b" " * 5_000_000, "LINE", "long.k:3: the line has more than 1,000,000"),
+}
+
+
+@pytest.mark.parametrize("name", BEYOND)
+def test_what_is_beyond_a_bound_is_told_unless_the_environment_raises_it(name: str, tmp_path: Path) -> None:
+    make, bound, said = BEYOND[name]
+    (tmp_path / name).write_bytes(make())
+    command = "check" if name.endswith(".k") else "info"
+    result = run(command, str(tmp_path / name))
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert said in result.stderr
+    assert f"set D2RPICK_MAX_{bound} higher" in result.stderr
+    raised = run(command, str(tmp_path / name), env={f"D2RPICK_MAX_{bound}": "1e9"})
+    assert "D2RPICK_MAX" not in raised.stderr
+
+
+def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
+    small = b"time,internal_energy\n" + b"".join(b"%d,0\n" % state for state in range(1000))
+    for name, content in {
+        "deep.h5": deep(100),
+        "still.gz": gzip.compress(
+            small + (b"#" * 4095 + b"\n") * (1 << 11)
+        ),  # 1,000 times as many bytes, few all the same
+        "line.csv": small + b"#" * 1_000_000,
+    }.items():
+        (tmp_path / name).write_bytes(content)
+        assert run("info", str(tmp_path / name)).exit_code == 0
+        assert (
+            run(
+                "info",
+                str(tmp_path / name),
+                env={f"D2RPICK_MAX_{which}": "0.5" for which in ("DEPTH", "LINE", "UNPACKED")},
+            ).exit_code
+            == 2
+        )
+    wrong = run("info", ENERGY, env={"D2RPICK_MAX_LINE": "long"})
+    assert (
+        wrong.stderr
+        == "d2rpick: D2RPICK_MAX_LINE is 'long', a number above 0 was expected; correct it or leave it out\n"
+    )
 
 
 @pytest.fixture
