@@ -2,6 +2,9 @@
 
 import gc
 import os
+import sys
+
+INTERRUPTED = 130  # what a shell reports for a program that SIGINT ended
 
 
 def main() -> None:
@@ -9,21 +12,36 @@ def main() -> None:
 
     One thread for linear algebra, unless the environment says otherwise: the systems solved here are small, and
     starting the others costs a quarter of numpy's import.  Garbage is looked for less often, and not at the end: of
-    what imports make none is garbage, and looking for it costs a seventh of a run on an ordinary file.
+    what imports make none is garbage, and looking for it costs a seventh of a run on an ordinary file.  An interrupt
+    before anything was begun, during the imports, ends the program without a word.
     """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    gc.set_threshold(100_000)
-    for stream in range(3):  # a file opened in the place of a closed one would get what is meant for it
+    try:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        gc.set_threshold(100_000)
+        _fill_closed_streams()
+        from d2rpick.cli import d2rpick
+
+        d2rpick()
+    except KeyboardInterrupt:
+        os._exit(INTERRUPTED)
+    finally:
+        gc.freeze()  # the system takes back what is left
+
+
+def _fill_closed_streams() -> None:
+    """Put something in the place of closed streams: a file opened there would get what is meant for them.
+
+    To write to a standard output that was closed is an error; a closed stderr loses only messages.
+    """
+    for stream in range(3):
         try:
             os.fstat(stream)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)
-    from d2rpick.cli import d2rpick
+            os.open(os.devnull, os.O_RDONLY if stream == 1 else os.O_RDWR)
+            if stream == 1:
+                import io
 
-    try:
-        d2rpick()
-    finally:
-        gc.freeze()  # the system takes back what is left
+                sys.stdout = io.TextIOWrapper(io.FileIO(stream, "w", closefd=False), write_through=True)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from errno import EBADF
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -39,6 +40,33 @@ class DeckError(D2RPickError):
 
 class ConfigurationError(D2RPickError):
     """The configuration of the deck check is wrong: an unknown rule, key or severity."""
+
+
+INTERNAL_ERROR: Final = "internal-error"  # what becomes of one of several inputs where it meets an error of the program
+FORESEEN: Final = (D2RPickError, OSError, MemoryError)  # what is no error of the program itself
+
+
+def one_line(error: BaseException) -> str:
+    """Say any error in one line; one that nobody foresaw as what to report.
+
+    Examples
+    --------
+    >>> one_line(RangeError("run: td 9 lies outside the record")), one_line(KeyError("time"))
+    ('run: td 9 lies outside the record', "internal error, please report it (KeyError: 'time')")
+    """
+    if not isinstance(error, FORESEEN):
+        return f"internal error, please report it ({type(error).__name__}: {' '.join(str(error).split())})"
+    if isinstance(error, FileNotFoundError) and error.filename:
+        return f"{error.filename}: no such file; check the name and the folder"
+    if isinstance(error, OSError) and error.errno == EBADF:
+        return "standard output is closed; open it, or name a file for the result"
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or 'standard output'}: {error.strerror}"
+    return (
+        "there is not enough memory; give it more, or name fewer files"
+        if isinstance(error, MemoryError)
+        else str(error)
+    )
 
 
 def printable(text: str) -> str:

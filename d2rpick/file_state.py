@@ -1,14 +1,16 @@
-"""Files that others may be writing: what tells that one has changed, and what one held at a single moment."""
+"""Files that others may be writing or reading: what one held at a single moment, and a new one put in its place."""
 
 from __future__ import annotations
 
 import os
 import stat
 import time
+from errno import ELOOP
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
     from io import FileIO
+    from pathlib import Path
 
 _TRIES: Final = 5  # looks at a file that changes all the time
 _TICK: Final = 50_000_000  # [ns] above the resolution of most files' times: later changes show in them
@@ -71,6 +73,34 @@ def settled_state(file: FileIO) -> FileState | None:
         if FileState.of(file).is_as(found):
             return found
     return None
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all: into a temporary file beside it, which then takes its name.
+
+    A link stays, and the file it points to is replaced; a device or a named pipe is written to.
+    """
+    import tempfile
+
+    if path.exists() and not path.is_file():
+        path.write_bytes(content)
+        return
+    try:
+        path = path.resolve()
+    except RuntimeError:  # a loop of links, before Python 3.13
+        raise OSError(ELOOP, os.strerror(ELOOP), str(path)) from None
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    scratch = path.parent / temporary
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        mask = os.umask(0)
+        os.umask(mask)
+        scratch.chmod(0o666 & ~mask)  # mkstemp gives the owner alone access
+        scratch.replace(path)
+    except BaseException:
+        scratch.unlink(missing_ok=True)
+        raise
 
 
 def snapshot(file: FileIO) -> bytes | None:

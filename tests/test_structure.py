@@ -27,6 +27,7 @@ PACKAGE = ROOT / "d2rpick"
 # Each folder imports only from itself and from those on the lines above its own.
 LAYERS = (
     ("errors", "file_state", "version"),
+    ("bounds",),
     ("histories", "deck"),
     ("vibration",),
     ("flight",),

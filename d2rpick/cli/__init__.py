@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import click
 
-from d2rpick.cli.wording import with_options
-from d2rpick.errors import D2RPickError, printable
+from d2rpick.errors import one_line, printable
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
@@ -91,28 +90,12 @@ class _Group(click.Group):
             return super().invoke(ctx)
         except BrokenPipeError as error:
             raise _PipeClosed from error
-        except (D2RPickError, OSError) as error:
-            if ctx.meta.get("d2rpick.debug"):
-                import traceback
+        except (click.ClickException, click.exceptions.Exit, click.Abort):
+            raise
+        except Exception as error:  # a user gets a line, whatever it is
+            from d2rpick.cli.output import explained
 
-                click.echo(traceback.format_exc(), err=True, nl=False)
-            raise click.ClickException(with_options(_one_line(error))) from error
-        except MemoryError as error:
-            raise click.ClickException("there is not enough memory; give it more, or name fewer files") from error
-        except (
-            ArithmeticError,
-            AttributeError,
-            LookupError,
-            RuntimeError,
-            TypeError,
-            ValueError,
-        ) as error:
-            if isinstance(error, click.exceptions.Exit | click.Abort) or ctx.meta.get("d2rpick.debug"):
-                raise
-            what = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            raise click.ClickException(
-                f"internal error; please report it with the output of --debug ({what})"
-            ) from error
+            raise click.ClickException(explained(error, ctx.meta.get("d2rpick.history", ()))) from error
 
     def main(self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any) -> NoReturn:  # type: ignore[override]
         extra["standalone_mode"] = False
@@ -123,6 +106,8 @@ class _Group(click.Group):
             _fail(error.format_message().rstrip(".") + where)
         except click.ClickException as error:
             _fail(error.format_message())
+        except OSError as error:  # from a help or a version that cannot be written
+            _fail(one_line(error))
         except click.Abort:
             _fail("interrupted")
         except _PipeClosed:
@@ -135,14 +120,6 @@ class _Group(click.Group):
 def _fail(message: str) -> NoReturn:
     click.echo(f"d2rpick: {printable(message)}", err=True)
     sys.exit(COULD_NOT_RUN)
-
-
-def _one_line(error: Exception) -> str:
-    if isinstance(error, FileNotFoundError) and error.filename:
-        return f"{error.filename}: no such file; check the name and the folder"
-    if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename or 'standard output'}: {error.strerror}"
-    return str(error)
 
 
 _VERSIONS: Final = "Show the version, and those of the libraries it stands on, and exit."

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output, finish, tell
+from d2rpick.cli.output import Output, explained, finish, tell
 from d2rpick.cli.wording import in_words
-from d2rpick.errors import ConfigurationError, DeckError
+from d2rpick.errors import INTERNAL_ERROR, ConfigurationError, D2RPickError, DeckError
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def command(
                         history=judge.run.sources if judge else None)  # fmt: skip
         text = write("findings", output_format, checks, Shown(ctx.meta["d2rpick.command"]))
         output.result(in_words(text, output_format))
-    if not results:
+    if not results or any(one.code == INTERNAL_ERROR for one in failed):
         ctx.exit(2)
     heavy = any(finding.severity.rank <= limit.rank for result in results for finding in result.findings)
     finish(ctx, objection=heavy or bool(failed), exit_zero=exit_zero)
@@ -96,7 +96,7 @@ def _checked(
 ) -> tuple[list[Checked], list[Unreadable], list[str]]:
     """Check each deck by the configuration nearest to it, and give all files that were read.
 
-    A deck that cannot be read, or whose configuration cannot, does not hide the others.
+    A deck that cannot be read, or whose configuration cannot, does not hide the others; nor does an internal error.
     """
     from d2rpick.deck.source import STDIN
     from d2rpick.rules import RULES, Unreadable, check_deck, configuration_for
@@ -113,8 +113,12 @@ def _checked(
             content = sys.stdin.buffer.read() if name == STDIN else None
             results.append(check_deck(name, configuration, judge, content))
             inputs += results[-1].files
-        except (ConfigurationError, DeckError) as error:
-            failed.append(Unreadable(name, str(error)))
+        except (ConfigurationError, DeckError, OSError, MemoryError) as error:
+            failed.append(Unreadable(name, explained(error)))
+        except D2RPickError:
+            raise  # about the history, by which all are judged
+        except Exception as error:  # noqa: BLE001  the others are answered, whatever it is
+            failed.append(Unreadable(name, explained(error, [name]), INTERNAL_ERROR))
     return results, failed, inputs
 
 
@@ -155,7 +159,7 @@ def _cautions(results: Sequence[Checked], judge: HistoryJudge | None) -> list[Ca
 def _warnings(cautions: Sequence[Caution], failed: Sequence[Unreadable]) -> list[dict[str, str]]:
     from d2rpick.report.keys import of_warnings
 
-    return of_warnings(cautions) + [{"code": "unreadable-deck", "message": one.reason} for one in failed]
+    return of_warnings(cautions) + [{"code": one.code, "message": one.reason} for one in failed]
 
 
 def _ids(texts: Sequence[str]) -> tuple[str, ...]:

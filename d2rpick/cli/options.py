@@ -256,6 +256,7 @@ class Reading(NamedTuple):
     @classmethod
     def of(cls, options: dict[str, Any]) -> Reading:
         """Take the options as they were given; UsageError when energies are asked for in two ways."""
+        click.get_current_context().meta["d2rpick.history"] = options["history"]
         return cls(options["history"], selection(options), options["input_format"], options["quiet"])
 
     def open(self) -> Run:

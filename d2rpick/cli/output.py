@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import click
 
 from d2rpick.cli.wording import with_options
-from d2rpick.errors import D2RPickError, printable
+from d2rpick.errors import FORESEEN, D2RPickError, listing, one_line, printable
+from d2rpick.file_state import write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
+    from collections.abc import Iterable, Sequence
 
     from d2rpick.choice.warnings import Caution
 
@@ -105,23 +105,15 @@ class Output(NamedTuple):
             tell(f"warning: {caution.code}: {caution.message}")
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a file whole or not at all: into a temporary file beside it, which then takes its name.
-
-        A link stays, and the file it points to is replaced; a device or a named pipe is written to.
-        """
+        """Write a file whole or not at all; D2RPickError where it cannot be written."""
         from pathlib import Path
 
-        path = Path(name)
         try:
-            if path.exists() and not path.is_file():
-                path.write_bytes(content)
-            else:
-                _replace(path.resolve(), content)
+            write_whole(Path(name), content)
         except BrokenPipeError:
             raise
-        except (OSError, RuntimeError) as error:  # Python before 3.13 tells a loop of links by RuntimeError
-            reason = getattr(error, "strerror", None) or "a loop of symbolic links"
-            raise D2RPickError(f"{name}: cannot be written ({reason}); give another file") from error
+        except OSError as error:
+            raise D2RPickError(f"{name}: cannot be written ({error.strerror}); give another file") from error
 
 
 def _check_report(name: str | None) -> None:
@@ -147,26 +139,23 @@ def tell(message: str) -> None:
     click.echo(printable(with_options(message)), err=True)
 
 
+def explained(error: BaseException, inputs: Sequence[str] = ()) -> str:
+    """Say any error in one line, with the options of the command line; ``--debug`` shows its traceback before.
+
+    ``inputs`` are named where nobody foresaw it, since it names none.
+    """
+    if click.get_current_context().meta.get("d2rpick.debug"):
+        import traceback
+
+        click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+    if isinstance(error, FORESEEN):
+        return with_options(one_line(error))
+    return f"{listing(inputs)}{': ' * bool(inputs)}{one_line(error)}; --debug shows where"
+
+
 def text_bytes(text: str) -> bytes:
     """Encode a text; bytes of file names that are none come as lone surrogates, which no encoding can write."""
     return text.encode(errors="surrogateescape").decode(errors="replace").encode()
-
-
-def _replace(path: Path, content: bytes) -> None:
-    import tempfile
-
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    scratch = path.parent / temporary
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        mask = os.umask(0)
-        os.umask(mask)
-        scratch.chmod(0o666 & ~mask)  # mkstemp gives the owner alone access
-        scratch.replace(path)
-    except BaseException:
-        scratch.unlink(missing_ok=True)
-        raise
 
 
 def finish(ctx: click.Context, *, objection: bool, exit_zero: bool) -> None:

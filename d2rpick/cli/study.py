@@ -16,7 +16,7 @@ from d2rpick.cli import typed
 from d2rpick.cli.output import Output, finish, tell, text_bytes
 from d2rpick.cli.progress import counting
 from d2rpick.cli.wording import in_words, with_options
-from d2rpick.errors import D2RPickError, FormatError
+from d2rpick.errors import INTERNAL_ERROR, D2RPickError, FormatError
 from d2rpick.report.formats import FORMATS, Shown, write
 
 if TYPE_CHECKING:
@@ -119,6 +119,8 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
     output.result(in_words(text, output_format))
     if not answer.judged:
         tell(f"d2rpick: no run could be judged; the first: {rows[0].message or ''}")
+        ctx.exit(2)
+    if any(row.status == INTERNAL_ERROR for row in rows):
         ctx.exit(2)
     finish(ctx, objection=answer.objection, exit_zero=exit_zero)
 

@@ -9,6 +9,7 @@ from functools import cached_property
 from itertools import islice, zip_longest
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.bounds import beyond, long_line
 from d2rpick.deck.marks import BYTE_ORDER_MARK, find_marks
 from d2rpick.deck.stored import Held, OnDisk, stored
 from d2rpick.errors import DeckError
@@ -74,6 +75,8 @@ class SourceFile:
             piece = self.read(start, min(start + size, end))
             if start + len(piece) < end:
                 piece = piece[: piece.rfind(b"\n") + 1]
+            if (at := long_line(piece or self.read(start, start + size))) >= 0:
+                raise DeckError(f"{self.name}:{self.line_at(start + at)}: the line has {beyond('LINE')}")
             if piece:
                 yield piece
                 start += len(piece)

@@ -17,6 +17,7 @@ from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import read_switching
 from d2rpick.deck.windows import find_windows
 from d2rpick.errors import DeckError
+from d2rpick.file_state import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -68,22 +69,14 @@ def write_deck(main: str, card: PrintedCard, folder: str, *, overwrite: bool = F
         for name in files:
             if (place / name).exists() and not overwrite:
                 raise DeckError(f"{place / name}: the file exists; choose another folder or `overwrite`")
+            if not Path(os.path.realpath(place / name)).is_relative_to(os.path.realpath(place)):
+                raise DeckError(f"{place / name}: leads out of {folder}, by a link or its name; choose another folder")
         for name, content in files.items():
-            _put(place / name, content)
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            write_whole(place / name, content)
     except OSError as error:
         raise DeckError(f"{error.filename or folder}: cannot be written ({error.strerror})") from None
     return [str(place / name) for name in files]
-
-
-def _put(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    scratch = path.with_name(f".{path.name}.part")
-    try:
-        scratch.write_bytes(content)
-        scratch.replace(path)
-    finally:
-        scratch.unlink(missing_ok=True)
 
 
 def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:

@@ -59,9 +59,9 @@ class Content:
         """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
         return self._data.find(wanted, begin)
 
-    def rfind(self, wanted: bytes, end: int) -> int:
-        """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
-        return self._data.rfind(wanted, 0, end)
+    def rfind(self, wanted: bytes, begin: int, end: int) -> int:
+        """Address of the last byte ``wanted`` from ``begin`` on and before ``end``, -1 where there is none."""
+        return self._data.rfind(wanted, begin, end)
 
     def view(self, begin: int, end: int) -> Bytes:
         """Bytes from one address to another, shape (end - begin,)."""
@@ -144,10 +144,10 @@ class OnDisk(Content):
                 return at + found
         return -1
 
-    def rfind(self, wanted: bytes, end: int) -> int:
-        """Address of the last byte ``wanted`` before ``end``, -1 where there is none."""
-        for stop in range(end, 0, -self._window):
-            first = max(0, stop - self._window)
+    def rfind(self, wanted: bytes, begin: int, end: int) -> int:
+        """Address of the last byte ``wanted`` from ``begin`` on and before ``end``, -1 where there is none."""
+        for stop in range(end, begin, -self._window):
+            first = max(begin, stop - self._window)
             found = self[first:stop].rfind(wanted)
             if found >= 0:
                 return first + found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import FormatError, listing
@@ -94,6 +95,7 @@ def unit_of(name: str) -> str:
     return tail[2] if tail and tail[2].casefold() in _UNITS else ""
 
 
+@lru_cache(maxsize=1 << 16)  # the same names are asked for again and again
 def normalised(name: str) -> str:
     """Reduce a name to its letters and digits, in small letters and without its unit.
 

@@ -8,6 +8,7 @@ import stat
 import sys
 from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.bounds import bound, unpacked_beyond
 from d2rpick.errors import FormatError, listing
 from d2rpick.histories.content import stored
 from d2rpick.histories.names import in_seconds, near_miss
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 STDIN = "-"
 _GZIP = b"\x1f\x8b"
+_BLOCK = 1 << 16  # packed bytes at a time, which become 68 MB at most
 # Files of a folder often share their suffix, and have it in common with any name that has it.
 _LIKENESS = 0.8
 _NUMBER = r"\d+\.?\d*|\.\d+"  # compiled where it is needed, as the next one
@@ -190,18 +192,37 @@ def _meant(name: str) -> str:
 
 
 def _unpacked(name: str, packed: bytes | OnDisk) -> Source:
-    """Unpack what there is, of files that were packed one behind the other too."""
+    """Unpack what there is, within the bounds."""
     import zlib
 
-    found, rest, cut = [], bytes(packed), False
+    data = bytes(packed)
     try:
-        while rest[:2] == _GZIP and not cut:
-            unpacker = zlib.decompressobj(wbits=31)  # 31: the gzip format
-            found.append(unpacker.decompress(rest))
-            cut, rest = not unpacker.eof, unpacker.unused_data
-        data = found[0] if len(found) == 1 else b"".join(found)
+        if len(data) * bound("RATIO") > bound("UNPACKED"):
+            _pieces(name, data, keep=False)  # before memory is taken for it
+        pieces, cut = _pieces(name, data)
+        return Source(name, b"".join(pieces), cut, packed)
     except zlib.error as error:
         raise FormatError(f"{name}: damaged gzip data ({error}); copy the file again") from None
     except MemoryError:
         raise FormatError(f"{name}: its unpacked data do not fit into memory; unpack it with gunzip") from None
-    return Source(name, data, cut, packed)
+
+
+def _pieces(name: str, packed: bytes, *, keep: bool = True) -> tuple[list[bytes], bool]:
+    """Unpack files packed one behind the other; whether the last of them is cut."""
+    import zlib
+
+    found, size, unpacker = list[bytes](), 0, zlib.decompressobj(wbits=31)  # 31: the gzip format
+    for end in range(_BLOCK, len(packed) + _BLOCK, _BLOCK):
+        rest = packed[end - _BLOCK : end]
+        while rest:
+            if unpacker.eof:
+                if not _GZIP.startswith(rest[:2]):
+                    return found, False
+                unpacker = zlib.decompressobj(wbits=31)
+            piece = unpacker.decompress(rest)
+            found += [piece] * keep
+            size += len(piece)
+            if too_much := unpacked_beyond(end, size):
+                raise FormatError(f"{name}: its packed data become {too_much}")
+            rest = unpacker.unused_data
+    return found, not unpacker.eof

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from d2rpick.file_state import write_whole
 from d2rpick.library import arguments
 from d2rpick.library.asked import asked_of
 from d2rpick.library.document import Document
@@ -380,5 +381,5 @@ def page_record(
 def written(path: arguments.Path, page: str) -> Path:
     """Write a page and give its path."""
     place = Path(*arguments.paths("path", path))
-    place.write_text(page, "utf-8")
+    write_whole(place, page.encode())
     return place

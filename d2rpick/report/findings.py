@@ -111,7 +111,7 @@ def as_junit(checks: Checks) -> str:
         name = _xml(_shown(one.deck, root))
         suite = ET.SubElement(suites, "testsuite", name=name, tests="1", failures="0", errors="1")
         case = ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
-        ET.SubElement(case, "error", type="unreadable-deck", message=_xml(one.reason))
+        ET.SubElement(case, "error", type=one.code, message=_xml(one.reason))
     for result in checks.results:
         failures = sum(finding.severity.rank <= fail_on.rank for finding in result.findings)
         suite = ET.SubElement(

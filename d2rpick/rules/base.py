@@ -72,10 +72,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class Unreadable:
-    """A deck that could not be checked, and why."""
+    """A deck that could not be checked, and why; ``code`` is that of the warning that tells it."""
 
     deck: str
     reason: str
+    code: str = "unreadable-deck"
 
 
 @dataclass(frozen=True, eq=False)

@@ -101,6 +101,8 @@ def _names(table: Mapping[str, object], key: str, source: str) -> tuple[str, ...
 
 def _load(path: Path) -> dict[str, object]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError, RecursionError) as error:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        repr(table)  # as a message may show it: Python refuses to write numbers of thousands of digits, or to read them
+    except (ValueError, OSError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {error}; valid TOML was expected") from None
+    return table

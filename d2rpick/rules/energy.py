@@ -55,8 +55,8 @@ def _units(case: Case) -> Iterator[Objection]:
 
 def _thousand(case: Case) -> Iterator[Objection]:
     windows = case.windows.windows
-    times = [time for one in windows for time in (one.tr, one.td) if time is not None and time > 0]
-    if case.judge is None or not times or not case.judge.end > 0:
+    times = [time for one in windows for time in (one.tr, one.td) if time is not None]
+    if case.judge is None or not case.judge.end > 0:
         return
     factor = factor_of(times, case.judge.end)
     if factor != 1:

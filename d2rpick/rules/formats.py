@@ -44,11 +44,17 @@ def _equal(case: Case) -> Iterator[Objection]:
 
 
 def factor_of(times: list[float], end: float) -> float:
-    """1000 or 1/1000 where all times multiplied by its inverse suit a run up to ``end``, and as they are do not."""
-    latest, earliest = max(times), min(times)
+    """1000 or 1/1000 where all times multiplied by its inverse suit a run up to ``end``, and as they are do not.
+
+    Times before the run, or at its start, suit it in any unit.
+    """
+    later = [time for time in times if time > 0]
+    if not later:
+        return 1.0
+    latest, earliest = max(later), min(later)
     if earliest >= end and latest < THOUSAND * end:
         return THOUSAND if latest > 10 * end else 1.0
-    return 1 / THOUSAND if latest > 0 and end / 50 <= THOUSAND * latest < end else 1.0
+    return 1 / THOUSAND if end / 50 <= THOUSAND * latest < end else 1.0
 
 
 def mistaken(factor: float) -> str:
@@ -59,9 +65,9 @@ def mistaken(factor: float) -> str:
 
 def _thousand(case: Case) -> Iterator[Objection]:
     times = [card.time for card, _ in _timed(case) if card.time is not None]
-    if case.end is None or not any(times):
+    if case.end is None:
         return
-    factor = factor_of([time for time in times if time > 0], case.end)
+    factor = factor_of(times, case.end)
     if factor != 1:
         found = f"the switching times reach {max(times):g} but the run ends at {case.end:g} (ENDTIM)"
         yield _timed(case)[0][1].time1.field, f"{found}, {mistaken(factor)} give both in the same unit"
@@ -96,7 +102,7 @@ RULES: Final = (
         "1000, and do not, or only in its first 1/1000. D2R101 reports times after the end too. Files name no "
         "units, so this is a guess by size.",
         _thousand,
-        (Example(GOOD), Example(THERE + BACK)),
+        (Example(GOOD), Example(THERE + BACK), _pair("-0.01", "0.07"), _pair("-0.02", "-0.01"), _pair("0.0", "0.07")),
         (_pair("20.0", "90.0"), _pair("2.0e-5", "9.0e-5")),
     ),
 )

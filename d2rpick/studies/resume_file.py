@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import INTERNAL_ERROR, FormatError
 from d2rpick.studies.row import FAILED, UNREADABLE, Stamp, StudyRow
 from d2rpick.studies.study import stamps
 
@@ -90,12 +92,15 @@ class Ledger:
         self.taken = self.outdated = self.damaged = 0
         self._rows: dict[tuple[Stamp, ...], StudyRow] = {}
         self._known: set[tuple[str, ...]] = set()
-        if Path(name).exists() and not Path(name).is_file():
+        new = not Path(name).exists()
+        if not new and not Path(name).is_file():
             raise FormatError(f"{name}: cannot be written (not a regular file); give another file")
         try:
-            with Path(name).open("a+b") as file:  # created, and sure to be writable before the work begins
+            with Path(name).open("a+b") as file:  # sure to be writable before the work begins
                 file.seek(0)
                 content = file.read()
+            if new:  # the first row makes it
+                Path(name).unlink()
         except OSError as error:
             raise FormatError(f"{name}: cannot be written ({error.strerror or error}); give another file") from None
         if content[: len(_FIRST)] != _FIRST[: len(content)]:
@@ -141,11 +146,22 @@ class Ledger:
 
     def add(self, row: StudyRow) -> None:
         """Append the row of a run that was judged; it is in the file when this returns."""
-        if row.status in (FAILED, UNREADABLE):  # asked again next time
+        if row.status in (FAILED, UNREADABLE, INTERNAL_ERROR):  # asked again next time
             return
+        size = None
         try:
             with Path(self.name).open("ab") as file:
+                size = file.tell()
                 file.write(self._end + line(row, self.asked).encode() + b"\n")
         except OSError as error:
+            if size is not None:
+                self._shorten(size)
             raise FormatError(f"{self.name}: cannot be written ({error.strerror}); make room and begin again") from None
         self._end = b""
+
+    def _shorten(self, size: int) -> None:
+        """Take back what was written of a row; an empty file is removed."""
+        with suppress(OSError):
+            os.truncate(self.name, size)
+            if not size:
+                Path(self.name).unlink()

@@ -27,10 +27,11 @@ class StudyRow:
     """Answer for one run; times in the unit of its history, None for what is not known.
 
     ``status``: "ok"; "none", nothing can be recommended; "unreadable"; "out-of-range", the record does not reach td or
-    is too short to choose; "failed", its process died.  ``message`` says why it is not "ok"; ``warnings`` are codes.
-    ``td`` is that of the run; ``acceptable`` are its windows of acceptable tr, shape (n, 2), ``alike`` those in which
-    the error is at most 0.05 above that of its tr, ``profile`` the errors, shape (2, m).  ``files`` is what was read;
-    ``curve`` an outline of the energy, shape (2, k), where one was asked for.
+    is too short to choose; "failed", its process died; "internal-error", the program failed on it.  ``message`` says
+    why it is not "ok"; ``warnings`` are codes.  ``td`` is that of the run; ``acceptable`` are its windows of
+    acceptable tr, shape (n, 2), ``alike`` those in which the error is at most 0.05 above that of its tr, ``profile``
+    the errors, shape (2, m).  ``files`` is what was read; ``curve`` an outline of the energy, shape (2, k), where one
+    was asked for.
     """
 
     source: str

@@ -13,7 +13,7 @@ from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows,
 from d2rpick.choice.error_profile import error_profile
 from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.warnings import Caution
-from d2rpick.errors import D2RPickError, RangeError, listing
+from d2rpick.errors import FORESEEN, INTERNAL_ERROR, D2RPickError, RangeError, listing, one_line
 from d2rpick.histories.outline import outline
 from d2rpick.histories.selection import Selection
 from d2rpick.histories.source import expand
@@ -149,10 +149,8 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
 
 def failed(source: str, error: BaseException) -> StudyRow:
     """StudyRow of a run whose process did not come back with one."""
-    text = " ".join(str(error).split())
-    if not isinstance(error, D2RPickError):
-        text = f"internal error, please report it ({type(error).__name__}: {text})"
-    return StudyRow(source, FAILED, f"{source}: {text}")
+    status = FAILED if isinstance(error, FORESEEN) else INTERNAL_ERROR
+    return StudyRow(source, status, f"{source}: {one_line(error)}")
 
 
 def stamps(source: str) -> tuple[Stamp, ...]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import tomllib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -16,6 +17,9 @@ from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import BOX, DECK, ENERGY, GLSTAT, answer, run
 from tests.json_schemas import check_by_schema
 from tests.report.test_findings import junit_is_valid, sarif_is_valid
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 FORMATS = ("table", "json", "github", "junit", "sarif")
 LATE = HEAD + PARTS + THERE + automatic(2, "0.5", deformable=["1"]) + END
@@ -300,6 +304,40 @@ def test_a_broken_configuration_does_not_hide_other_decks() -> None:
     assert result.exit_code == 1
     assert rules(json.loads(result.stdout)) == ["D2R101"]
     assert "a/d2rpick.toml" in result.stderr
+
+
+def failing_on(text: str, error: Exception) -> Callable[[str], dict[str, Any]]:
+    """A reader of TOML that nobody foresaw."""
+    read = tomllib.loads
+
+    def loads(content: str) -> dict[str, Any]:
+        if text in content:
+            raise error
+        return read(content)
+
+    return loads
+
+
+@pytest.mark.parametrize("form", [*FORMATS, "ndjson"])
+@pytest.mark.parametrize(
+    "error", [ZeroDivisionError("odd"), AssertionError("odd"), BufferError("odd"), EOFError("odd")]
+)
+def test_an_unforeseen_error_is_the_line_of_its_deck(
+    form: str, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decks = [place("a/main.k", LATE), place("b/main.k", GOOD), place("c/main.k", LATE)]
+    Path("b/d2rpick.toml").write_text("# bad")
+    monkeypatch.setattr(tomllib, "loads", failing_on("# bad", error))
+    result = run("check", *decks, "-f", form, "--exit-zero")
+    assert result.exit_code == 2
+    told = f"b/main.k: internal error, please report it ({type(error).__name__}: odd)"
+    assert result.stderr == f"d2rpick: {told}; --debug shows where\n"
+    assert result.stdout.count("is after") == 2 or result.stdout.count("D2R101") >= 2
+    assert told in result.stdout or form == "table"
+    valid(form, result.stdout)
+    if form == "json":
+        assert [one["code"] for one in json.loads(result.stdout)["warnings"]] == ["internal-error"]
+    assert "Traceback" in run("check", *decks, "--debug").stderr
 
 
 def test_two_spellings_of_a_deck_are_one(tmp_path: Path) -> None:

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import gzip
+import io
 import json
 import os
 import re
 import subprocess
 import sys
+import zlib
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import h5py
 import numpy as np
 import pytest
 
-from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, run
+from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, run, started
 from tests.made_binout import binout as made_binout
 from tests.made_t01 import t01, value
 from tests.text_files import glstat_text, matsum_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
 
 HOSTILE = "energy\n\x1b[31mred.csv"
 
@@ -42,6 +49,29 @@ def test_standard_input_that_is_closed_is_told() -> None:
     assert "-: standard input is closed" in one_line(child("d2rpick study --td 1 --from - <&-"))
 
 
+@pytest.mark.parametrize("args", ["--help", "suggest --td 0.064 -q", "study --td 0.064 -qf ndjson"])
+def test_a_result_that_nobody_can_get_is_no_success(args: str) -> None:
+    for closed, said in ((">&-", "standard output is closed; open it"), (">/dev/full", "No space left on device")):
+        if Path("/dev/full").exists() or closed == ">&-":
+            assert said in one_line(child(f'd2rpick {args} "$@" {closed}', ENERGY))
+
+
+def test_a_closed_stdout_is_not_missed_where_nothing_is_written_to_it(tmp_path: Path) -> None:
+    found = child('d2rpick suggest --td 0.064 -qf value "$1" -o "$2" >&-', ENERGY, tmp_path / "tr")
+    assert (found.returncode, found.stderr) == (0, "")
+    assert float((tmp_path / "tr").read_text()) == pytest.approx(0.0128852793630525)
+
+
+def test_an_interrupt_during_the_imports_ends_the_program_without_a_word(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "click.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhile True: pass\n")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
+    with started("info", ENERGY) as process:
+        assert process.communicate() == (b"", b"")
+    assert process.returncode == 130
+
+
 def test_a_closed_stderr_loses_no_result() -> None:
     found = child('d2rpick suggest --td 0.064 -f value "$@" 2>&-', ENERGY)
     assert found.returncode == 0
@@ -59,16 +89,108 @@ def test_a_full_disk_is_told_of_the_file_that_it_holds(tmp_path: Path) -> None:
     ledger = tmp_path / "ledger"
     message = one_line(child('ulimit -f 0; d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY))
     assert f"{ledger}: cannot be written (File too large); make room" in message
-    ledger.unlink()
+    assert not ledger.exists()
     ledger.symlink_to(os.devnull)
     assert "not a regular file" in one_line(child('d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY))
+
+
+def test_a_disk_that_fills_up_leaves_the_rows_that_fitted(tmp_path: Path) -> None:
+    """The size of a file is limited in blocks of 1 kB, which the second row exceeds."""
+    ledger, again = tmp_path / "ledger", tmp_path / "again.csv"
+    again.write_bytes(Path(ENERGY).read_bytes())
+    assert run("study", "--td", "0.064", "--jobs", "1", "--resume", str(ledger), ENERGY).exit_code == 0
+    first = ledger.read_bytes()
+    blocks = -(-len(first) // 1024)
+    study = 'ulimit -f "$1"; d2rpick study -q --td 0.064 --jobs 1 --resume "$2" "$3" "$4"'
+    assert "make room" in one_line(child(study, str(blocks), ledger, ENERGY, again))
+    assert ledger.read_bytes() == first
+
+
+@pytest.mark.parametrize("args", [("absent.csv",), ("absent.csv", "--after", "-1")])
+def test_a_study_without_a_finished_run_leaves_no_ledger(tmp_path: Path, args: tuple[str, ...]) -> None:
+    assert run("study", "--td", "0.064", "--resume", str(tmp_path / "ledger"), *args).exit_code == 2
+    assert not (tmp_path / "ledger").exists()
 
 
 def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> None:
     packed = tmp_path / "zeros.gz"
     packed.write_bytes(50 * gzip.compress(bytes(1 << 24)))
-    message = one_line(child('ulimit -v 700000; d2rpick info "$1"', packed))
+    message = one_line(child('ulimit -v 700000; D2RPICK_MAX_RATIO=2e3 d2rpick info "$1"', packed))
     assert "zeros.gz: its unpacked data do not fit into memory" in message
+
+
+def deep(groups: int) -> bytes:
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        place = file.create_group("/".join(["g"] * groups))
+        place["time"], place["internal_energy"] = np.arange(9.0), np.arange(9.0) ** 2
+    return content.getvalue()
+
+
+def dense(sizes: Sequence[int], **options: Any) -> bytes:
+    """A file with columns of zeros, which are packed; what is not written is not there at all."""
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        for number, size in enumerate(sizes):
+            file.create_dataset(f"e{number}", data=np.zeros(size), chunks=(1 << 17,), **options)
+    return content.getvalue()
+
+
+BEYOND: dict[str, tuple[Callable[[], bytes], str, str]] = {
+    "zeros.gz": (lambda: gzip.compress(bytes(1 << 24)) * 2, "RATIO", "its packed data become more than 100 times"),
+    "deep.h5": (lambda: deep(101), "DEPTH", "its data lie in more than 100 groups"),
+    "one.h5": (lambda: dense([1 << 22], compression="gzip"), "RATIO", "its packed data become more than 100 times"),
+    "all.h5": (lambda: dense([1 << 20] * 3, compression="gzip"), "RATIO", "become more than 100 times as many bytes"),
+    "head.csv": (lambda: b"time,energy" + b" " * 1_000_000 + b"\n0,1\n", "LINE", "head.csv:1: the line has more than"),
+    "row.csv": (lambda: b"time,energy\n0,1\n1," + b" " * 1_000_001 + b"2\n", "LINE", "row.csv:3: the line has more"),
+    "end.csv": (
+        lambda: b"time,energy\n0,1\n" + b"1" * 1_000_001,
+        "LINE",
+        "end.csv:3: the line has more than 1,000,000",
+    ),
+    "utf16.csv": (lambda: ("x" * 1_000_001).encode("utf-16"), "LINE", "utf16.csv:1: the line has more than 1,000,000"),
+    "line.k": (lambda: b"*PART\n" + b"1," * 500_001 + b"\n", "LINE", "line.k:2: the line has more than 1,000,000"),
+    "long.k": (lambda: b"*SET_PART\n1\n" + b" " * 5_000_000, "LINE", "long.k:3: the line has more than 1,000,000"),
+}
+
+
+@pytest.mark.parametrize("name", BEYOND)
+def test_what_is_beyond_a_bound_is_told_unless_the_environment_raises_it(name: str, tmp_path: Path) -> None:
+    make, bound, said = BEYOND[name]
+    (tmp_path / name).write_bytes(make())
+    command = "check" if name.endswith(".k") else "info"
+    result = run(command, str(tmp_path / name))
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert said in result.stderr
+    assert f"set D2RPICK_MAX_{bound} higher" in result.stderr
+    raised = run(command, str(tmp_path / name), env={f"D2RPICK_MAX_{bound}": "1e9"})
+    assert "D2RPICK_MAX" not in raised.stderr
+
+
+def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
+    small = b"time,internal_energy\n" + b"".join(b"%d,0\n" % state for state in range(1000))
+    for name, content in {
+        "deep.h5": deep(100),
+        "still.gz": gzip.compress(
+            small + (b"#" * 4095 + b"\n") * (1 << 11)
+        ),  # 1,000 times as many bytes, few all the same
+        "line.csv": small + b"#" * 1_000_000,
+    }.items():
+        (tmp_path / name).write_bytes(content)
+        assert run("info", str(tmp_path / name)).exit_code == 0
+        assert (
+            run(
+                "info",
+                str(tmp_path / name),
+                env={f"D2RPICK_MAX_{which}": "0.5" for which in ("DEPTH", "LINE", "UNPACKED")},
+            ).exit_code
+            == 2
+        )
+    wrong = run("info", ENERGY, env={"D2RPICK_MAX_LINE": "long"})
+    assert (
+        wrong.stderr
+        == "d2rpick: D2RPICK_MAX_LINE is 'long', a number above 0 was expected; correct it or leave it out\n"
+    )
 
 
 @pytest.fixture
@@ -107,6 +229,18 @@ def test_a_study_of_a_name_that_is_no_text_can_be_reported(tmp_path: Path) -> No
     result = run("study", "--td", "0.064", "--report", str(tmp_path / "page.html"), name, ENERGY)
     assert result.exit_code == 0
     assert "run\ufffd.csv" in (tmp_path / "page.html").read_text("utf-8")
+
+
+def test_an_unforeseen_error_names_the_files_of_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.csv").write_bytes(Path(ENERGY).read_bytes())
+    Path("b.csv.gz").write_bytes(gzip.compress(Path(ENERGY).read_bytes()))
+    monkeypatch.setattr(zlib, "decompressobj", lambda **_: 1 / 0)
+    for command in (("plan",), ("info",), ("suggest", "--td", "0.064")):
+        result = run(*command, "a.csv", "b.csv.gz")
+        told = "d2rpick: a.csv, b.csv.gz: internal error, please report it (ZeroDivisionError: division by zero)"
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert result.stderr == f"{told}; --debug shows where\n"
 
 
 def test_links_in_a_circle_give_each_run_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import json
 import os
@@ -17,7 +18,7 @@ import pytest
 
 from d2rpick import __version__
 from tests import variants
-from tests.command import BOX, ENERGY, GLSTAT, answer, run, started
+from tests.command import BOX, ENERGY, GLSTAT, ROOT, answer, run, started
 from tests.json_schemas import check_by_definition, check_by_schema
 from tests.variants import STUDY
 
@@ -286,6 +287,23 @@ def test_a_run_that_kills_its_process_is_a_row(
     assert [row["status"] for row in found["runs"]] == ["ok", "failed", "ok", "ok"]
     assert "memory" in found["runs"][1]["message"]
     assert process.returncode == 1
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_an_unforeseen_error_is_the_row_of_its_run(
+    runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jobs: str
+) -> None:
+    (tmp_path / "odd.csv").write_bytes(gzip.compress(Path(runs[0]).read_bytes()))
+    (tmp_path / "sitecustomize.py").write_text("import zlib\nzlib.decompressobj = lambda **_: 1 / 0\n")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
+    args = (*STUDY[:-1], jobs, "-f", "json", "--exit-zero", runs[0], "odd.csv", runs[1])
+    with started(*args, cwd=tmp_path, text=True) as process:
+        text, _ = process.communicate(timeout=30)
+    found = json.loads(text)
+    check_by_schema(found)
+    assert [row["status"] for row in found["runs"]] == ["ok", "internal-error", "ok"]
+    assert found["runs"][1]["message"].startswith("odd.csv: internal error, please report it (ZeroDivisionError")
+    assert process.returncode == 2
 
 
 # Taking up where it ended.

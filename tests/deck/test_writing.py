@@ -109,6 +109,26 @@ def test_nothing_is_replaced_without_being_told(tmp_path: Path) -> None:
         write_deck(main, CARD, str(tmp_path), overwrite=True)
 
 
+def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "deck").mkdir()
+    main = write(tmp_path / "deck", HEAD + "*INCLUDE\nparts/all.k\n" + END, {"parts/all.k": PARTS})
+    mine, folder = tmp_path / "mine", tmp_path / "next"
+    mine.mkdir()
+    folder.mkdir()
+    (mine / "kept.k").write_text("mine")
+    (folder / "parts").symlink_to(mine)
+    (folder / "switches.k").symlink_to(mine / "kept.k")
+    (folder / "main.k").symlink_to(mine / "new.k")
+    for name, link in (("main.k", "main.k"), ("switches.k", "switches.k"), ("all.k", "parts")):
+        with pytest.raises(DeckError, match=rf"{name}: leads out of {folder}, by a link"):
+            write_deck(main, CARD, str(folder), overwrite=True)
+        (folder / link).unlink()
+        assert [one.name for one in mine.iterdir()] == ["kept.k"]
+    assert (mine / "kept.k").read_text() == "mine"
+    (tmp_path / "named").symlink_to(folder)  # a link that was asked for
+    assert (folder / "parts" / "all.k").samefile(write_deck(main, CARD, str(tmp_path / "named"))[2])
+
+
 # Radioss.
 
 

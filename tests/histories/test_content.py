@@ -64,8 +64,11 @@ def test_bytes_on_a_disk_are_those_in_memory(
     assert there.view(0, len(data)).tobytes() == data
     assert there.find(data[-5:], len(data) // 3) == data.find(data[-5:], len(data) // 3)
     assert there.find(b"not there") == -1
-    assert there.rfind(data[:1], size) == held.rfind(data[:1], size)
-    assert there.rfind(data[:1], 0) == -1
+    for begin in (0, size // 3):
+        assert (
+            there.rfind(data[:1], begin, size) == held.rfind(data[:1], begin, size) == data.rfind(data[:1], begin, size)
+        )
+    assert there.rfind(data[:1], 0, 0) == -1
     assert there.sha256() == hashlib.sha256(data).hexdigest()
 
 

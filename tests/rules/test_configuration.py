@@ -42,6 +42,9 @@ def test_the_nearest_file_wins(tmp_path: Path) -> None:
         ("[severity]\nD2R101 = ['error']", "one of error"),
         ("select = ", "valid TOML"),
         ("a = '\xff'", "valid TOML"),
+        (f"select = {'9' * 5000}", "valid TOML"),  # Python refuses to read it,
+        (f"[severity]\nD2R101 = 0x{'f' * 5000}", "valid TOML"),  # and to write this one
+        (f"select = {'[' * 9999}", "valid TOML"),
     ],
 )
 def test_wrong_settings_say_what_is_wrong(tmp_path: Path, text: str, message: str) -> None:

@@ -72,9 +72,12 @@ def test_what_is_wrong_with_a_run_is_said_in_its_row(
 
 
 def test_a_process_that_did_not_answer_is_a_row() -> None:
-    found = failed("run", MemoryError("full"))
+    found = failed("run", MemoryError())
     assert (found.source, found.status) == ("run", "failed")
-    assert found.message == "run: internal error, please report it (MemoryError: full)"
+    assert found.message == "run: there is not enough memory; give it more, or name fewer files"
+    found = failed("run", KeyError("time"))
+    assert (found.source, found.status) == ("run", "internal-error")
+    assert found.message == "run: internal error, please report it (KeyError: 'time')"
 
 
 def test_another_version_gives_no_answer() -> None:

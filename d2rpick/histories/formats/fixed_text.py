@@ -85,7 +85,7 @@ class Blocks:
         self.source, self._portions = source, portions
         self._data = content_of(data)
         self._grammar = grammar
-        self._end = self._data.rfind(b"\n", len(self._data)) + 1
+        self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         self._begin = begin
         self._runs = array("q")  # packed: a file whose blocks all differ must not fill the memory
         data, end = self._data, self._end  # not self: a circle would keep the file open

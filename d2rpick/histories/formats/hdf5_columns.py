@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.formats.hdf5_damage import check_size
+from d2rpick.histories.formats.hdf5_damage import check_data
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -60,7 +60,7 @@ class Column:
     def load(self, file: h5py.File, source: str) -> Samples:
         """Its values, shape (size,); FormatError unless all are finite."""
         dataset = file[self.dataset]
-        check_size(dataset, source)
+        check_data(dataset, source)
         whole = dataset if self.field is None else dataset.fields(self.field)
         if self.place is None or self.field is not None:
             values = whole[()]

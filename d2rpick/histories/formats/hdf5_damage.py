@@ -8,14 +8,18 @@ from __future__ import annotations
 import os
 import signal
 import struct
+from contextlib import suppress
+from functools import cache
 from typing import TYPE_CHECKING, BinaryIO, Final
 
+from d2rpick.bounds import beyond, unpacked_beyond
 from d2rpick.errors import FormatError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import h5py
 
-_DENSEST: Final = 1100  # HDF5's best compression; a larger array than that is a damaged shape
 # Place of the end-of-file address in superblocks of version 0 to 3, of addresses of eight bytes, as all writers use.
 _END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
 _VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
@@ -26,7 +30,7 @@ _USER_BLOCK: Final = 512  # MATLAB puts it before the file
 
 
 def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
-    """FormatError where a file has not the size it says, or the library would crash on it.
+    """FormatError where a file has not the size it says, is beyond the bounds, or the library would crash on it.
 
     It is read once in a child process, of limited time, so many seconds and one for each 100 kB: what ends that one
     would end this one, or never end.
@@ -34,21 +38,28 @@ def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
     _check_size_of_file(file, source)
     if not hasattr(os, "fork"):
         return
+    reading, told = os.pipe()
     child = os.fork()
     if child == 0:
-        _read_and_exit(file, seconds)
+        _read_and_exit(file, source, seconds, told)
+    os.close(told)
+    with os.fdopen(reading, encoding="utf-8", errors="surrogateescape") as pipe:
+        message = pipe.read()
     _, status = os.waitpid(child, 0)
+    if message:
+        raise FormatError(message)
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
         what = "did not finish reading it" if number == signal.SIGXCPU else f"crashed on it (signal {number})"
         raise FormatError(f"{source}: the HDF5 library {what}; the file is damaged, copy it again")
 
 
-def check_size(dataset: h5py.Dataset, source: str) -> None:
-    """FormatError if the data of a dataset is not all there; unwritten chunks would read as zeros."""
+def check_data(dataset: h5py.Dataset, source: str) -> None:
+    """FormatError if data of a dataset are not there, which would read as zeros, or of a type that nothing writes."""
+    _check_type(dataset, source)
     stored = dataset.id.get_storage_size()
-    if dataset.nbytes > _DENSEST * max(stored, 4096):
-        raise FormatError(f"{source}: {dataset.name} has shape {dataset.shape} but {stored} bytes; the file is damaged")
+    if too_much := unpacked_beyond(stored, dataset.nbytes):
+        raise FormatError(f"{source}: {dataset.name} becomes {too_much}")
     if dataset.size and not stored:
         raise FormatError(f"{source}: {dataset.name} was never written; choose another dataset or copy the file again")
     if dataset.chunks and dataset.size:
@@ -63,6 +74,39 @@ def check_size(dataset: h5py.Dataset, source: str) -> None:
                 f"{source}: {dataset.name} has {inside} of {expected} chunks of its data; the file is damaged or was "
                 "not written to its end"
             )
+
+
+def _check_type(dataset: h5py.Dataset, source: str) -> None:
+    """FormatError for numbers of a type that HDF5 does not define: a changed byte in it would change them all."""
+    for kind in _numbers(dataset.id.get_type()):
+        if not any(kind.equal(standard) for standard in _standard_types()):
+            raise FormatError(
+                f"{source}: {dataset.name} has numbers of {kind.get_size()} bytes that are no standard type of HDF5; "
+                "the file is damaged, copy it again, or write it with a standard type"
+            )
+
+
+def _numbers(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
+    """Types of the numbers in a type, which may be made of others."""
+    import h5py
+
+    if isinstance(kind, h5py.h5t.TypeCompoundID):
+        for member in range(kind.get_nmembers()):
+            yield from _numbers(kind.get_member_type(member))
+    elif isinstance(kind, h5py.h5t.TypeArrayID | h5py.h5t.TypeEnumID):
+        yield from _numbers(kind.get_super())
+    elif isinstance(kind, h5py.h5t.TypeAtomicID) and kind.get_class() in (h5py.h5t.INTEGER, h5py.h5t.FLOAT):
+        yield kind
+
+
+@cache
+def _standard_types() -> tuple[h5py.h5t.TypeID, ...]:
+    import h5py
+
+    names = [f"IEEE_F{bits}" for bits in (16, 32, 64)] + [
+        f"STD_{sign}{bits}" for sign in "IU" for bits in (8, 16, 32, 64)
+    ]
+    return tuple(getattr(h5py.h5t, name + order) for name in names for order in ("LE", "BE"))
 
 
 def _check_size_of_file(file: BinaryIO, source: str) -> None:
@@ -86,8 +130,8 @@ def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
     return head, file.seek(0, os.SEEK_END)
 
 
-def _read_and_exit(file: BinaryIO, seconds: int) -> None:
-    """Read all that could crash the library: what describes the data, and data in chunks; errors are not for here."""
+def _read_and_exit(file: BinaryIO, source: str, seconds: int, told: int) -> None:
+    """Read all that could crash the library; what is beyond the bounds is ``told``, other errors are not for here."""
     try:
         import faulthandler
         import resource
@@ -98,20 +142,32 @@ def _read_and_exit(file: BinaryIO, seconds: int) -> None:
         _, most = resource.getrlimit(resource.RLIMIT_CPU)
         resource.setrlimit(resource.RLIMIT_CPU, (limit if most < 0 else min(limit, most), most))
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-        _read(file)
+        _read(file, source)
+    except FormatError as error:
+        os.write(told, str(error).encode(errors="surrogateescape"))
     finally:
         os._exit(0)
 
 
-def _read(file: BinaryIO) -> None:
+def _read(file: BinaryIO, source: str) -> None:
+    """Read what describes the data, and data in chunks; FormatError where there is more than the bounds allow."""
     import h5py
 
+    size, unpacked = _head_and_size(file)[1], 0
+
     def visit(name: bytes, info: h5py.h5o.ObjInfo) -> None:
+        nonlocal unpacked
+        if too_deep := beyond("DEPTH", name.count(b"/")):
+            raise FormatError(f"{source}: its data lie in {too_deep}")
         if info.type == h5py.h5o.TYPE_DATASET:
             dataset = h5py.h5d.open(opened.id, name)
             if dataset.get_create_plist().get_layout() == h5py.h5d.CHUNKED:
-                check_size(h5py.Dataset(dataset), "")
-                h5py.Dataset(dataset)[()]
+                unpacked += h5py.Dataset(dataset).nbytes
+                if too_much := unpacked_beyond(size, unpacked):
+                    raise FormatError(f"{source}: its packed data become {too_much}")
+                with suppress(Exception):
+                    check_data(h5py.Dataset(dataset), "")
+                    h5py.Dataset(dataset)[()]
 
     with h5py.File(file, "r") as opened:
         h5py.h5o.visit(opened.id, visit, info=True)

@@ -17,7 +17,7 @@ import numpy as np
 from d2rpick.errors import FormatError, listing, printable
 from d2rpick.histories.database import DIGITS, SolverFile
 from d2rpick.histories.formats.hdf5_columns import Column, columns_of, finite
-from d2rpick.histories.formats.hdf5_damage import check_file, check_size
+from d2rpick.histories.formats.hdf5_damage import check_data, check_file
 from d2rpick.histories.formats.order import not_a_restart
 from d2rpick.histories.history import Part, Precision
 from d2rpick.histories.names import near_miss, refuse_other_quantity
@@ -197,12 +197,12 @@ class PartGroup:
         group = opened[name]
         self.title = _line(group, "title")
         self.version = " ".join(text for text in (_line(group, "version"), _line(group, "revision")) if text)
-        check_size(group["time"], source)
+        check_data(group["time"], source)
         self.time: Samples = finite(group["time"][()], f"{name}/time", source).reshape(-1)
         self.channels: tuple[str, ...] = ()
         self.parts: tuple[Part, ...] = ()
         if "ids" in group:
-            self.parts = _parts(group)
+            self.parts = _parts(group, source)
         else:
             self.channels = tuple(
                 column.path
@@ -236,16 +236,18 @@ class PartGroup:
     def _load(self, group: h5py.Group, name: str, shape: tuple[int, ...]) -> Samples:
         """Dataset ``name``, which may lack the axes of length 1 of ``shape``."""
         dataset = group[name]
-        check_size(dataset, self._source)
+        check_data(dataset, self._source)
         if [size for size in dataset.shape if size != 1] != [size for size in shape if size != 1]:
             raise FormatError(f"{self._source}: {dataset.name} has shape {dataset.shape}, {shape} was expected")
         return finite(dataset[()], dataset.name, self._source).reshape(shape)
 
 
-def _parts(group: h5py.Group) -> tuple[Part, ...]:
+def _parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
     """Parts in the order of the columns; titles by ``legend_ids``, which may be in another order."""
+    check_data(group["ids"], source)
     titles: dict[int, str] = {}
     if "legend" in group and "legend_ids" in group:
+        check_data(group["legend_ids"], source)
         ids = np.ravel(group["legend_ids"][()])
         legend = b"".join(np.ravel(group["legend"][()]).tolist())
         size, rest = divmod(len(legend), max(1, ids.size))

@@ -6,6 +6,7 @@ from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.bounds import beyond, long_line
 from d2rpick.errors import FormatError
 from d2rpick.histories.content import Content
 
@@ -36,13 +37,14 @@ _PORTIONS: Final = Portions()
 class Text:
     """Lines of a file, line ends as line feeds; ``unended`` is the last one when it has no end, else empty.
 
-    A big file in plain ASCII stays on its disk.  FormatError for binary data.
+    A big file in plain ASCII stays on its disk.  FormatError for binary data, and for a line beyond the bound.
     """
 
     def __init__(self, source: Source, portions: Portions = _PORTIONS) -> None:
         self.name, self._portions = source.name, portions
         self._data, self._encoding = _plain(source, portions.piece)
-        self._end = self._data.rfind(b"\n", len(self._data)) + 1  # behind the last line that counts
+        self._check_lines()
+        self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1  # behind the last line that counts
         self.unended = self._text(self._data[self._end :])
 
     @property
@@ -103,7 +105,7 @@ class Text:
             starts.append(first)
             first = data.find(b"\n", first) + 1 or end
         for _ in range(count):
-            last = data.rfind(b"\n", max(last - 1, 0)) + 1
+            last = data.rfind(b"\n", 0, max(last - 1, 0)) + 1
             starts.append(last)
         between = ((first * (count - i) + last * i) // count for i in range(count))
         starts += (data.find(b"\n", at) + 1 for at in between)
@@ -111,6 +113,12 @@ class Text:
         lines = [self._text(data[at : to if to >= 0 else end]) for at, to in spans]
         data.check()
         return lines
+
+    def _check_lines(self) -> None:
+        at, piece = long_line(self._data), self._portions.piece
+        if at >= 0:
+            line = 1 + sum(self._data[begin : min(begin + piece, at)].count(b"\n") for begin in range(0, at, piece))
+            raise FormatError(f"{self.name}:{line}: the line has {beyond('LINE')}")
 
     def _text(self, data: bytes) -> str:
         return data.decode(self._encoding)

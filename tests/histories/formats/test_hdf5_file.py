@@ -26,6 +26,8 @@ from tests.hdf5_files import ENERGY, KINETIC, LAYOUTS, PARTS, TIME, lasso, plain
 from tests.reading import history_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from d2rpick.histories.history import History
 
 
@@ -147,7 +149,7 @@ def test_shape_far_too_large_for_the_file_is_refused() -> None:
         file.create_dataset("internal_energy", (4,), "f8")
         file.create_dataset("t", (10**12,), "f8", chunks=(1000,))
 
-    with pytest.raises(FormatError, match="the file is damaged"):
+    with pytest.raises(FormatError, match="is the file damaged"):
         read(written(write), "internal_energy", time="t")
 
 
@@ -205,6 +207,56 @@ def test_chunks_that_were_never_written_are_no_zeros() -> None:
         read(written(unfinished), "later")
     with pytest.raises(FormatError, match="/never was never written"):
         read(written(unfinished), "never")
+
+
+def odd_float() -> h5py.h5t.TypeFloatID:
+    """A double whose exponents count from elsewhere: all its numbers are four times as large."""
+    kind = h5py.h5t.IEEE_F64LE.copy()
+    kind.set_ebias(1021)
+    return kind
+
+
+def odd_integer() -> h5py.h5t.TypeIntegerID:
+    """An integer of which only 24 bits count."""
+    kind = h5py.h5t.STD_I32LE.copy()
+    kind.set_precision(24)
+    return kind
+
+
+@pytest.mark.parametrize("kind", [odd_float, odd_integer])
+def test_numbers_of_no_standard_type_are_refused(kind: Callable[[], h5py.h5t.TypeID]) -> None:
+    pair = h5py.h5t.create(h5py.h5t.COMPOUND, 32)
+    pair.insert(b"t", 0, h5py.h5t.IEEE_F64LE)
+    pair.insert(b"ie", 16, kind())
+
+    def write(file: h5py.File, name: bytes, of: h5py.h5t.TypeID) -> None:
+        h5py.h5d.create(file.id, name, of, h5py.h5s.create_simple((TIME.size,)))
+        file[name.decode()].write_direct(np.zeros(TIME.size, file[name.decode()].dtype))
+
+    def alone(file: h5py.File) -> None:
+        write(file, b"time", kind())
+        file["internal_energy"] = ENERGY
+
+    def together(file: h5py.File) -> None:
+        write(file, b"run", pair)
+
+    def saved_ids(file: h5py.File) -> None:
+        lasso(file)
+        del file["matsum/ids"]
+        write(file["matsum"], b"ids", kind())
+
+    for damaged in (alone, together, saved_ids):
+        with pytest.raises(FormatError, match=r"numbers of [48] bytes that are no standard type of HDF5"):
+            read(written(damaged))
+
+
+@pytest.mark.parametrize("kind", [">f8", "<f4", ">f4", "<f2", "i1", ">i2", "<i4", ">i8", "u1", "<u2", ">u4", "<u8"])
+def test_numbers_of_every_standard_type_are_read(kind: str) -> None:
+    def write(file: h5py.File) -> None:
+        file["time"], file["internal_energy"] = np.arange(9).astype(kind), (np.arange(9) % 5).astype(kind)
+
+    history = read(written(write))
+    assert (history.time.tolist(), history.energy.tolist()) == ([*range(9)], [i % 5 for i in range(9)])
 
 
 def test_a_flipped_bit_in_data_with_a_checksum_is_refused() -> None:
