@@ -33,7 +33,7 @@ _MOST_HIDDEN: Final = 0.01
 # noise, and the sign is unclear.
 _OFF: Final = 0.2
 _MOST_OFF: Final = 0.5  # of the samples
-_ROUNDS: Final = 4  # in which the stretch that is fitted grows
+_ROUNDS: Final = 4  # in which the stretch that is fitted comes to hold all that is clear
 # Modes of a part's own can imitate what crosses between modes in its energy: they must leave so much less.
 _CLEARLY: Final = 0.5
 
@@ -74,14 +74,15 @@ def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None
         waves = fit
         modelled = waves.amplitudes(time)[0]
         miss = (np.abs(modelled) - root) ** 2
-        off = _means(miss, width) > _OFF * waves.vibration_energy(time)
-        clear = _longest(~off)
-        if clear.stop - clear.start <= stretch.stop - stretch.start:
+        missed = _means(miss, width) > _OFF * waves.vibration_energy(time)
+        off = _means(missed, width) * width > 0.5  # and beside it, where the mean still holds much that is right
+        fitted, stretch = stretch, _longest(~off)
+        if stretch == fitted:
             break
-        stretch, deformation = clear, np.copysign(root, modelled)
+        deformation = np.copysign(root, modelled)
     if np.mean(off) > _MOST_OFF or miss[~off].sum() > _MOST_LEFT * (root[~off] ** 2).sum():
         return None
-    hidden = hidden_share(time[stretch], root[stretch] ** 2, waves)
+    hidden = hidden_share(time[fitted], root[fitted] ** 2, waves)
     return PartMotion(waves, time[off], hidden) if hidden <= _MOST_HIDDEN else None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -38,21 +39,16 @@ class Unsigned(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SignedParts:
-    """Signed deformations of parts over ``time`` (n,), and what else of their vibration is known.
+    """Signed deformations of parts, and what else of their vibration is known.
 
     Parameters
     ----------
     names : tuple of str
-        Of the parts that have a sign.
-    deformation : array of shape (k, n)
-        Deformations, of which a part that bends in several planes has several; of one the sign as a whole is
-        arbitrary [sqrt(energy)].
-    owner : array of shape (k,)
-        Place in ``names`` of the part of each.
-    kinetic, hidden : array of shape (n,)
-        Kinetic energy of the vibration, and what of its energy further modes and other parts may have [energy].
-    unclear : array
-        Times at which the sign of some part may turn or not: no two times on different sides can be compared.
+        Of the k parts that have a sign.
+    motions : tuple of PartMotion
+        How each of them vibrates; of one deformation the sign as a whole is arbitrary.
+    time : array of shape (n,)
+        Of the states that they were read from [time].
     unsigned : tuple of Unsigned
         Parts that were left out.
     unsigned_share : float
@@ -60,12 +56,8 @@ class SignedParts:
     """
 
     names: tuple[str, ...]
+    motions: tuple[PartMotion, ...]
     time: Samples
-    deformation: Samples
-    owner: Places
-    kinetic: Samples
-    hidden: Samples
-    unclear: Samples
     unsigned: tuple[Unsigned, ...]
     unsigned_share: float
 
@@ -74,40 +66,46 @@ class SignedParts:
         """Whether enough of the energy lies in parts that have a sign."""
         return bool(self.names) and self.unsigned_share <= MOST_UNSIGNED
 
+    @cached_property
+    def owner(self) -> Places:
+        """Place in ``names`` of the part of each deformation: one that bends in several planes has several."""
+        return np.repeat(np.arange(len(self.names)), [len(one.model.amplitudes(0.0)) for one in self.motions])
+
+    @cached_property
+    def unclear(self) -> Samples:
+        """Times where the sign of some part may turn or not: no two times on different sides can be compared."""
+        return np.sort(np.concatenate([np.zeros(0), *(one.unclear for one in self.motions)]))
+
     def amplitudes(self, t: Samples | float) -> Samples:
         """Signed deformations, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
-        return self._between(self.deformation, t)
+        return np.concatenate([one.model.amplitudes(t) for one in self.motions])
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
         """Kinetic energy of the vibration, T [energy]."""
-        return self._between(self.kinetic, t)
+        return np.sum([one.model.kinetic_energy(t) for one in self.motions], axis=0)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Energy of the vibration, V = E + T [energy]."""
-        return np.asarray(np.sum(self.amplitudes(t) ** 2, axis=0)) + self.kinetic_energy(t)
+        return np.sum([one.model.vibration_energy(t) for one in self.motions], axis=0)
+
+    def hidden_energy(self, t: Samples | float) -> Samples:
+        """Vibration energy that further modes, and the parts that were left out, may have [energy]."""
+        beside = self.unsigned_share / (1 - self.unsigned_share)
+        return np.sum([(one.hidden + beside) * one.model.vibration_energy(t) for one in self.motions], axis=0)
 
     def sunk(self, t: float) -> bool:
         """Whether the energy of the vibration is below a solver's errors at ``t``."""
-        highest = float(np.max(np.sum(self.deformation**2, axis=0)))
-        return bool(self.vibration_energy(t) < _SOLVER_FLOOR * highest)
+        return bool(self.vibration_energy(t) < _SOLVER_FLOOR * np.max(self.vibration_energy(self.time)))
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
-        """Largest residual of each tr of shape (n,) if what may be hidden stood opposed at tr and td [-]."""
-        apart = np.sqrt(self._between(self.hidden, tr)) + np.sqrt(self._between(self.hidden, td))
+        """Largest residual of each tr of shape (n,), if what may be hidden stood opposed at tr and td [-]."""
+        apart = np.sqrt(self.hidden_energy(tr)) + np.sqrt(self.hidden_energy(td))
         return np.asarray(np.sqrt(residual**2 + apart**2 / self.vibration_energy(td)))
 
     def comparable_since(self, td: float) -> float:
         """Earliest time whose signs can be compared with those at ``td`` [time]."""
         before = self.unclear[self.unclear < td]
         return float(before[-1] if before.size else self.time[0])
-
-    def _between(self, values: Samples, t: Samples | float) -> Samples:
-        """Values over ``time``, along the last axis, at ``t``, linear between the states."""
-        time = np.clip(t, self.time[0], self.time[-1])
-        cell = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, self.time.size - 2)
-        left, right = values[..., cell], values[..., cell + 1]
-        slope = (right - left) / (self.time[cell + 1] - self.time[cell])
-        return np.asarray(left + slope * (time - self.time[cell]))
 
 
 def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> SignedParts:
@@ -129,7 +127,7 @@ def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Signed
     >>> found = read_parts(t, np.stack([one**2, other**2, other**2 + 1], axis=1), ["one", "other", "third"])
     >>> found.names, [part.name for part in found.unsigned]
     (('one', 'other'), ['third'])
-    >>> bool(np.abs(np.abs(found.deformation[0] @ one) - one @ one) < 1e-6)
+    >>> bool(np.abs(np.abs(found.amplitudes(t)[0] @ one) - one @ one) < 1e-6)
     True
     """
     roots = np.sqrt(np.maximum(energies.T, 0.0), order="C")
@@ -150,32 +148,12 @@ def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Signed
         else:
             reasons[i] = reason or _NOT_FOLLOWED
             lost += held[i]
-    return _signed_parts(
-        time,
-        {names[i]: found[i] for i in sorted(found)},
-        tuple(Unsigned(names[i], reasons[i]) for i in sorted(reasons)),
-        float(lost / held.sum()) if lost else float(not held.any()),
-    )
-
-
-def _signed_parts(
-    time: Samples, motions: dict[str, PartMotion], unsigned: tuple[Unsigned, ...], unsigned_share: float
-) -> SignedParts:
-    """Put what is known of each part together; others may have their share of the energy."""
-    rows = [motion.model.amplitudes(time) for motion in motions.values()]
-    energies = [motion.model.vibration_energy(time) for motion in motions.values()]
-    hidden = [motion.hidden * energy for motion, energy in zip(motions.values(), energies, strict=True)]
-    beside = unsigned_share / (1 - unsigned_share) if unsigned_share < 1 else 0.0
     return SignedParts(
-        names=tuple(motions),
+        names=tuple(names[i] for i in sorted(found)),
+        motions=tuple(found[i] for i in sorted(found)),
         time=time,
-        deformation=np.concatenate([np.zeros((0, time.size)), *rows]),
-        owner=np.repeat(np.arange(len(rows)), [len(row) for row in rows]),
-        kinetic=np.sum([motion.model.kinetic_energy(time) for motion in motions.values()], axis=0),
-        hidden=np.sum(hidden, axis=0) + beside * np.sum(energies, axis=0),
-        unclear=np.sort(np.concatenate([np.zeros(0), *(motion.unclear for motion in motions.values())])),
-        unsigned=unsigned,
-        unsigned_share=unsigned_share,
+        unsigned=tuple(Unsigned(names[i], reasons[i]) for i in sorted(reasons)),
+        unsigned_share=float(lost / held.sum()) if lost else float(not held.any()),
     )
 
 

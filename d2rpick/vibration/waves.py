@@ -112,7 +112,8 @@ def _fit(space: Samples, step: float, time: Samples, deformation: Samples) -> tu
     rates = np.minimum(rates.real, 0.0) + 1j * rates.imag  # noise lets a free vibration grow
     waves = np.exp(np.multiply.outer(time - time[0], rates))
     basis = np.hstack([waves.real, -waves.imag])
-    found = np.linalg.lstsq(basis, deformation, rcond=None)[0]
+    weight = np.abs(deformation)  # what is off in an energy is off by so much less in its root
+    found = np.linalg.lstsq(basis * weight[:, np.newaxis], deformation * weight, rcond=None)[0]
     rest = deformation - basis @ found
     weights = found[: rates.size] + 1j * found[rates.size :]
     return float(rest @ rest), Waves(rates, weights, float(time[0]))

@@ -46,17 +46,15 @@ def history(motion: Motion, noise: float = 0.0) -> History:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("noise", [0.0, 2e-3])
-@pytest.mark.parametrize("share", [0.003, 0.03, 0.2, 0.45])
+@pytest.mark.parametrize(("share", "noise"), [(0.003, 0.0), (0.03, 0.0), (0.03, 2e-3), (0.45, 2e-3)])
 def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(share: float, noise: float) -> None:
-    truth = planes(share)
-    for td in (0.2072, 0.31):
-        answer = suggest(history(truth, noise), td, Settings(after=0.0))
-        assert answer.situation.basis == "parts"
-        for one in answer.candidates[:6]:
-            assert one.residual is not None
-            assert one.residual_high is not None
-            assert one.residual - 0.05 <= truth.residual(one.tr, td) <= one.residual_high + 0.05
+    truth, td = planes(share), 0.31
+    answer = suggest(history(truth, noise), td, Settings(after=0.0))
+    assert answer.situation.basis == "parts"
+    for one in answer.candidates[:6]:
+        assert one.residual is not None
+        assert one.residual_high is not None
+        assert one.residual - 0.05 <= truth.residual(one.tr, td) <= one.residual_high + 0.05
 
 
 def test_minima_that_stay_above_zero_prove_no_sign() -> None:
@@ -72,7 +70,7 @@ def test_minima_that_stay_above_zero_prove_no_sign() -> None:
 def test_what_a_second_plane_may_hold_unseen_widens_the_residual() -> None:
     small = read_parts(TIME, planes(5e-4).energies(TIME), NAMES)
     assert small.names == NAMES
-    assert len(small.deformation) == 2  # taken for one plane
+    assert small.owner.size == 2  # taken for one plane
     tr, td = np.array([0.05, 0.1]), 0.2072
     told = np.sqrt(np.sum((small.amplitudes(tr).T - small.amplitudes(td)) ** 2, axis=1) + small.kinetic_energy(td))
     told /= np.sqrt(small.vibration_energy(td))
