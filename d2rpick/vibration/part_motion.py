@@ -75,7 +75,9 @@ def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None
         modelled = waves.amplitudes(time)[0]
         miss = (np.abs(modelled) - root) ** 2
         missed = _means(miss, width) > _OFF * waves.vibration_energy(time)
-        off = _means(missed, width) * width > 0.5  # and beside it, where the mean still holds much that is right
+        off = (
+            _means(missed.astype(np.float64), width) * width > 0.5
+        )  # and beside it, where the mean still holds much that is right
         fitted, stretch = stretch, _longest(~off)
         if stretch == fitted:
             break

@@ -82,16 +82,18 @@ class SignedParts:
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
         """Kinetic energy of the vibration, T [energy]."""
-        return np.sum([one.model.kinetic_energy(t) for one in self.motions], axis=0)
+        return np.asarray(np.sum([one.model.kinetic_energy(t) for one in self.motions], axis=0))
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Energy of the vibration, V = E + T [energy]."""
-        return np.sum([one.model.vibration_energy(t) for one in self.motions], axis=0)
+        return np.asarray(np.sum([one.model.vibration_energy(t) for one in self.motions], axis=0))
 
     def hidden_energy(self, t: Samples | float) -> Samples:
         """Vibration energy that further modes, and the parts that were left out, may have [energy]."""
         beside = self.unsigned_share / (1 - self.unsigned_share)
-        return np.sum([(one.hidden + beside) * one.model.vibration_energy(t) for one in self.motions], axis=0)
+        return np.asarray(
+            np.sum([(one.hidden + beside) * one.model.vibration_energy(t) for one in self.motions], axis=0)
+        )
 
     def sunk(self, t: float) -> bool:
         """Whether the energy of the vibration is below a solver's errors at ``t``."""

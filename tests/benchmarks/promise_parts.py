@@ -127,14 +127,18 @@ def records(kind: str, seed: int, number: int) -> Iterator[Record]:
         energies = np.maximum(energies + spread * energies.max() * rng.standard_normal(energies.shape), 0.0)
         digits = int(rng.choice([5, 8, 15]))
         energies = np.array([float(f"{value:.{digits}g}") for value in energies.ravel()]).reshape(energies.shape)
-        names = tuple(f"part {i + 1}" for i in range(energies.shape[1]))
-        history = History(
-            time, energies.sum(axis=1), source=("made",), format="csv", channel="sum", part_names=names,
-            part_energies=energies,
-        )  # fmt: skip
         first = float(time[-1] * rng.uniform(0.4, 0.9))
         last = float(time[-1] * 0.95) if rng.uniform() < 0.5 else first
-        yield Record(history, Settings(after=0.0), (first, last), motion.residual)
+        yield Record(history(time, energies), Settings(after=0.0), (first, last), motion.residual)
+
+
+def history(time: Samples, energies: Samples) -> History:
+    """Give parts the energies, shape (n, k), as a file of them is read."""
+    names = tuple(f"part {i + 1}" for i in range(energies.shape[1]))
+    return History(
+        time, energies.sum(axis=1), source=("made",), format="csv", channel="sum", part_names=names,
+        part_energies=energies,
+    )  # fmt: skip
 
 
 class Stated(NamedTuple):

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
 from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.histories.history import History
 from d2rpick.vibration.part_motion import by_own_modes, followed
 from d2rpick.vibration.part_signs import read_parts
 from d2rpick.vibration.part_zeros import all_zeros
-from tests.benchmarks.promise_parts import Motion
+from tests.benchmarks.promise_parts import Motion, history
 from tests.records import noisy
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import History
 
 TIME = np.arange(0, 0.4, 4e-4)
 NAMES = ("A", "B")
@@ -37,19 +41,15 @@ def grouped() -> Motion:
     )
 
 
-def history(motion: Motion, noise: float = 0.0) -> History:
+def written(motion: Motion, noise: float = 0.0) -> History:
     energies = motion.energies(TIME)
-    energies = np.maximum(np.stack([noisy(row, noise, seed=2) for row in energies.T], axis=1), 0.0)
-    return History(
-        TIME, energies.sum(axis=1), source=("made",), format="csv", channel="sum", part_names=NAMES,
-        part_energies=energies,
-    )  # fmt: skip
+    return history(TIME, np.maximum(np.stack([noisy(row, noise, seed=2) for row in energies.T], axis=1), 0.0))
 
 
 @pytest.mark.parametrize(("share", "noise"), [(0.003, 0.0), (0.03, 0.0), (0.03, 2e-3), (0.45, 2e-3)])
 def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(share: float, noise: float) -> None:
     truth, td = planes(share), 0.31
-    answer = suggest(history(truth, noise), td, Settings(after=0.0))
+    answer = suggest(written(truth, noise), td, Settings(after=0.0))
     assert answer.situation.basis == "parts"
     for one in answer.candidates[:6]:
         assert one.residual is not None
@@ -85,11 +85,11 @@ def test_parts_of_several_springs_in_which_modes_mix_have_no_sign() -> None:
     parts = read_parts(TIME, grouped().energies(TIME), NAMES)
     assert parts.names == ("B",)
     assert [one.name for one in parts.unsigned] == ["A"]
-    assert examine(history(grouped()), 0.3, Settings(after=0.0)).basis != "parts"
+    assert examine(written(grouped()), 0.3, Settings(after=0.0)).basis != "parts"
 
 
 def test_the_share_of_a_part_is_that_of_all_its_modes() -> None:
-    answer = suggest(history(planes(0.2)), 0.31, Settings(after=0.0))
+    answer = suggest(written(planes(0.2)), 0.31, Settings(after=0.0))
     for one in answer.candidates[:5]:
-        assert sorted(part.name for part in one.parts) == ["A", "B"]
+        assert sorted(part.name for part in one.parts) == ["part 1", "part 2"]
         assert sum(part.share or 0.0 for part in one.parts) == pytest.approx(1)
