@@ -47,7 +47,7 @@ class Candidate(NamedTuple):
     parts or modes come closest, "start" of a flight in which nothing vibrates ("given" for a pair to be verified).
     ``acceptable``: in the flight, same sign, error within tolerance; else ``notes`` say why not.  ``run_time_share``:
     expected run time over that of the reference.  ``same_swing``: the energy turns less than twice from tr to td, so
-    that hardly anything is saved.  ``residual_high``: how large the residual may be if what the oscillator leaves over
+    that hardly anything is saved.  ``residual_high``: how large the residual may be if what the model leaves over
     is a further mode.  ``parts``: what each part has of the mismatch, empty where single parts are not known.
     ``position_error``: how far a body is out of place at td [length], because ``position_error_part`` is frozen
     elsewhere; of several bodies the largest, ``position_error_body`` has the parts of that one.
@@ -322,7 +322,8 @@ def _remarks(situation: Situation, reach: float, known: Measured | None, parts: 
 
         yield f"mismatch of {main_contributors(parts)}"
     if known and known.residual_high > known.residual + MUCH_HIGHER:
-        yield f"residual up to {known.residual_high:.2g} if what the oscillator leaves over is a further mode"
+        model = "modes of the parts leave" if parts else "oscillator leaves"
+        yield f"residual up to {known.residual_high:.2g} if what the {model} over is a further mode"
     if known and reach > known.timing_tolerance:
         yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known.timing_tolerance:.2g}"
     if known is None and reach >= situation.history.step:

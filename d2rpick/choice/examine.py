@@ -13,7 +13,7 @@ from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.histories.samples import window
 from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.identify import Identification, identify, identify_several, judge_given
-from d2rpick.vibration.model import Evidence, energy_at
+from d2rpick.vibration.model import Evidence
 from d2rpick.vibration.one_mode import LARGEST_ENERGY
 from d2rpick.vibration.second_mode import resolved
 from d2rpick.vibration.span import Span, described_span, identify_within, span_of
@@ -55,7 +55,7 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
         # without a sign of the next contact nothing is known of what comes after td
         end = flight.end or (float(history.time[-1]) if flying or span else td)
         start = min(td, float(history.time[0]) if flight.start is None else flight.start)
-        evidence = _with_parts(evidence, history, td, Span(start, end), fits)
+        evidence = _with_parts(evidence, history, Span(start, end), fits)
     return Situation(history, td, settings, flight, evidence, fits)
 
 
@@ -93,16 +93,14 @@ def _resolved(history: History, fit: Identification, fits: Fits) -> Identificati
     return fits.once(("resolved", fit.start, fit.end, fit.rms), lambda: resolved(*window, fit))
 
 
-def _with_parts(evidence: Evidence, history: History, td: float, within: Span, fits: Fits) -> Evidence:
+def _with_parts(evidence: Evidence, history: History, within: Span, fits: Fits) -> Evidence:
     """Add what the energies of single parts tell of the flight."""
-    from d2rpick.vibration.envelope import upper_envelope
-    from d2rpick.vibration.part_signs import PartVibration, read_parts
+    from d2rpick.vibration.part_signs import read_parts
 
     assert history.part_energies is not None
-    time, energy = history.between(*within)
+    time, _ = history.between(*within)
     if time.size < 3:
         return evidence
     energies = history.part_energies[window(history.time, *within)]
     parts = fits.once(("parts", *within), lambda: read_parts(time, energies, history.part_names))
-    whole = energy_at(history, td, evidence).mode or upper_envelope(time, energy)
-    return evidence._replace(parts=parts, signed=PartVibration(parts, whole) if parts.signed and whole else None)
+    return evidence._replace(parts=parts)

@@ -116,7 +116,7 @@ class Situation:
     def sees_as(self, other: Situation) -> bool:
         """Whether the two, of one record, have one flight and one evidence: then only their td differ."""
         own, its = self.evidence, other.evidence
-        same = own.fit is its.fit and own.parts is its.parts and own.signed is its.signed
+        same = own.fit is its.fit and own.parts is its.parts
         return same and own.span == its.span and self.flight == other.flight
 
     def at(self, td: float) -> Situation:

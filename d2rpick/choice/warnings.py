@@ -73,7 +73,7 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
 def _of_parts(situation: Situation) -> Iterator[Caution]:
     vibration = situation.vibration
     if vibration.estimated:
-        found = f"the kinetic share is an estimate from the envelope of the energy: {vibration.estimated}"
+        found = f"the kinetic share is the sum over the modes found in each part: {vibration.estimated}"
         yield Caution("kinetic-share-estimated", found)
     for part in vibration.unsigned:
         yield Caution("part-without-sign", f"{part.name} was left out: {part.reason}")

@@ -69,7 +69,7 @@ def _basis(situation: Situation) -> str:
     fit, vibration = situation.evidence.fit, situation.vibration
     mode, parts = vibration.mode, f"parts, signs of {', '.join(vibration.signed)}" if vibration.signed else ""
     if not (mode and fit):
-        return f"{parts}; vibration energy estimated from the envelope of the energy" if parts else vibration.basis
+        return f"{parts}; kinetic energy from the modes of each part" if parts else vibration.basis
     rates = ", ".join(f"{one.omega:.6g}" for one in mode.modes)
     facts = [f"omega {rates}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}

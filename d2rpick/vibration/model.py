@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.moments import Moment, Moments
     from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.part_shares import PartMatch
-    from d2rpick.vibration.part_signs import PartVibration, SignedParts, Unsigned
+    from d2rpick.vibration.part_signs import SignedParts, Unsigned
     from d2rpick.vibration.span import Span
 
 
@@ -111,7 +111,7 @@ class Evidence(NamedTuple):
 
     ``fit`` is None only where no oscillator was looked for; ``span`` is the window in which it describes the record.
     ``given``: the oscillator was given; ``prescribed``: it, or the window to identify it in.  ``parts`` are the
-    deformations of single parts, ``signed`` is their vibration, where they have a sign.
+    deformations of single parts, as far as they have a sign.
     """
 
     fit: Identification | None = None
@@ -119,7 +119,11 @@ class Evidence(NamedTuple):
     given: bool = False
     prescribed: bool = False
     parts: SignedParts | None = None
-    signed: PartVibration | None = None
+
+    @property
+    def signed(self) -> SignedParts | None:
+        """The parts, where enough of the energy has a sign."""
+        return self.parts if self.parts and self.parts.signed else None
 
     @property
     def has_model(self) -> bool:
@@ -131,13 +135,13 @@ class Evidence(NamedTuple):
 def model_at(history: History, td: float, evidence: Evidence) -> Vibration:
     """Give the best model that can be relied on at ``td``."""
     whole, signed = energy_at(history, td, evidence), evidence.signed
-    sunk = signed is not None and signed.sunk(td)
+    sunk = signed is not None and isinstance(whole, OfEnergy) and signed.sunk(td)  # a model of the whole tells more
     if signed and not sunk:
         from d2rpick.vibration.of_parts import OfParts  # not above: a table has no parts
 
         return OfParts(whole, signed)
     if isinstance(whole, OfModes):
-        return whole.doubting((SUNK,)) if sunk else whole
+        return whole
     return whole.without_parts(evidence.parts, sunk=sunk)
 
 

@@ -55,10 +55,6 @@ class OfModes:
         self.fit, self.mode, self.span = fit, fit.mode, span
         self.doubts = doubts
 
-    def doubting(self, doubts: tuple[str, ...]) -> OfModes:
-        """Give the same with these doubts."""
-        return OfModes(self.history, self.td, self.fit, self.span, doubts)
-
     @cached_property
     def sunk(self) -> str | None:
         """Say so when the vibration at td is no more than the scatter of the record about it."""

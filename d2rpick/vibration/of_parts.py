@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.moments import Moments
     from d2rpick.vibration.of_energy import OfEnergy
     from d2rpick.vibration.one_mode import Mode
-    from d2rpick.vibration.part_signs import PartVibration, Unsigned
+    from d2rpick.vibration.part_signs import SignedParts, Unsigned
 
 
 class OfParts:
@@ -30,7 +30,7 @@ class OfParts:
     unknown = None
     undescribed = "the signs of the parts' deformations cannot be followed from here to td"
 
-    def __init__(self, whole: OfModes | OfEnergy, parts: PartVibration) -> None:
+    def __init__(self, whole: OfModes | OfEnergy, parts: SignedParts) -> None:
         self.whole, self.parts = whole, parts
 
     @property
@@ -51,12 +51,12 @@ class OfParts:
     @property
     def unsigned(self) -> tuple[Unsigned, ...]:
         """Parts without a sign."""
-        return self.parts.parts.unsigned
+        return self.parts.unsigned
 
     @property
     def signed(self) -> tuple[str, ...]:
         """Names of the parts with a sign."""
-        return self.parts.parts.names
+        return self.parts.names
 
     @property
     def mode(self) -> Mode | Modes | None:
@@ -92,12 +92,12 @@ class OfParts:
     @property
     def _comparable(self) -> tuple[float, float]:
         """First and last time whose signs can be compared with those at td [time]."""
-        return self.parts.parts.comparable_since(self.td), float(self.parts.parts.time[-1])
+        return self.parts.comparable_since(self.td), float(self.parts.time[-1])
 
     @cached_property
     def profile(self) -> Profile:
         """Lock-in error at the samples before td that can be compared with it."""
-        time = self.parts.parts.time
+        time = self.parts.time
         return Profile.of(self.parts, time[time >= self._comparable[0]], self.td)
 
     def moments(self, tolerance: float, since: float = -np.inf) -> list[Moment]:  # noqa: ARG002  they are few
@@ -120,10 +120,11 @@ class OfParts:
         lock_in = measures.lock_in_error(self.parts, tr, self.td)
         tolerance = self.profile.tolerances(tr, lock_in)
         residual = np.array([measures.residual(error, self.kinetic_share) for error in lock_in.tolist()])
+        highest = self.parts.residual_bound(residual, tr, self.td)
         found = iter(
             measures.measured(
                 self.parts, tr, self.td,
-                residual=residual, residual_high=residual, timing_tolerance=tolerance, of_parts=True,
+                residual=residual, residual_high=highest, timing_tolerance=tolerance, of_parts=True,
             )
         )  # fmt: skip
         return [next(found) if one else None for one in inside]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.vibration.part_signs import PartVibration
+    from d2rpick.vibration.part_signs import SignedParts
 
 # The parts that are named together make up this much of the mismatch.
 _MOST = 0.8
@@ -27,13 +29,13 @@ class PartMatch(NamedTuple):
     reason: str | None = None
 
 
-def contributions(vibration: PartVibration, tr: float, td: float) -> tuple[PartMatch, ...]:
+def contributions(vibration: SignedParts, tr: float, td: float) -> tuple[PartMatch, ...]:
     """Give the match of each part, that with the largest share first, then those without a sign."""
-    shares = measures.mismatch_shares(vibration, tr, td).tolist()
-    same = (vibration.amplitudes(tr) * vibration.amplitudes(td) >= 0).tolist()
-    matches = [PartMatch(*row) for row in zip(vibration.parts.names, same, shares, strict=True)]
+    shares = np.bincount(vibration.owner, measures.mismatch_shares(vibration, tr, td)).tolist()
+    same = np.bincount(vibration.owner, vibration.amplitudes(tr) * vibration.amplitudes(td)) >= 0
+    matches = [PartMatch(*row) for row in zip(vibration.names, same.tolist(), shares, strict=True)]
     matches.sort(key=lambda one: -(one.share or 0.0))
-    return (*matches, *(PartMatch(part.name, None, None, part.reason) for part in vibration.parts.unsigned))
+    return (*matches, *(PartMatch(part.name, None, None, part.reason) for part in vibration.unsigned))
 
 
 def main_contributors(matches: Sequence[PartMatch]) -> str:

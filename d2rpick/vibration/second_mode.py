@@ -14,12 +14,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.waves import Waves
 
 # Of n lines of white noise the strongest exceeds the mean power by ln n on average, and by this much more with a
 # probability of 0.7 %.
 _BEYOND_CHANCE: Final = 5.0
 # Share of the vibration energy: a smaller mode changes a residual by 0.06 at most, and real solvers leave as much.
-_SMALLEST: Final = 1e-3
+SMALLEST: Final = 1e-3
 _LEFT_OVER: Final = 0.5  # of a second mode's line, at least: of a nearby rate one mode takes up the other half
 _MOST_LINES: Final = 8192  # bounds the work; enough for 800 periods of the energy
 _FINER: Final = 4  # points per line of a spectrum, so that its top is met
@@ -50,7 +51,7 @@ def resolved(time: Samples, energy: Samples, fit: Identification) -> Identificat
     """
     assert fit.mode is not None
     spectrum = _spectrum(time, energy, fit.mode)
-    large = _share(spectrum) > _SMALLEST * _LEFT_OVER
+    large = _share(spectrum) > SMALLEST * _LEFT_OVER
     if isinstance(fit.mode, Mode) and large and float(np.max(spectrum.chance)) > _certain(time.size):
         two = identify_beside(time, energy, fit.mode, _strongest(spectrum) / 2 / (fit.end - fit.start))
         if two.describes_record and _explains(two, fit, time.size):
@@ -62,6 +63,11 @@ def resolved(time: Samples, energy: Samples, fit: Identification) -> Identificat
         fastest = fit.mode.modes[-1].vibration_energy(time[0])  # its rate may be an alias
         hidden += float(fastest / fit.mode.vibration_energy(time[0]))
     return fit._replace(hidden_share=min(hidden, 1.0))
+
+
+def hidden_share(time: Samples, energy: Samples, model: Mode | Modes | Waves) -> float:
+    """Share of the vibration energy that a further mode may have in what a model leaves over, at most 1 [-]."""
+    return min(_share(_spectrum(time, energy, model)), 1.0)
 
 
 def _share(spectrum: _Spectrum) -> float:
@@ -79,10 +85,10 @@ def _explains(two: Identification, one: Identification, n: int) -> bool:
     assert two.mode is not None
     energies = [float(mode.vibration_energy(two.start)) for mode in two.mode.modes]
     gain = n * (one.rms**2 - two.rms**2)  # a line of power x takes 2 x from the sum of squares
-    return min(energies) > _SMALLEST * sum(energies) and gain > 2 * _certain(n) * two.rms**2
+    return min(energies) > SMALLEST * sum(energies) and gain > 2 * _certain(n) * two.rms**2
 
 
-def _spectrum(time: Samples, energy: Samples, mode: Mode | Modes) -> _Spectrum:
+def _spectrum(time: Samples, energy: Samples, mode: Mode | Modes | Waves) -> _Spectrum:
     """Lines of what ``mode`` leaves over, from one period in the record to the fastest that the samples show."""
     span = float(time[-1] - time[0])
     count = min(time.size - 1, _MOST_LINES)

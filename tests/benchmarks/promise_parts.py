@@ -1,0 +1,210 @@
+"""What a good grade is worth on parts: random records, seeded, held against the exact motion of their modes.
+
+    python -m tests.benchmarks.promise_parts [N [SEED]]
+
+The motion is written down here in the coordinates of its modes, by no code of d2rpick.  Springs with one mode each;
+a free chain of masses whose springs, or groups of springs, are the parts, so that the modes mix in each; and a
+part that bends in two planes beside another one.  Damping is proportional to mass.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.choice.quality import GRADES
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.choice.suggest_td import suggest_in_window
+from d2rpick.histories.history import History
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from d2rpick.histories.history import Samples
+
+    Truth = Callable[[float, float], float]
+
+# A true residual beyond which a good grade is a broken promise, and up to which a pair is truly good.
+BAD: Final = 0.3
+_GOOD: Final = 0.2
+# Room that the stated range is given.
+_ROOM: Final = 0.05
+
+
+class Motion(NamedTuple):
+    """Vibration of m modes, ``exp(-alpha t/2) cos(rate t + phase)``, whose parts have the energies ``x' form x``.
+
+    ``rate`` and ``phase`` are of shape (m,), ``forms``, the stiffness of each of k parts in the modes, (k, m, m).
+    """
+
+    alpha: float
+    rate: Samples
+    phase: Samples
+    forms: Samples
+
+    def state(self, time: Samples | float) -> tuple[Samples, Samples]:
+        """Give coordinates and velocities over the undamped rates, both of the shape of ``time`` and an axis for m."""
+        angle, half = np.multiply.outer(time, self.rate) + self.phase, self.alpha / 2
+        decay = np.exp(-half * np.asarray(time))[..., np.newaxis]
+        own = np.hypot(self.rate, half)
+        return decay * np.cos(angle), -decay * (self.rate * np.sin(angle) + half * np.cos(angle)) / own
+
+    def energies(self, time: Samples) -> Samples:
+        """Energies of the parts, shape (n, k)."""
+        at = self.state(time)[0]
+        return np.asarray(np.einsum("ni,kij,nj->nk", at, self.forms, at))
+
+    def residual(self, tr: float, td: float) -> float:
+        """Energy norm of what the switched run lacks at td over that of the reference: modes are orthogonal in it."""
+        (before, _), (after, velocity) = self.state(tr), self.state(td)
+        stiffness = np.einsum("kii->i", self.forms)
+        lack, whole = (before - after) ** 2 + velocity**2, after**2 + velocity**2
+        return float(np.sqrt(stiffness @ lack / (stiffness @ whole)))
+
+
+class Record(NamedTuple):
+    """A history, the settings and window of td it is asked with, a single td as a window of no width, and the truth."""
+
+    history: History
+    settings: Settings
+    window: tuple[float, float]
+    residual: Truth
+
+
+def one_each(rng: np.random.Generator) -> Motion:
+    """Two or three parts with a mode each."""
+    count = int(rng.integers(2, 4))
+    return _planes(rng, [(i, energy) for i, energy in enumerate(rng.uniform(0.1, 1, count))])
+
+
+def mixed(rng: np.random.Generator) -> Motion:
+    """A free chain of three to six masses; each spring is a part, or, in a third of them, several springs are one."""
+    count = int(rng.integers(2, 6))
+    mass, spring = rng.uniform(0.3, 3, count + 1), rng.uniform(0.3, 3, count)
+    stretch = np.diff(np.eye(count + 1), axis=0) / np.sqrt(mass)
+    square, shapes = np.linalg.eigh(stretch.T @ (spring[:, np.newaxis] * stretch))
+    own = np.sqrt(square[1:]) * 2 * np.pi / np.sqrt(square[1])
+    amplitude = rng.uniform(0.2, 1, count) / own
+    rows = stretch @ shapes[:, 1:] * amplitude * np.sqrt(spring)[:, np.newaxis]
+    forms = np.einsum("si,sj->sij", rows, rows)
+    if rng.uniform() < 1 / 3:
+        forms = np.stack([forms[:-1].sum(axis=0), forms[-1]])
+    alpha = rng.uniform(0, 0.5)
+    return Motion(alpha, np.sqrt(own**2 - alpha**2 / 4), rng.uniform(0, 2 * np.pi, count), forms)
+
+
+def two_planes(rng: np.random.Generator) -> Motion:
+    """A part whose second plane holds 0.3 to 50 % of its energy, beside one with a mode, or with two planes too."""
+    modes = [(0, 1 - (share := 10 ** rng.uniform(-2.5, -0.3))), (0, share), (1, rng.uniform(0.1, 1))]
+    second = [(1, modes[-1][1] * 10 ** rng.uniform(-2.5, -0.3))] if rng.uniform() < 0.3 else []
+    return _planes(rng, [*modes, *second])
+
+
+def _planes(rng: np.random.Generator, modes: list[tuple[int, float]]) -> Motion:
+    """Modes that belong to a part, by its number, and have an energy."""
+    part, energy = (np.array(column) for column in zip(*modes, strict=True))
+    rate = 2 * np.pi * rng.uniform(1, 3.5, len(modes))
+    forms = np.array([np.diag(np.where(part == one, energy, 0.0)) for one in range(part.max() + 1)])
+    return Motion(rng.uniform(0, 0.5), rate, rng.uniform(0, 2 * np.pi, len(modes)), forms)
+
+
+CLASSES: Final = {"parts with one mode each": one_each, "parts with mixed modes": mixed, "two planes": two_planes}
+
+
+def records(kind: str, seed: int, number: int) -> Iterator[Record]:
+    """Give so many random records of a class: 4 to 14 slow periods, 20 to 150 states a fast one, some with noise."""
+    for one in range(number):
+        rng = np.random.default_rng([seed, list(CLASSES).index(kind), one])
+        motion = CLASSES[kind](rng)
+        last, states = rng.uniform(4, 14), np.exp(rng.uniform(np.log(20), np.log(150)))
+        time = np.arange(0, last, 2 * np.pi / motion.rate.max() / states)
+        energies = motion.energies(time)
+        spread = rng.choice([0.0, 0.0, 10 ** rng.uniform(-4, -2.3)])
+        energies = np.maximum(energies + spread * energies.max() * rng.standard_normal(energies.shape), 0.0)
+        digits = int(rng.choice([5, 8, 15]))
+        energies = np.array([float(f"{value:.{digits}g}") for value in energies.ravel()]).reshape(energies.shape)
+        first = float(time[-1] * rng.uniform(0.4, 0.9))
+        last = float(time[-1] * 0.95) if rng.uniform() < 0.5 else first
+        yield Record(history(time, energies), Settings(after=0.0), (first, last), motion.residual)
+
+
+def history(time: Samples, energies: Samples) -> History:
+    """Give parts the energies, shape (n, k), as a file of them is read."""
+    names = tuple(f"part {i + 1}" for i in range(energies.shape[1]))
+    return History(
+        time, energies.sum(axis=1), source=("made",), format="csv", channel="sum", part_names=names,
+        part_energies=energies,
+    )  # fmt: skip
+
+
+class Stated(NamedTuple):
+    """Grade of a recommended pair, its basis, its residual as stated, at most, and in truth [-]."""
+
+    grade: str
+    basis: str
+    low: float | None
+    high: float | None
+    true: float
+
+    @property
+    def within(self) -> bool:
+        """Whether the truth lies in the stated range, with room."""
+        assert self.low is not None
+        assert self.high is not None
+        return self.low - _ROOM <= self.true <= self.high + _ROOM
+
+
+def stated(record: Record) -> Stated | None:
+    """Ask for a pair; None where none is recommended."""
+    first, last = record.window
+    ask = partial(suggest, td=first) if first == last else partial(suggest_in_window, window=record.window)
+    answer = ask(record.history, settings=record.settings)
+    best, quality = answer.chosen, answer.quality
+    if best is None or quality is None:
+        return None
+    true = record.residual(best.tr, answer.situation.td)
+    return Stated(quality.grade, answer.situation.basis, best.residual, best.residual_high, true)
+
+
+class Counts(NamedTuple):
+    """How many of the records have a pair, a good one, a good one that is bad, a range, a truth in it, and so on."""
+
+    records: int
+    pairs: int
+    good: int
+    good_but_bad: int
+    with_a_range: int
+    within_it: int
+    truly_good: int
+    good_of_these: int
+
+
+def counted(found: Sequence[Stated | None]) -> Counts:
+    """Count what was stated of records."""
+    pairs = [one for one in found if one]
+    good, ranged = [one for one in pairs if one.grade == GRADES[-1]], [one for one in pairs if one.high is not None]
+    return Counts(
+        records=len(found),
+        pairs=len(pairs),
+        good=len(good),
+        good_but_bad=sum(one.true > BAD for one in good),
+        with_a_range=len(ranged),
+        within_it=sum(one.within for one in ranged),
+        truly_good=sum(one.true <= _GOOD for one in pairs),
+        good_of_these=sum(one.true <= _GOOD for one in good),
+    )
+
+
+def main(number: int = 300, seed: int = 1) -> None:
+    """Print the table."""
+    for kind in CLASSES:
+        counts = counted([stated(record) for record in records(kind, seed, number)])
+        print(f"{kind}: " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in counts._asdict().items()))
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

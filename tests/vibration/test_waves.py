@@ -1,0 +1,52 @@
+"""Waves: signed records made of a few are found again, others are none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from d2rpick.vibration.waves import Waves, fit_waves
+
+MADE = Waves(np.array([-0.1 + 5j, -0.1 + 8j, -0.1 + 13j]), np.array([1 + 0.3j, -0.6j, 0.2]), 0.0)
+TIME = np.linspace(0, 9, 700)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(3, 6), st.floats(1.2, 2.5), st.floats(0, 0.4), st.floats(0, 6.3), st.booleans())
+def test_waves_are_found_again(rate: float, ratio: float, damping: float, phase: float, even: bool) -> None:
+    rates = -damping + 1j * rate * np.array([1.0, ratio, 1.6 * ratio])
+    made = Waves(rates, np.exp(1j * phase * np.arange(3)), 0.0)
+    time = TIME if even else TIME + 0.001 * np.sin(40 * TIME)
+    found = fit_waves(time, made.amplitudes(time)[0])
+    assert found is not None
+    room = (1e-6 if even else 0.02) * made.vibration_energy(time)
+    assert np.all(np.abs(found.energy(time) - made.energy(time)) < room + 1e-9)
+    assert np.all(np.abs(found.kinetic_energy(time) - made.kinetic_energy(time)) < 2 * room + 1e-9)
+
+
+def test_one_wave_is_an_oscillator() -> None:
+    one = Waves(MADE.rates[:1], MADE.weights[:1], 0.0)
+    velocity = np.gradient(one.amplitudes(TIME)[0], TIME, edge_order=2)
+    assert one.kinetic_energy(TIME) == pytest.approx((velocity / abs(one.rates[0])) ** 2, abs=2e-3)
+    assert one.alpha == pytest.approx(0.2)
+    assert one.vibration_energy(0.3) == pytest.approx(one.energy(0.3) + one.kinetic_energy(0.3))
+
+
+def test_the_fewest_waves_that_do_are_taken() -> None:
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(TIME.size)
+    found = fit_waves(TIME, MADE.amplitudes(TIME)[0] + noise)
+    assert found is not None
+    assert np.sort(found.rates.imag) == pytest.approx([5, 8, 13], abs=0.01)
+    assert np.all(found.rates.real <= 0)
+
+
+def test_far_before_the_record_nothing_overflows() -> None:
+    assert np.all(np.isfinite(MADE.energy(np.array([-1e5, 1e5]))))
+
+
+def test_too_few_states_and_rest_have_no_waves() -> None:
+    assert fit_waves(TIME[:20], np.sin(5 * TIME[:20])) is None
+    assert fit_waves(TIME, np.zeros(TIME.size)) is None
+    assert fit_waves(TIME, np.ones(TIME.size)) is None
