@@ -322,8 +322,7 @@ def _remarks(situation: Situation, reach: float, known: Measured | None, parts: 
 
         yield f"mismatch of {main_contributors(parts)}"
     if known and known.residual_high > known.residual + MUCH_HIGHER:
-        model = "modes of the parts leave" if parts else "oscillator leaves"
-        yield f"residual up to {known.residual_high:.2g} if what the {model} over is a further mode"
+        yield f"residual up to {known.residual_high:.2g} if the record hides a further mode"
     if known and reach > known.timing_tolerance:
         yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known.timing_tolerance:.2g}"
     if known is None and reach >= situation.history.step:

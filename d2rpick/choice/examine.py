@@ -13,7 +13,7 @@ from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.histories.samples import window
 from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.identify import Identification, identify, identify_several, judge_given
-from d2rpick.vibration.model import Evidence
+from d2rpick.vibration.model import Evidence, doubtful, energy_at
 from d2rpick.vibration.one_mode import LARGEST_ENERGY
 from d2rpick.vibration.second_mode import resolved
 from d2rpick.vibration.span import Span, described_span, identify_within, span_of
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
     from d2rpick.flight.flight import Seen
     from d2rpick.histories.history import History
+    from d2rpick.vibration.swings import Swings
 
 
 def examine(history: History, td: float, settings: Settings, fits: Fits | None = None) -> Situation:
@@ -48,14 +49,19 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
     at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
     fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits)
-    flight = find_flight(history, td, settings.after, seen, span)
+    flight = find_flight(history, td, settings.after, seen, _settled(history, fit, span))
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
-    if history.part_energies is not None and settings.replay:
+    if settings.replay:
         # without a sign of the next contact nothing is known of what comes after td
         end = flight.end or (float(history.time[-1]) if flying or span else td)
         start = min(td, float(history.time[0]) if flight.start is None else flight.start)
-        evidence = _with_parts(evidence, history, Span(start, end), fits)
+        if history.part_energies is not None:
+            evidence = _with_parts(evidence, history, Span(start, end), fits)
+        if flight.start is not None and not evidence.signed and doubtful(energy_at(history, td, evidence)):
+            settled = flight.start if flight.settled is None else flight.settled
+            within = Span(settled, flight.end or float(history.time[-1]))
+            evidence = evidence._replace(swings=_swings(history, within, fits))
     return Situation(history, td, settings, flight, evidence, fits)
 
 
@@ -91,6 +97,24 @@ def _resolved(history: History, fit: Identification, fits: Fits) -> Identificati
         return fit
     window = history.between(fit.start, fit.end)
     return fits.once(("resolved", fit.start, fit.end, fit.rms), lambda: resolved(*window, fit))
+
+
+def _settled(history: History, fit: Identification | None, span: Span | None) -> Span | None:
+    """Give the window of an oscillator without its first quarter of a period, unless the record begins with it.
+
+    While the deformation passes through zero its energy hardly shows that a load still moves it, by a tenth of its
+    amplitude and more; where it is largest a hundredth shows.  Each quarter of a period has one of both.
+    """
+    if span is None or fit is None or fit.mode is None or span.start <= history.time[0]:
+        return span
+    return Span(min(span.start + np.pi / 2 / fit.mode.omega, span.end), span.end)
+
+
+def _swings(history: History, within: Span, fits: Fits) -> Swings | None:
+    """Count the swings of the energy in the flight, where they come down to a floor."""
+    from d2rpick.vibration.swings import count_swings
+
+    return fits.once(("swings", *within), lambda: count_swings(*history.between(*within)))
 
 
 def _with_parts(evidence: Evidence, history: History, within: Span, fits: Fits) -> Evidence:

@@ -8,7 +8,7 @@ import numpy as np
 
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
-from d2rpick.vibration.measures import TOLERATED_GROWTH
+from d2rpick.vibration.measures import TOLERATED_GROWTH, wrong_sign
 
 if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate
@@ -21,6 +21,8 @@ GRADES: Final = ("poor", "fair", "good")
 # Of the vibration [-].  A residual of a half is a quarter of its energy; beyond, the error is what an engineer sees of
 # the motion after td.  A good pair keeps what the tolerance on tr asks for by default.
 _MOST_FAIR, _MOST_GOOD = 0.5, 0.2
+# What a further mode may hide at most, where an oscillator or parts tell, and where swings were only counted.
+_MOST_HIDDEN, _MOST_COUNTED = 0.5, 0.3
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
 _BAND: Final = 0.25
 _NOT_CERTAIN: Final = "the flight is not certain"
@@ -52,7 +54,7 @@ def quality_of(situation: Situation, best: Candidate, expected: Expectation | No
     poor = tuple(_poor(situation, best, expected))
     if poor:
         return Quality("poor", poor)
-    fair = tuple(_fair(situation, best))
+    fair = tuple(_fair(situation, best, expected))
     return Quality("fair" if fair else "good", fair)
 
 
@@ -89,15 +91,19 @@ def _is_loose(best: Candidate) -> bool:
     return TOLERATED_GROWTH * (best.tr_high - best.tr) > _MOST_GOOD * best.timing_tolerance
 
 
-def _fair(situation: Situation, best: Candidate) -> list[str]:
+def _fair(situation: Situation, best: Candidate, expected: Expectation | None) -> list[str]:
     found = []
     if best.residual is None:
-        found.append("the sign of the deformation is unknown")
+        off = f"{wrong_sign(expected.kinetic_share if expected else 0.0):.0%}"
+        found.append(
+            f"the sign of the deformation is unknown, and with a wrong one the vibration after td is off by {off}"
+        )
     elif best.residual > _MOST_GOOD:
         found.append(f"the vibration after td is off by {best.residual:.0%}")
     elif _is_loose(best):
         found.append("tr is not known well enough for its timing tolerance")
-    if best.residual_high is not None and best.residual_high > _MOST_FAIR:
+    most = _MOST_COUNTED if situation.basis == "swings" else _MOST_HIDDEN
+    if best.residual_high is not None and best.residual_high > most:
         found.append(f"with a further mode hidden in the record it may be off by {best.residual_high:.0%}")
     if not situation.flight.certain:
         found.append(_NOT_CERTAIN)

@@ -44,7 +44,7 @@ class Situation:
 
     @property
     def basis(self) -> str:
-        """What a choice rests on: "parts", "oscillator" (one or several of them) or "energy"."""
+        """What a choice rests on: "parts", "oscillator" (one or several of them), "swings" or "energy"."""
         return self.vibration.basis
 
     @property
@@ -76,7 +76,7 @@ class Situation:
         if start is None or not self.in_flight:
             return False
         window, deformed = (start, self.flight.end), self.vibration.unknown is None
-        return nothing_vibrates(self.history, window, self.td, self.settings.tolerance, deformed=deformed)
+        return nothing_vibrates(self.history, window, self.td, deformed=deformed)
 
     @cached_property
     def bodies(self) -> Bodies | None:
@@ -116,7 +116,7 @@ class Situation:
     def sees_as(self, other: Situation) -> bool:
         """Whether the two, of one record, have one flight and one evidence: then only their td differ."""
         own, its = self.evidence, other.evidence
-        same = own.fit is its.fit and own.parts is its.parts
+        same = own.fit is its.fit and own.parts is its.parts and own.swings is its.swings
         return same and own.span == its.span and self.flight == other.flight
 
     def at(self, td: float) -> Situation:

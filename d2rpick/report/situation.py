@@ -68,6 +68,7 @@ def _basis(situation: Situation) -> str:
     """What the choice rests on, and the oscillator behind it."""
     fit, vibration = situation.evidence.fit, situation.vibration
     mode, parts = vibration.mode, f"parts, signs of {', '.join(vibration.signed)}" if vibration.signed else ""
+    parts = "swings of the energy, counted" if vibration.basis == "swings" else parts
     if not (mode and fit):
         return f"{parts}; kinetic energy from the modes of each part" if parts else vibration.basis
     rates = ", ".join(f"{one.omega:.6g}" for one in mode.modes)

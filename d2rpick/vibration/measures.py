@@ -158,6 +158,17 @@ def residual(lock_in: float, kinetic: float) -> float:
     return sqrt(lock_in**2 + kinetic)
 
 
+def wrong_sign(kinetic: float) -> float:
+    """R = sqrt(4 - 3 K) [-]: the residual where the level of td is locked in with the opposite sign, L^2 = 4 (1 - K).
+
+    Examples
+    --------
+    >>> wrong_sign(0.0), wrong_sign(1.0)
+    (2.0, 1.0)
+    """
+    return sqrt(4 - 3 * kinetic)
+
+
 def run_time_share(rigid_fraction: float, cost_share: float, step_ratio: float) -> float:
     """Expected run time of the switched run over that of the reference, 1 - f (1 - (1 - c)/n) [-].
 

@@ -1,6 +1,7 @@
-"""What is known of the vibration at one td: one protocol, and which of its three models can be relied on there.
+"""What is known of the vibration at one td: one protocol, and which of its four models can be relied on there.
 
-The signs of parts are worth more than an oscillator that describes the record, and that more than the energy alone.
+The signs of parts are worth more than an oscillator that describes the record, that more than swings that were counted
+unless it leaves much over, and these more than the energy alone.
 A further kind of vibration is a module with these methods and a line in `model_at`.
 """
 
@@ -27,6 +28,12 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.part_signs import SignedParts, Unsigned
     from d2rpick.vibration.span import Span
+    from d2rpick.vibration.swings import Swings
+
+
+# Of the vibration energy: more of it in a further mode moves a residual by a quarter and more.
+_HIDDEN = 0.02
+_LEFT_OVER = "the oscillator leaves more over than the swings of the energy do, which were counted"
 
 
 class Vibration(Protocol):
@@ -34,7 +41,7 @@ class Vibration(Protocol):
 
     @property
     def basis(self) -> str:
-        """Name of the model: "parts", "oscillator" or "energy"."""
+        """Name of the model: "parts", "oscillator", "swings" or "energy"."""
 
     @property
     def unknown(self) -> str | None:
@@ -111,7 +118,8 @@ class Evidence(NamedTuple):
 
     ``fit`` is None only where no oscillator was looked for; ``span`` is the window in which it describes the record.
     ``given``: the oscillator was given; ``prescribed``: it, or the window to identify it in.  ``parts`` are the
-    deformations of single parts, as far as they have a sign.
+    deformations of single parts, as far as they have a sign; ``swings`` were counted in the energy of the flight, where
+    it comes down to a floor in each.
     """
 
     fit: Identification | None = None
@@ -119,6 +127,7 @@ class Evidence(NamedTuple):
     given: bool = False
     prescribed: bool = False
     parts: SignedParts | None = None
+    swings: Swings | None = None
 
     @property
     def signed(self) -> SignedParts | None:
@@ -129,7 +138,7 @@ class Evidence(NamedTuple):
     def has_model(self) -> bool:
         """Whether at some td more than the samples of the energy may be relied on."""
         fit = self.fit
-        return bool(self.signed or (fit and fit.mode and self.span and not fit.reason))
+        return bool(self.signed or self.swings or (fit and fit.mode and self.span and not fit.reason))
 
 
 def model_at(history: History, td: float, evidence: Evidence) -> Vibration:
@@ -140,9 +149,20 @@ def model_at(history: History, td: float, evidence: Evidence) -> Vibration:
         from d2rpick.vibration.of_parts import OfParts  # not above: a table has no parts
 
         return OfParts(whole, signed)
+    swings = evidence.swings
+    if swings and not whole.doubts and doubtful(whole) and swings.known_at(td):
+        from d2rpick.vibration.of_swings import OfSwings  # not above: an oscillator does without it
+
+        if isinstance(whole, OfEnergy) or swings.unseen(whole.span.start, td)[0] < whole.fit.hidden_share:
+            return OfSwings(OfEnergy(history, td, _LEFT_OVER) if isinstance(whole, OfModes) else whole, swings)
     if isinstance(whole, OfModes):
         return whole
     return whole.without_parts(evidence.parts, sunk=sunk)
+
+
+def doubtful(whole: OfModes | OfEnergy) -> bool:
+    """Whether no oscillator is known, or one that leaves so much over that its sign may be wrong."""
+    return isinstance(whole, OfEnergy) or whole.fit.hidden_share > _HIDDEN
 
 
 def energy_at(history: History, td: float, evidence: Evidence) -> OfModes | OfEnergy:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.of_energy import OfEnergy
     from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.part_signs import SignedParts, Unsigned
+    from d2rpick.vibration.swings import Swings
 
 
 class OfParts:
@@ -30,7 +31,7 @@ class OfParts:
     unknown = None
     undescribed = "the signs of the parts' deformations cannot be followed from here to td"
 
-    def __init__(self, whole: OfModes | OfEnergy, parts: SignedParts) -> None:
+    def __init__(self, whole: OfModes | OfEnergy, parts: SignedParts | Swings) -> None:
         self.whole, self.parts = whole, parts
 
     @property

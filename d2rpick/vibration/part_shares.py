@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.vibration.part_signs import SignedParts
+    from d2rpick.vibration.swings import Swings
 
 # The parts that are named together make up this much of the mismatch.
 _MOST = 0.8
@@ -29,7 +30,7 @@ class PartMatch(NamedTuple):
     reason: str | None = None
 
 
-def contributions(vibration: SignedParts, tr: float, td: float) -> tuple[PartMatch, ...]:
+def contributions(vibration: SignedParts | Swings, tr: float, td: float) -> tuple[PartMatch, ...]:
     """Give the match of each part, that with the largest share first, then those without a sign."""
     shares = np.bincount(vibration.owner, measures.mismatch_shares(vibration, tr, td)).tolist()
     same = np.bincount(vibration.owner, vibration.amplitudes(tr) * vibration.amplitudes(td)) >= 0

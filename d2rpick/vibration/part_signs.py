@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from d2rpick.vibration.envelope import SOLVER_FLOOR
 from d2rpick.vibration.part_motion import by_own_modes, followed
 from d2rpick.vibration.part_zeros import all_zeros
 from d2rpick.vibration.second_mode import SMALLEST
@@ -25,8 +26,6 @@ _MOST_OFF_CENTRE = 0.5
 # Parts without a sign are left out where they hold no more than this share of the energy: D changes by 0.2 at most,
 # the default tolerance.
 MOST_UNSIGNED = 0.01
-# Of the highest energy: a solver errs by a tenth of it at any time, so that nothing below is sure to be vibration.
-_SOLVER_FLOOR = 1e-4
 _NOT_FOLLOWED = "no few modes have its energy, with the signs that its minima give or on their own"
 
 
@@ -97,7 +96,7 @@ class SignedParts:
 
     def sunk(self, t: float) -> bool:
         """Whether the energy of the vibration is below a solver's errors at ``t``."""
-        return bool(self.vibration_energy(t) < _SOLVER_FLOOR * np.max(self.vibration_energy(self.time)))
+        return bool(self.vibration_energy(t) < SOLVER_FLOOR * np.max(self.vibration_energy(self.time)))
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
         """Largest residual of each tr of shape (n,), if what may be hidden stood opposed at tr and td [-]."""

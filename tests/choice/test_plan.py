@@ -17,6 +17,7 @@ from d2rpick.choice.plan import Plan, plan_of
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.errors import RangeError
+from d2rpick.histories.digits import first_as_read
 from d2rpick.histories.opening import Selection
 from tests.computed import stored
 from tests.drops import drop, written
@@ -157,7 +158,7 @@ def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
 
 def test_where_nothing_vibrates_td_lies_as_late_as_the_margin_allows(reference: Reference, plan: Plan) -> None:
     resting = [row for row in plan.rows if row.window and row.answer and row.answer.situation.at_rest]
-    assert len(resting) > 1
+    assert [row.number for row in resting] == [1]  # after it there is plastic work, and little vibration above it
     for row in resting:
         assert row.window is not None
         room = max(row.margin.time, 2 * (row.margin.spread or 0.0))
@@ -257,7 +258,7 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_fac
     reference, asked = read(bouncing(seed, tmp_path_factory.getbasetemp())), Settings(replay=False)
     plan = plan_of(reference, asked)
     for row in plan.rows:
-        assert row.window is None or row.start <= row.window[0] < row.window[1] <= row.end
+        assert row.window is None or first_as_read(row.start) <= row.window[0] < row.window[1] <= row.end
     assert all(one.end <= other.start for one, other in pairwise(plan.rows))
     if len(plan.rows) == 1 and plan.rows[0].window:
         alone = suggest_of(reference, None, asked).recommended

@@ -47,7 +47,8 @@ def test_the_energy_alone_is_fair_at_best() -> None:
     assert grade(record, at_a_peak, replay=False, after=0.005) == "fair"
     answer = suggest(record, at_a_peak, Settings(replay=False, after=0.005))
     assert answer.quality is not None
-    assert answer.quality.reasons == ("the sign of the deformation is unknown",)
+    (reason,) = answer.quality.reasons
+    assert reason.startswith("the sign of the deformation is unknown, and with a wrong one")
 
 
 def test_a_td_near_the_zero_of_the_energy_is_poor_by_the_energy_alone() -> None:
@@ -116,7 +117,7 @@ def test_without_a_period_there_are_no_states_of_one() -> None:
 
 def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     time = np.linspace(0, 1, 201)
-    energy = np.where(time < 0.2, 50 * time, 10.0) + 0.02 * np.random.default_rng(1).random(201)
+    energy = np.where(time < 0.2, 50 * time, 10.0) + 1e-5 * np.random.default_rng(1).random(201)
     found = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(after=0.25))
     assert found.situation.at_rest
     assert found.quality == Quality("good")
@@ -124,6 +125,43 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     guessed = replace(found.situation, flight=found.situation.flight._replace(source="energy"))
     assert guessed.at_rest
     assert quality_of(guessed, found.chosen, None) == Quality("fair", ("the flight is not certain",))
+
+
+@pytest.mark.parametrize("vibration", [0.05, 0.5, 2.6])
+def test_plastic_work_hides_no_vibration(vibration: float) -> None:
+    """Of 100 J of which little vibrates, the level says nothing: a frozen tr may be wrong by all of the vibration."""
+    time = np.linspace(0, 1, 401)
+    swinging = sum(np.sin(rate * time + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
+    energy = 100 * np.minimum(time / 0.1, 1) ** 2 + vibration * np.where(time > 0.1, swinging, 0)
+    found = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(after=0.15))
+    assert not found.situation.at_rest
+    assert found.quality is None or found.quality.grade != "good"
+    still = suggest(
+        History(time, energy - energy * (time > 0.1) + 100.0 * (time > 0.1), ("made",), "made", "E"),
+        0.9,
+        Settings(after=0.15),
+    )
+    assert still.situation.at_rest
+
+
+def test_a_vibration_that_was_damped_out_is_rest() -> None:
+    time = np.linspace(0, 1, 2001)
+    energy = 100 + 2.6 * np.exp(-40 * time) * (1 + np.cos(150 * time) * np.cos(97 * time))
+    record = History(time, energy, ("made",), "made", "E")
+    assert suggest(record, 0.9, Settings(after=0.5)).situation.at_rest
+    assert not suggest(record, 0.9, Settings(after=0.05)).situation.at_rest
+
+
+def test_what_a_wrong_sign_would_cost_is_told() -> None:
+    """Of sqrt((4 E + T)/(E + T)): twice the vibration at most, what moves at td less."""
+    time = np.linspace(0, 1, 801)
+    energy = np.sum([np.sin(rate * time + rate) ** 2 for rate in (31.0, 47.0, 66.0)], axis=0)
+    answer = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(replay=False, after=0.0))
+    assert answer.quality is not None
+    assert answer.expected is not None
+    cost = f"{(4 - 3 * answer.expected.kinetic_share) ** 0.5:.0%}"
+    told = f"the sign of the deformation is unknown, and with a wrong one the vibration after td is off by {cost}"
+    assert answer.quality.reasons == (told,)
 
 
 def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:

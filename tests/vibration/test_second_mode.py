@@ -77,7 +77,7 @@ def test_candidates_state_how_large_their_residual_may_be() -> None:
         assert one.residual is not None
         assert one.residual_high is not None
         assert one.residual_high >= one.residual
-        noted = any("if what the oscillator leaves over is a further mode" in note for note in one.notes)
+        noted = any("if the record hides a further mode" in note for note in one.notes)
         assert noted == (one.residual_high > one.residual + 0.1)
 
 

@@ -1,0 +1,81 @@
+"""Counting the swings of an energy: the signs of a motion that was integrated, or none where a mode hides."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.histories.history import History
+from d2rpick.vibration.swings import count_swings
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import Samples
+
+TIME: Samples = np.linspace(0.0, 30.0, 1201)
+
+
+def stiffening(by: float, alpha: float) -> tuple[Samples, Samples]:
+    """Deformation of x'' + alpha x' + x + by x^3 = 0 from x = 1, and its energy."""
+    found = solve_ivp(
+        lambda _, x: (x[1], -alpha * x[1] - x[0] - by * x[0] ** 3), TIME[[0, -1]], (1.0, 0.0), "DOP853", TIME, rtol=1e-9
+    )
+    x = found.y[0]
+    return x, x**2 + by * x**4 / 2
+
+
+@pytest.mark.parametrize("by", [0.0, 0.3, 3.0])
+@pytest.mark.parametrize("alpha", [0.0, 0.05])
+@pytest.mark.parametrize("lifted", [0.0 * TIME, 40.0 + 0.0 * TIME, 0.02 * TIME, -0.02 * TIME])
+def test_every_minimum_on_the_floor_is_a_passage_through_zero(by: float, alpha: float, lifted: Samples) -> None:
+    x, energy = stiffening(by, alpha)
+    found = count_swings(TIME, energy + lifted)
+    assert found is not None
+    counted = found.amplitudes(TIME)[0]
+    unclear = found.unclear
+    assert np.all((unclear == TIME[1]) | (unclear > TIME[-1] - np.pi))
+    # a sample next to a zero may lie on either side of it, and behind the last peak none is seen yet
+    clear = (np.abs(x) > 0.15 * np.exp(-alpha / 2 * TIME)) & (unclear.max() >= TIME)
+    assert np.ptp(np.sign(counted[clear]) * np.sign(x[clear])) == 0
+    np.testing.assert_allclose(counted**2, energy, atol=0.03 * energy.max())
+
+
+@given(st.floats(1.3, 4.0), st.floats(0.0, 3.0), st.floats(0.003, 1.0))
+def test_what_another_mode_may_cost_is_told_or_nothing_is_counted(rate: float, phase: float, share: float) -> None:
+    """The residual with both modes known is not above the highest that counting tells."""
+    both = np.stack([np.sin(TIME), np.sqrt(share) * np.sin(rate * TIME + phase)])
+    found = count_swings(TIME, np.sum(both**2, axis=0))
+    if found is None:
+        return
+    td = np.pi / 2 + 8 * np.pi
+    tr = td - 2 * np.pi * np.arange(1.0, 4.0)
+    tr = tr[tr > found.comparable_since(td)]
+    hidden = np.abs(np.sin(rate * tr + phase) - np.sin(rate * td + phase)) * np.sqrt(share / (1 + share))
+    assert (hidden <= 3 * np.sqrt(found.unseen(tr, td)) + 0.2).all()
+
+
+def test_noise_and_too_few_swings_are_not_counted() -> None:
+    _, energy = stiffening(0.3, 0.0)
+    noise = 0.1 * np.random.default_rng(1).standard_normal(TIME.size)
+    assert count_swings(TIME, energy + noise) is None
+    assert count_swings(TIME[:200], energy[:200]) is None
+    assert count_swings(TIME, 0.0 * TIME) is None
+
+
+@pytest.mark.parametrize("lifted", [0.0 * TIME, 5.0 + 0.01 * TIME])
+def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) -> None:
+    x, energy = stiffening(1.0, 0.02)
+    record = History(TIME, energy + lifted, ("made",), "made", "E")
+    for td in (20.0, 23.0, 27.5):
+        answer = suggest(record, td, Settings(after=2.0))
+        assert answer.situation.basis == "swings"
+        assert answer.chosen is not None
+        at_tr, at_td = np.interp([answer.chosen.tr, td], TIME, x)
+        assert at_tr == pytest.approx(at_td, abs=0.2 * np.abs(x[td < TIME]).max())
+        assert not any(one.acceptable and np.interp(one.tr, TIME, x) * at_td < -1e-3 for one in answer.candidates)
