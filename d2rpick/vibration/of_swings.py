@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.vibration.measures import wrong_sign
 from d2rpick.vibration.of_parts import OfParts
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class OfSwings(OfParts):
     def measured(self, times: Samples) -> list[Measured | None]:
         """Measures of each time; the highest residual is that with what may hide in the floor at its worst."""
         found = super().measured(times)
-        hidden = _OF_THE_FLOOR * np.sqrt(self.swings.unseen(times, self.td))
+        hidden = np.minimum(_OF_THE_FLOOR * np.sqrt(self.swings.unseen(times, self.td)), wrong_sign(0.0))
         return [
             one and one._replace(residual_high=float(np.hypot(_OF_ANY_SPRING * one.residual, most)), part_mismatch=None)
             for one, most in zip(found, hidden, strict=True)
