@@ -14,6 +14,7 @@ import numpy as np
 
 from d2rpick.histories.crossings import find_turns
 from d2rpick.vibration.envelope import upper_envelope
+from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,7 +88,8 @@ class Swings:
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
         """Largest residual of each tr (n,): of any spring, with what may hide in the floor at its worst [-]."""
-        return np.asarray(np.hypot(_OF_ANY_SPRING * residual, _OF_THE_FLOOR * np.sqrt(self.unseen(tr, td))))
+        hidden = np.minimum(_OF_THE_FLOOR * np.sqrt(self.unseen(tr, td)), wrong_sign(0.0))
+        return np.asarray(np.hypot(_OF_ANY_SPRING * residual, hidden))
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Share of the vibration energy at td that the floor may hide in another mode, from each tr (n,) on [-].
