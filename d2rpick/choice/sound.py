@@ -54,7 +54,7 @@ def _blew_up(history: History) -> str | None:
         np.concatenate([[0.0], np.maximum.accumulate(one)])[earlier] for one in (kinetic + internal, internal)
     )
     gained = counted & (deformed > 0) & (kinetic > _GAIN * before)
-    gained &= (kinetic > _SPEED * internal) & (internal > _TORN * deformed)
+    gained &= (kinetic / _SPEED > internal) & (internal / _TORN > deformed)  # products might overflow
     if balance.external_work is not None:
         gained &= kinetic > _GAIN * np.abs(balance.external_work)
     at = int(np.argmax(gained))

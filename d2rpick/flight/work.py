@@ -206,5 +206,7 @@ class _Parabola:
         table[:, 0], table[:, 1], table[:, 2] = 1.0, elapsed, elapsed**2
         if spent is not None and extent > 0:
             table[:, 3] = (spent - spent[0]) / extent
-        factors, *_ = np.linalg.lstsq(table, self.energies[states], rcond=None)
-        return float(np.abs(self.energies[states] - table @ factors).max())
+        scale = 2.0 ** (np.frexp(np.abs(self.energies[states]).max())[1] - 1)  # exact; squares of 1e200 would overflow
+        energies = self.energies[states] / scale
+        factors, *_ = np.linalg.lstsq(table, energies, rcond=None)
+        return float(np.abs(energies - table @ factors).max()) * float(scale)

@@ -341,6 +341,13 @@ def test_odd_numbers_reach_no_warning_of_the_machine(name: str, tmp_path: Path) 
     assert result.exit_code in (0, 2)
 
 
+def test_numbers_whose_squares_overflow_reach_no_warning_of_the_machine(tmp_path: Path) -> None:
+    rows = [f"{i / 2},{i % 7},{1e308 if i == 14 else i % 5}" for i in range(15)]
+    (tmp_path / "large.csv").write_text("\n".join(["time,internal energy,kinetic energy", *rows, ""]))
+    result = run("info", str(tmp_path / "large.csv"))
+    assert (result.exit_code, result.stderr) == (0, "")
+
+
 def test_a_number_of_too_many_digits_is_no_part() -> None:
     result = run("suggest", "--td", "0.1", "--part", "9" * 5000, "sample_data/rolloverT01.gz")
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1)

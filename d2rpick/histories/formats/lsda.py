@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 DIRECTORY: Final = 2
 VARIABLE: Final = 3
 _COMMANDS: Final = range(1, 8)
+_TABLES: Final = range(4, 8)  # symbol tables and what is in them
+_LONGEST: Final = 1 << 32  # bytes that no symbol table has
 
 _FIELDS: Final = {1: "B", 2: "H", 4: "I", 8: "Q"}
 _TYPES: Final = {1: "i1", 2: "i2", 3: "i4", 4: "i8", 5: "u1", 6: "u2", 7: "u4", 8: "u8", 9: "f4", 10: "f8"}
@@ -179,6 +181,7 @@ class Lsda:
         path: tuple[str, ...] = ()
         number, start, records, command = -1, position, list[bytes](), 0
         anchors: dict[tuple[str, ...], int] = {}  # where the last state of each branch began
+        heads: set[bytes] = set()
         while position + head <= size:
             at = position - base
             if at + _HEAD > len(near):
@@ -187,6 +190,7 @@ class Lsda:
             end = position + length
             if length < head or end > size or command not in _COMMANDS:
                 break
+            heads.add(near[at : at + head])
             if command == DIRECTORY:
                 self._leave(path, number, start, records)
                 records = []
@@ -214,11 +218,23 @@ class Lsda:
             else:
                 records.append(near[at : at + head])
             position = end
+        if position < size and not self._goes_on(data[position : position + head], heads):
+            records = records[:-1]
         self._leave(path, number, start, records)
         if position < size:
             self.stop = f"no complete record at byte {position} of {size}"
         if number >= 0 and (self.stop or command == VARIABLE):
             self.unfinished = path[0]
+
+    def _goes_on(self, rest: bytes, heads: set[bytes]) -> bool:
+        """Whether the file was cut in the record that begins so; else bytes are lost or too many in the one before.
+
+        Records of a state are as long as those of the last one, but no symbol table is like another.
+        """
+        if any(known.startswith(rest) for known in heads):
+            return True
+        length, command = self._head.unpack(rest.ljust(self._head.size, b"\0"))
+        return command in _TABLES and length < _LONGEST
 
     def _leave(self, path: tuple[str, ...], number: int, start: int, records: list[bytes]) -> None:
         """Keep what the directory that is now left held, if it is wanted."""

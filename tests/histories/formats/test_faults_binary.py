@@ -162,6 +162,18 @@ def test_any_byte_of_a_binouts_structure_may_be_wrong(flip: int, tenth: int) -> 
         data[place] ^= flip
 
 
+@pytest.mark.parametrize("states", [1, 3])
+@pytest.mark.parametrize("change", [2, 5, -2])
+def test_bytes_inserted_into_a_value_or_lost_from_it_shift_no_number(states: int, change: int) -> None:
+    """The record before the place where the records break is the one that is damaged."""
+    made = binout(range(1, states + 1), PARTS, tables=False)
+    data = bytes(made.data)
+    for begin, end in pairwise([*made.marks, len(data)]):
+        if data[begin + 8] == 3 and end < len(data):
+            middle = end - 4
+            true_binout(data[:middle] + b"\x11" * change + data[middle + max(0, -change) :])
+
+
 def test_a_variable_whose_type_changes_between_states_is_left_out_with_a_note() -> None:
     name = b"\x10hourglass_energy"
     data = bytearray(BINOUT.data)
