@@ -72,7 +72,7 @@ def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None
         if fit is None:
             return None
         waves = fit
-        modelled = waves.amplitudes(time)[0]
+        modelled = waves.deformation(time)
         miss = (np.abs(modelled) - root) ** 2
         missed = _means(miss, width) > _OFF * waves.vibration_energy(time)
         off = (

@@ -45,7 +45,7 @@ class SignedParts:
     names : tuple of str
         Of the k parts that have a sign.
     motions : tuple of PartMotion
-        How each of them vibrates; of one deformation the sign as a whole is arbitrary.
+        How each of them vibrates; the sign of a deformation as a whole is arbitrary.
     time : array of shape (n,)
         Of the states that they were read from [time].
     unsigned : tuple of Unsigned
@@ -67,7 +67,7 @@ class SignedParts:
 
     @cached_property
     def owner(self) -> Places:
-        """Place in ``names`` of the part of each deformation: one that bends in several planes has several."""
+        """Place in ``names`` of the part of each deformation: a part has one for each of its modes."""
         return np.repeat(np.arange(len(self.names)), [len(one.model.amplitudes(0.0)) for one in self.motions])
 
     @cached_property
@@ -76,7 +76,7 @@ class SignedParts:
         return np.sort(np.concatenate([np.zeros(0), *(one.unclear for one in self.motions)]))
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Signed deformations, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
+        """Signed deformations of the parts' modes, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
         return np.concatenate([one.model.amplitudes(t) for one in self.motions])
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
@@ -128,7 +128,7 @@ def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> Signed
     >>> found = read_parts(t, np.stack([one**2, other**2, other**2 + 1], axis=1), ["one", "other", "third"])
     >>> found.names, [part.name for part in found.unsigned]
     (('one', 'other'), ['third'])
-    >>> bool(np.abs(np.abs(found.amplitudes(t)[0] @ one) - one @ one) < 1e-6)
+    >>> bool(np.abs(np.abs(found.motions[0].model.deformation(t) @ one) - one @ one) < 1e-6)
     True
     """
     roots = np.sqrt(np.maximum(energies.T, 0.0), order="C")

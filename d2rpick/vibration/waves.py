@@ -31,9 +31,9 @@ class Waves:
     .. math:: q(t) = \mathrm{Re} \sum_i w_i e^{\lambda_i (t - t_0)}
 
     ``rates`` are the lambda of shape (m,), with positive imaginary and no positive real parts [1/time]; ``weights`` are
-    the w [sqrt(energy)]; ``origin`` is t_0 [time].  Kinetic energies are those of the modes, each (q_i'/w_0i)^2 with
-    its undamped rate: what crosses between two of them in one part, other parts take back, since the shapes of modes
-    are orthogonal in the mass.
+    the w [sqrt(energy)]; ``origin`` is t_0 [time].  A vibration is measured by its modes, each with the energies q_i^2
+    and (q_i'/w_0i)^2, w_0i its undamped rate.  What crosses between two modes in the energy of a part is zero on
+    average over time, and other parts take it back, since the shapes of modes are orthogonal in mass and stiffness.
     """
 
     rates: Waving
@@ -46,12 +46,16 @@ class Waves:
         return float(-2 * np.average(self.rates.real, weights=np.abs(self.weights) ** 2))
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """q(t), of the shape of ``t`` with an axis of length one before it [sqrt(energy)]."""
-        return np.asarray(self._each(t).real.sum(axis=0)[np.newaxis])
+        """Signed deformations of all waves, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
+        return np.asarray(self._each(t).real)
+
+    def deformation(self, t: Samples | float) -> Samples:
+        """q(t) [sqrt(energy)]."""
+        return np.asarray(self.amplitudes(t).sum(axis=0))
 
     def energy(self, t: Samples | float) -> Samples:
         """q(t)^2 [energy]."""
-        return np.asarray(self.amplitudes(t)[0] ** 2)
+        return self.deformation(t) ** 2
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
         """Kinetic energy of the modes [energy]."""
@@ -59,8 +63,8 @@ class Waves:
         return np.asarray(((self._each(t) * turned).real ** 2).sum(axis=0))
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Internal and kinetic energy [energy]."""
-        return self.energy(t) + self.kinetic_energy(t)
+        """Internal and kinetic energy of the modes [energy]."""
+        return np.asarray((self.amplitudes(t) ** 2).sum(axis=0) + self.kinetic_energy(t))
 
     def _each(self, t: Samples | float) -> Waving:
         s = np.multiply.outer(self.rates, np.asarray(t, dtype=np.float64) - self.origin)

@@ -2,9 +2,9 @@
 
     python -m tests.benchmarks.promise_parts [N [SEED]]
 
-The motion is written down here in the coordinates of its modes, by no code of d2rpick.  Springs with one mode each;
-a free chain of masses whose springs, or groups of springs, are the parts, so that the modes mix in each; and a
-part that bends in two planes beside another one.  Damping is proportional to mass.
+The motion is written down here in the coordinates of its modes, by no code of d2rpick.  Springs with one mode each; two
+parts of a larger structure, or a free chain of masses whose springs, or groups of springs, are the parts, so that the
+modes mix in each; and a part that bends in two planes beside another one.  Damping is proportional to mass.
 """
 
 from __future__ import annotations
@@ -59,7 +59,10 @@ class Motion(NamedTuple):
         return np.asarray(np.einsum("ni,kij,nj->nk", at, self.forms, at))
 
     def residual(self, tr: float, td: float) -> float:
-        """Energy norm of what the switched run lacks at td over that of the reference: modes are orthogonal in it."""
+        """Energy norm of what the switched run lacks at td over that of the reference, summed over the modes.
+
+        Of the parts of a larger structure that is the mean over time after td: there it is no sum at any time.
+        """
         (before, _), (after, velocity) = self.state(tr), self.state(td)
         stiffness = np.einsum("kii->i", self.forms)
         lack, whole = (before - after) ** 2 + velocity**2, after**2 + velocity**2
@@ -82,7 +85,15 @@ def one_each(rng: np.random.Generator) -> Motion:
 
 
 def mixed(rng: np.random.Generator) -> Motion:
-    """A free chain of three to six masses; each spring is a part, or, in a third of them, several springs are one."""
+    """Two parts of a larger structure; or a free chain of three to six masses, whose springs are the parts.
+
+    In a third of the chains several springs are one part.
+    """
+    if rng.uniform() < 1 / 3:
+        modes = int(rng.integers(2, 4))
+        rows, rate = rng.uniform(-1, 1, (2, modes)), 2 * np.pi * rng.uniform(1, 3.5, modes)
+        forms = np.einsum("pi,pj->pij", rows, rows)
+        return Motion(rng.uniform(0, 0.5), rate, rng.uniform(0, 2 * np.pi, modes), forms)
     count = int(rng.integers(2, 6))
     mass, spring = rng.uniform(0.3, 3, count + 1), rng.uniform(0.3, 3, count)
     stretch = np.diff(np.eye(count + 1), axis=0) / np.sqrt(mass)

@@ -19,7 +19,7 @@ def test_waves_are_found_again(rate: float, ratio: float, damping: float, phase:
     rates = -damping + 1j * rate * np.array([1.0, ratio, 1.6 * ratio])
     made = Waves(rates, np.exp(1j * phase * np.arange(3)), 0.0)
     time = TIME if even else TIME + 0.001 * np.sin(40 * TIME)
-    found = fit_waves(time, made.amplitudes(time)[0])
+    found = fit_waves(time, made.deformation(time))
     assert found is not None
     room = (1e-6 if even else 0.02) * made.vibration_energy(time)
     assert np.all(np.abs(found.energy(time) - made.energy(time)) < room + 1e-9)
@@ -28,7 +28,7 @@ def test_waves_are_found_again(rate: float, ratio: float, damping: float, phase:
 
 def test_one_wave_is_an_oscillator() -> None:
     one = Waves(MADE.rates[:1], MADE.weights[:1], 0.0)
-    velocity = np.gradient(one.amplitudes(TIME)[0], TIME, edge_order=2)
+    velocity = np.gradient(one.deformation(TIME), TIME, edge_order=2)
     assert one.kinetic_energy(TIME) == pytest.approx((velocity / abs(one.rates[0])) ** 2, abs=2e-3)
     assert one.alpha == pytest.approx(0.2)
     assert one.vibration_energy(0.3) == pytest.approx(one.energy(0.3) + one.kinetic_energy(0.3))
@@ -36,7 +36,7 @@ def test_one_wave_is_an_oscillator() -> None:
 
 def test_the_fewest_waves_that_do_are_taken() -> None:
     noise = 1e-3 * np.random.default_rng(1).standard_normal(TIME.size)
-    found = fit_waves(TIME, MADE.amplitudes(TIME)[0] + noise)
+    found = fit_waves(TIME, MADE.deformation(TIME) + noise)
     assert found is not None
     assert np.sort(found.rates.imag) == pytest.approx([5, 8, 13], abs=0.01)
     assert np.all(found.rates.real <= 0)
