@@ -54,13 +54,16 @@ def model_of(options: dict[str, Any]) -> CostModel | None:
     return read_model(options["deck"], options["weights"])
 
 
-def with_deck(run: Run, options: dict[str, Any], settings: Settings, model: CostModel | None) -> dict[str, Any]:
-    """Replace ``--part recommended`` by the numbers of that set, and add those of springs; UsageError without a deck.
+def with_deck(
+    run: Run, options: dict[str, Any], settings: Settings, model: CostModel | None
+) -> tuple[Run, dict[str, Any]]:
+    """Let the deck tell what acts on the run, replace ``--part recommended`` by the numbers of that set, add springs.
 
-    The energy of springs is no level: they are the parts that the deck, or their energies, show to be springs.
+    UsageError where that set is asked for without a deck.  The energy of springs is no level: they are the parts that
+    the deck, or their energies, show to be springs.
     """
     if model is None and not options["part"]:
-        return options
+        return run, options
     from d2rpick.flight.flying_parts import asks_for_recommended
 
     if asks_for_recommended(options["part"], run):
@@ -69,12 +72,14 @@ def with_deck(run: Run, options: dict[str, Any], settings: Settings, model: Cost
         if model is None:
             raise click.UsageError("--part recommended needs --deck, the main deck of the run")
     if model is None:
-        return options
+        return run, options
     from d2rpick.choice.by_deck import selected
+    from d2rpick.choice.surroundings import in_deck
     from d2rpick.histories.selection import Selection
 
+    run = in_deck(run, model.inventory)
     found = selected(run, Selection(parts=options["part"]), settings, model)
-    return {**options, "part": found.parts, "springs": found.springs}
+    return run, {**options, "part": found.parts, "springs": found.springs}
 
 
 def with_cost(
