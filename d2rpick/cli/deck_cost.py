@@ -31,15 +31,18 @@ _WEIGHTS = click.option(
 
 def cost_options(function: shared.Decorated) -> shared.Decorated:
     """``--deck`` and ``--weights``; collected by ``with_deck``."""
-    return _deck(f"{_DECK}; `--part recommended` stands for the set that d2rpick parts recommends.")(_WEIGHTS(function))
+    return deck_option(f"{_DECK}; `--part recommended` stands for the set that d2rpick parts recommends.")(
+        _WEIGHTS(function)
+    )
 
 
 def model_options(function: shared.Decorated) -> shared.Decorated:
     """``--deck`` and ``--weights`` of the command that recommends a set; collected by ``model_of``."""
-    return _deck(f"{_DECK}.")(_WEIGHTS(function))
+    return deck_option(f"{_DECK}.")(_WEIGHTS(function))
 
 
-def _deck(text: str) -> Callable[[shared.Decorated], shared.Decorated]:
+def deck_option(text: str) -> Callable[[shared.Decorated], shared.Decorated]:
+    """``--deck``, for what the text says."""
     return click.option("--deck", metavar="DECK", type=shared.FILE, help=text)
 
 

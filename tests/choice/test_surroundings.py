@@ -119,6 +119,7 @@ def test_a_support_refuses_the_flight_in_any_form_of_input(
         assert found.exit_code in (1, 2), found.stderr
         assert "held or moved by /BCS/7 (" in found.stderr
         assert "MADE_0000.rad:" in found.stderr
+    assert answer("info", str(folder / name), *options, "--deck", deck)["flights"] == []
     reference = d2.read(str(folder / name))
     with pytest.raises(D2RPickError, match=r"held or moved by /BCS/7"):
         d2.suggest(reference, parts=options[1:] or None, deck=deck)
