@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,8 +34,13 @@ def _surroundings(inventory: Inventory) -> Surroundings:
     on_free = {gravity.get(part) for part in inventory.nodes_by_part.keys() - by_part.keys()}
     if len(on_free) == 1 and (common := on_free.pop()) is not None:
         gravity[None] = common
+    return Surroundings(gravity, supports, partial(_bodies, inventory))
+
+
+def _bodies(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
+    """Parts that hang together; none where some may be missing, or ties that are not followed may join them."""
     known = inventory.complete and not inventory.ties
-    return Surroundings(gravity, supports, inventory.bodies(inventory.nodes_by_part.keys()) if known else None)
+    return inventory.bodies(inventory.nodes_by_part.keys()) if known else ()
 
 
 def _named(holds: tuple[Hold, ...]) -> tuple[Support, ...]:

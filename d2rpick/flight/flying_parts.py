@@ -67,7 +67,7 @@ def flying_parts(run: Run) -> tuple[Part, ...]:
     none of these flies by itself, what `flying_together` tries.
     """
     deformable, momenta = _with_momenta(run)
-    found = list(_of_bodies(momenta, run.surroundings.bodies or ())) if momenta else []
+    found = list(_of_bodies(momenta, run.surroundings.bodies())) if momenta else []
     return _heaviest(run, deformable, momenta, found) if found else flying_together(run)
 
 

@@ -7,7 +7,7 @@ from math import inf
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
 
 class _Numbered(Protocol):
@@ -31,12 +31,12 @@ class Surroundings:
     """What acts on each part from outside, by number; on the whole model by None.
 
     ``gravity`` has the accelerations that it may have [length/time^2], 0 where there is a time without; of a part
-    that is not in it they are not known.  ``bodies`` are the parts that hang together, None where that is not known.
+    that is not in it they are not known.  ``bodies`` gives the parts that hang together, none where that is not known.
     """
 
     gravity: Mapping[int | None, tuple[float, ...]] = field(default_factory=dict)
     supports: Mapping[int | None, tuple[Support, ...]] = field(default_factory=dict)
-    bodies: tuple[tuple[int, ...], ...] | None = None
+    bodies: Callable[[], tuple[tuple[int, ...], ...]] = tuple
 
     def gravity_on(self, parts: Iterable[_Numbered] | None) -> tuple[float, ...] | None:
         """Accelerations that gravity may have for some parts together, or the model; None where they are not known."""

@@ -57,7 +57,8 @@ def _name(card: Card) -> str:
 
 
 def _holds(run: Run, starter: Starter, acting: Worded) -> Iterator[Hold | str]:
-    lifted = any(keyword(block)[:1] == ("BCSR",) for source in run.deck.sources for block in blocks(source))
+    engine = [source for source in run.deck.sources if source not in starter.sources]
+    lifted = any(keyword(block)[:1] == ("BCSR",) for source in engine for block in blocks(source))
     for card, words in acting:
         rows = _rows(card)
         if words[0] == "GRAV" or not rows:
