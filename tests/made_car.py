@@ -94,6 +94,7 @@ def starter(folder: Path, more: str = "") -> str:
         rows = (_row(n, *nodes) for n, (of, nodes) in enumerate(quads(), 1) if of == part)
         text += f"/PART/{part}\n{title}\n{_row(1, 1)}/SHELL/{part}\n{''.join(rows)}"
     name = folder / "MADE_0000.rad"
+    text += "/GRAV/1\ngravity\n" + f"{'':10}{'Z':>10}".ljust(80) + f"{-9.81:20g}\n"
     name.write_text(f"{text}{more}/END\n")
     return str(name)
 
@@ -106,6 +107,9 @@ def keywords(folder: Path, more: str = "") -> str:
     text += "".join(f"{node:8d}{x:16g}{y:16g}{z:16g}\n" for node, (x, y, z) in places().items())
     rows = (_row(n, part, *nodes, width=8) for n, (part, nodes) in enumerate(quads(), 1))
     name = folder / "made.k"
+    text += (
+        f"*LOAD_BODY_Z\n         1{9.81:10g}\n*DEFINE_CURVE\n         1\n{_row(0, 1, width=20)}{_row(1, 1, width=20)}"
+    )
     name.write_text(f"{text}*ELEMENT_SHELL\n{''.join(rows)}{more}*END\n")
     return str(name)
 

@@ -11,6 +11,7 @@ from d2rpick.choice.deck_doubts import (
     doubts_of_bodies,
     doubts_of_cost,
     doubts_of_solver,
+    left_rigid_in,
     of_another_model,
 )
 from d2rpick.choice.part_sets import recommended_parts, with_cost_of
@@ -19,6 +20,7 @@ from d2rpick.choice.warnings import Caution
 from d2rpick.deck.inventory import read_inventory
 from d2rpick.deck.inventory.model import DISCRETE
 from d2rpick.deck.inventory.placement import Placement
+from d2rpick.deck.radioss.flaws import RUINS
 from d2rpick.errors import FormatError
 from d2rpick.flight.flying_parts import asks_for_recommended
 
@@ -70,12 +72,14 @@ def with_deck(settings: Settings, reference: Reference, model: CostModel) -> tup
     inventory = model.inventory
     if foreign := of_another_model(reference.run, inventory):
         return replace(settings, bodies=()), (foreign,)
-    history, settings = reference.history, replace(settings, kept_off=inventory.kept_off)
+    ids = [part.id for part in reference.history.parts or ()]
+    told = (*doubts_of_solver(ids, inventory), *left_rigid_in(reference.run, inventory))
+    ruined = tuple(RUINS[code] for code in dict.fromkeys(one.code for one in told) if code in RUINS)
+    history, settings = reference.history, replace(settings, kept_off=inventory.kept_off, ruined=ruined)
     if not history.parts:
         why = "no parts are named whose elements are saved; give them with `parts`"
-        told = [Caution("cost-unknown", f"the run time stays open: {why}")] if settings.cost_share is None else []
-        return replace(settings, bodies=()), (*doubts_of_solver((), inventory), *told)
-    ids = [part.id for part in history.parts]
+        open_ = [Caution("cost-unknown", f"the run time stays open: {why}")] if settings.cost_share is None else []
+        return replace(settings, bodies=()), (*told, *open_)
     found, share = with_cost_of(settings, model, ids)
     source = ByDeck(inventory.files, model.weights if settings.cost_share is None else None)
     placement = Placement(inventory)
@@ -83,8 +87,9 @@ def with_deck(settings: Settings, reference: Reference, model: CostModel) -> tup
     doubts = [
         *doubts_of(history.parts, inventory),
         *doubts_of_cost(model, used=settings.cost_share is None and share.value is not None),
+        *doubts_of_bodies(ids, inventory),
+        *told,
     ]
-    doubts += [*doubts_of_bodies(ids, inventory), *doubts_of_solver(ids, inventory)]
     if share.reason:
         doubts.append(Caution("cost-unknown", f"the run time stays open: {share.reason}"))
     return found, tuple(doubts)

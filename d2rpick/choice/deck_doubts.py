@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.inventory.pieces import pieces_of
+from d2rpick.deck.radioss.flaws import LEFT_RIGID
 from d2rpick.errors import FormatError, are, name_units
 
 if TYPE_CHECKING:
@@ -70,13 +71,22 @@ def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[C
 
 
 def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
-    """Say what ruins a run of Radioss, and which of the parts would spring back wrongly after a rotation."""
+    """Say what ruins a run, what is not known of its supports, and which parts would spring back wrongly if turned."""
     for flaw in inventory.flaws:
         yield Caution(flaw.code, f"{flaw.place.file}:{flaw.place.line}: {flaw.message}")
+    yield from (Caution("deck-not-followed", note) for note in inventory.boundary.notes)
     unturned = [part for part in parts if part in inventory.parts and not inventory.parts[part].section.turns]
     if unturned and inventory.solver == "radioss":
         found = f"{name_units(unturned)}: the stresses of these solids do not turn with the rigid body"
         yield Caution("stresses-unturned", f"{found}; expect an error after a large rotation")
+
+
+def left_rigid_in(run: Run, inventory: Inventory) -> Iterator[Caution]:
+    """Say which parts a deck keeps rigid, in a run that switches others, although they deform."""
+    left = inventory.left_rigid
+    if left and _has_energy(run, [part for part in run.parts if part.id in left.parts]):
+        where = f"{left.place.file}:{left.place.line}"
+        yield Caution(LEFT_RIGID, f"{where}: {left.found}, which deform in the history; {left.way_out}")
 
 
 def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:

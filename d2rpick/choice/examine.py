@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ from d2rpick.vibration.span import Span, described_span, identify_within, span_o
 
 if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
-    from d2rpick.flight.flight import Seen
+    from d2rpick.flight.flight import Flight, Seen
     from d2rpick.histories.history import History
     from d2rpick.vibration.swings import Swings
 
@@ -50,6 +51,7 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
     fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits)
     flight = find_flight(history, td, settings.after, seen, _settled(history, fit, span))
+    flight = _between_supports(history, flight, td)
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
     if settings.replay:
@@ -63,6 +65,15 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
             within = Span(settled, flight.end or float(history.time[-1]))
             evidence = evidence._replace(swings=_swings(history, within, fits))
     return Situation(history, td, settings, flight, evidence, fits)
+
+
+def _between_supports(history: History, flight: Flight, td: float) -> Flight:
+    """Give the same of what was found in any evidence, or given; that of parts by their momentum is so already."""
+    if flight.start is None or flight.refusal or flight.by_parts:
+        return flight
+    start, end = history.surroundings.free(history.parts, td) or (-inf, inf)
+    end = min(end, inf if flight.end is None else flight.end)
+    return flight._replace(start=max(start, flight.start), end=None if end == inf else end)
 
 
 def _oscillator(

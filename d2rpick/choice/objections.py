@@ -59,7 +59,7 @@ def objections(
     everywhere = np.ones(tr.size, dtype=bool)
     earliest, vibration = situation.earliest_tr, situation.vibration
     if earliest is None:
-        yield Objection(everywhere, "unknown: nothing shows when the load is over")
+        yield Objection(everywhere, situation.flight.refusal or "unknown: nothing shows when the load is over")
     else:
         yield Objection(tr < first_as_read(earliest), f"before {end_of_load(situation)}")
     yield from (Objection(everywhere, reason) for reason in _against_td(situation))

@@ -48,6 +48,7 @@ class Reference(NamedTuple):
         """Read of another run of the model the parts that this one has, whatever words they were asked for by."""
         ids = tuple(str(part.id) for part in self.history.parts or ())
         springs = tuple(str(part.id) for part in self.history.springs)
+        run = run.within(self.run.surroundings)
         return Reference.of(run, selection._replace(parts=ids, springs=springs) if ids else selection)
 
 

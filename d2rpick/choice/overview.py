@@ -88,8 +88,11 @@ class Overview:
         return (*self.alarms, *health, *cautions_of_engine(self.source))
 
 
-def survey(run: Run, selection: Selection) -> Overview:
-    """Look at all databases of a run; of ``selection`` parts and energy matter, for the flights."""
+def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
+    """Look at all databases of a run; of ``selection`` parts and energy matter, for the flights, and the ``deck``."""
+    told: tuple[Caution, ...] = ()
+    if deck is not None:
+        run, told = _in_deck(run, deck)
     first = run.databases[0]
     notes = [note for database in run.databases for note in _notes(database)]
     notes += doubts(run.databases)
@@ -122,8 +125,19 @@ def survey(run: Run, selection: Selection) -> Overview:
         should_write=None if any(one.parts for one in run.momenta(None, None)) else _missing(run),
         health=_health(run, [flight for _, flight in flights]),
         notes=tuple(dict.fromkeys(notes)),
-        alarms=tuple(unsound(history)) if history else (),
+        alarms=(*(unsound(history) if history else ()), *told),
     )
+
+
+def _in_deck(run: Run, deck: str) -> tuple[Run, tuple[Caution, ...]]:
+    """Let a deck tell what acts on a run; DeckError where it cannot be read."""
+    from d2rpick.choice.deck_doubts import doubts_of_solver, of_another_model  # not above: few name a deck
+    from d2rpick.choice.surroundings import in_deck
+    from d2rpick.deck.inventory import read_inventory
+
+    inventory = read_inventory(deck)
+    foreign = of_another_model(run, inventory)
+    return in_deck(run, inventory), (foreign,) if foreign else tuple(doubts_of_solver((), inventory))
 
 
 def _missing(run: Run) -> str:

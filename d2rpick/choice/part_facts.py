@@ -9,7 +9,7 @@ import numpy as np
 
 from d2rpick.choice.suggest_td import bounds, flights_of
 from d2rpick.errors import FormatError
-from d2rpick.flight.flying_parts import deformable_parts, flying_parts
+from d2rpick.flight.flying_parts import deformable_parts, flying_together
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.samples import window
 
@@ -49,12 +49,16 @@ class InFlight:
 
 @dataclass(frozen=True)
 class PartFacts:
-    """What the history says about one part; ``has_energy`` None: its energy is not written."""
+    """What the history says about one part; ``has_energy`` None: its energy is not written.
+
+    ``held`` says what holds it in the longest flight, or at the end of a record without any.
+    """
 
     part: Part
     mass: float | None
     has_energy: bool | None
     flights: tuple[InFlight, ...] = ()
+    held: str | None = None
 
 
 @dataclass(frozen=True)
@@ -100,6 +104,7 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
     spans = tuple(bounds(history, flight) for flight in flights)
     lengths = [end - start for start, end in spans]
     longest = int(np.argmax(lengths)) if lengths else None
+    moment = float(history.time[-1]) if longest is None else sum(spans[longest]) / 2
     known = {
         part.id: PartFacts(
             part,
@@ -109,6 +114,7 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
                 _in_flight(history.time, energies[:, at], span, _flies(part, flight, members))
                 for span, flight in zip(spans, flights, strict=True)
             ),
+            run.surroundings.held([part], moment),
         )
         for at, part in enumerate(run.parts)
     }
@@ -118,7 +124,7 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
 def _history(run: Run) -> tuple[History, Sequence[Part] | None]:
     """Energy of the parts that fly together, or of all that deform where momenta do not tell."""
     try:
-        members: Sequence[Part] | None = flying_parts(run)
+        members: Sequence[Part] | None = flying_together(run)
     except FormatError:
         members = None
     chosen = members or deformable_parts(run)

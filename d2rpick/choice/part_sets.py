@@ -15,6 +15,7 @@ from d2rpick.choice.deck_doubts import (
     doubts_of_bodies,
     doubts_of_cost,
     doubts_of_solver,
+    left_rigid_in,
     of_another_model,
 )
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
@@ -22,6 +23,7 @@ from d2rpick.choice.part_facts import facts_of
 from d2rpick.choice.part_steps import steps_of
 from d2rpick.choice.part_verdicts import rows_of
 from d2rpick.choice.rigid_bodies import bodies_of
+from d2rpick.choice.surroundings import in_deck
 from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.deck.inventory.placement import Placement
 from d2rpick.errors import FormatError, RangeError, are, name_units
@@ -151,9 +153,10 @@ def parts_of(
     -------
     Parts
     """
-    facts = facts_of(run, settings)
     foreign = of_another_model(run, model.inventory) if model else None
     model = None if foreign else model
+    run = in_deck(run, model.inventory if model else None)
+    facts = facts_of(run, settings)
     printed = printed_steps(run, *(beside if model else ()))
     inventory = model.inventory if model else None
     steps = steps_of(inventory, printed)
@@ -167,7 +170,7 @@ def parts_of(
         if left and sets[-1].moving:  # they may fly longer without what moves
             sets.append(comparison.of(PartSet(_STILL, left), times))
     found = tuple(_with_recommendation(_distinct(sets)))
-    cautions = (*((foreign,) if foreign else ()), *_cautions(facts, model, rows, found))
+    cautions = (*((foreign,) if foreign else ()), *_cautions(run, facts, model, rows, found))
     return Parts(run, inventory, model.weights if model else None, settings, facts, rows, found, cautions)
 
 
@@ -356,7 +359,7 @@ def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
 
 
 def _cautions(
-    facts: RunFacts, model: CostModel | None, rows: Sequence[PartRow], sets: Sequence[PartSet]
+    run: Run, facts: RunFacts, model: CostModel | None, rows: Sequence[PartRow], sets: Sequence[PartSet]
 ) -> Iterator[Caution]:
     if facts.reason:
         yield Caution("no-part-history", facts.reason)
@@ -366,6 +369,7 @@ def _cautions(
     yield from doubts_of((fact.part for fact in facts.parts.values()), model.inventory)
     yield from doubts_of_bodies([row.id for row in rows if row.movable], model.inventory)
     yield from doubts_of_solver((), model.inventory)
+    yield from left_rigid_in(run, model.inventory)
     yield from doubts_of_cost(model)
     if missing := [row.id for row in rows if row.elements is None and row.id in facts.parts]:
         yield Caution("parts-not-in-deck", f"{name_units(missing)} of the history {are(missing)} not in the deck")

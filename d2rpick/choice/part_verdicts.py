@@ -154,7 +154,9 @@ def _to_keep(row: PartRow, fact: PartFacts | None, data: PartData | None, alone:
     if row.elements is not None and not row.elements:
         yield "no elements"
         return
-    if fact and fact.has_energy is False:
+    if fact and fact.held:
+        yield fact.held
+    elif fact and fact.has_energy is False:
         yield "never any internal energy: rigid, or fixed"
     elif row.flight and row.flight.flies is False:
         yield "does not fly with the rest"

@@ -47,13 +47,12 @@ def quality_of(situation: Situation, best: Candidate, expected: Expectation | No
     ``expected`` is what the energy alone tells of the time after td, None on another basis.
     """
     flight = situation.flight
-    if flight.unknown_load:
-        return Quality("poor", (_UNKNOWN_LOAD, *(() if situation.at_rest else _poor(situation, best, expected))))
-    if situation.at_rest:
-        return Quality("good") if flight.certain else Quality("fair", (_NOT_CERTAIN,))
-    poor = tuple(_poor(situation, best, expected))
+    poor = (*situation.settings.ruined, *(_UNKNOWN_LOAD,) * flight.unknown_load)
+    poor += () if situation.at_rest else tuple(_poor(situation, best, expected))
     if poor:
         return Quality("poor", poor)
+    if situation.at_rest:
+        return Quality("good") if flight.certain else Quality("fair", (_NOT_CERTAIN,))
     fair = tuple(_fair(situation, best, expected))
     return Quality("fair" if fair else "good", fair)
 

@@ -39,7 +39,7 @@ class Settings:
     Then one body is assumed.
     ``placement``: where the deck puts the parts, or None without one.
     ``by_deck``: the files that these, and a cost share that is not given, come from; None where no deck tells anything.
-    ``kept_off``: main nodes of rigid bodies that the run of a Radioss deck keeps off.
+    ``kept_off``: main nodes of rigid bodies that the run of a Radioss deck keeps off.  ``ruined``: what ruins that run.
     """
 
     after: float | None = None
@@ -57,6 +57,7 @@ class Settings:
     placement: Placement | None = field(default=None, compare=False, repr=False)
     by_deck: ByDeck | None = field(default=None, compare=False, repr=False)
     kept_off: tuple[int, ...] = field(default=(), compare=False, repr=False)
+    ruined: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Raise ValueError with the name of an argument that is out of its range."""

@@ -67,8 +67,11 @@ def longest_flight(
     if not flights and otherwise:
         return otherwise
     if not flights:
-        found = f"{', '.join(history.source)}: nothing in the record shows a flight, in which td could be chosen"
-        raise RangeError(f"{found}; give `td`, and the end of the load as `after` where it is known")
+        held = history.surroundings.held(history.parts, float(history.time[-1]))
+        found = held or "nothing in the record shows a flight, in which td could be chosen"
+        cure = "give `td`, and the end of the load as `after` where it is known"
+        cure = "only what nothing holds can be switched" if held else cure
+        raise RangeError(f"{', '.join(history.source)}: {found}; {cure}")
     windows = [(bounds(history, flight), flight) for flight in flights]
     (start, end), longest = max(windows, key=lambda one: one[0][1] - one[0][0])
     latest = last_td(end, margin_before_contact(history, longest, settings.margin).time)
@@ -87,7 +90,8 @@ def flights_of(history: History, settings: Settings, fits: Fits | None = None) -
     first = float(history.time[0]) if settings.after is None else settings.after
     middle = examine(history, (first + float(history.time[-1])) / 2, settings, fits)
     start, end = bounds(history, middle.flight)
-    if middle.evidence.span and start < end:  # it ends with the oscillator, also where its start is given
+    if middle.evidence.span and start < end and not middle.flight.refusal:
+        # it ends with the oscillator, also where its start is given
         return (middle.flight,)
     return find_flights(history, replace(settings, replay=False))
 

@@ -111,6 +111,8 @@ def _checked(
             configuration = configuration_for(name, asked)
             inputs.append(configuration.source)
             content = sys.stdin.buffer.read() if name == STDIN else None
+            if judge and content is None:
+                judge.beside(name)
             results.append(check_deck(name, configuration, judge, content))
             inputs += results[-1].files
         except (ConfigurationError, DeckError, OSError, MemoryError) as error:

@@ -31,15 +31,18 @@ _WEIGHTS = click.option(
 
 def cost_options(function: shared.Decorated) -> shared.Decorated:
     """``--deck`` and ``--weights``; collected by ``with_deck``."""
-    return _deck(f"{_DECK}; `--part recommended` stands for the set that d2rpick parts recommends.")(_WEIGHTS(function))
+    return deck_option(f"{_DECK}; `--part recommended` stands for the set that d2rpick parts recommends.")(
+        _WEIGHTS(function)
+    )
 
 
 def model_options(function: shared.Decorated) -> shared.Decorated:
     """``--deck`` and ``--weights`` of the command that recommends a set; collected by ``model_of``."""
-    return _deck(f"{_DECK}.")(_WEIGHTS(function))
+    return deck_option(f"{_DECK}.")(_WEIGHTS(function))
 
 
-def _deck(text: str) -> Callable[[shared.Decorated], shared.Decorated]:
+def deck_option(text: str) -> Callable[[shared.Decorated], shared.Decorated]:
+    """``--deck``, for what the text says."""
     return click.option("--deck", metavar="DECK", type=shared.FILE, help=text)
 
 
@@ -54,13 +57,16 @@ def model_of(options: dict[str, Any]) -> CostModel | None:
     return read_model(options["deck"], options["weights"])
 
 
-def with_deck(run: Run, options: dict[str, Any], settings: Settings, model: CostModel | None) -> dict[str, Any]:
-    """Replace ``--part recommended`` by the numbers of that set, and add those of springs; UsageError without a deck.
+def with_deck(
+    run: Run, options: dict[str, Any], settings: Settings, model: CostModel | None
+) -> tuple[Run, dict[str, Any]]:
+    """Let the deck tell what acts on the run, replace ``--part recommended`` by the numbers of that set, add springs.
 
-    The energy of springs is no level: they are the parts that the deck, or their energies, show to be springs.
+    UsageError where that set is asked for without a deck.  The energy of springs is no level: they are the parts that
+    the deck, or their energies, show to be springs.
     """
     if model is None and not options["part"]:
-        return options
+        return run, options
     from d2rpick.flight.flying_parts import asks_for_recommended
 
     if asks_for_recommended(options["part"], run):
@@ -69,12 +75,14 @@ def with_deck(run: Run, options: dict[str, Any], settings: Settings, model: Cost
         if model is None:
             raise click.UsageError("--part recommended needs --deck, the main deck of the run")
     if model is None:
-        return options
+        return run, options
     from d2rpick.choice.by_deck import selected
+    from d2rpick.choice.surroundings import in_deck
     from d2rpick.histories.selection import Selection
 
+    run = in_deck(run, model.inventory)
     found = selected(run, Selection(parts=options["part"]), settings, model)
-    return {**options, "part": found.parts, "springs": found.springs}
+    return run, {**options, "part": found.parts, "springs": found.springs}
 
 
 def with_cost(

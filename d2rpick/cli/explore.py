@@ -79,7 +79,7 @@ def command(
         run = asked.open()
         output = Output.of(options, *run.sources)
         model = deck_cost.model_of(options)
-        options = deck_cost.with_deck(run, options, settings, model)
+        run, options = deck_cost.with_deck(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
         settings, unknown = deck_cost.with_cost(settings, reference, model, options["merge"])
     found = explore_of(reference, settings, td_window, td=td, steps=steps)

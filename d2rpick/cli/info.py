@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from d2rpick.cli import options as shared
+from d2rpick.cli.deck_cost import deck_option
 from d2rpick.cli.output import Output
 from d2rpick.cli.progress import reading
 from d2rpick.cli.wording import in_words
@@ -20,6 +21,7 @@ Examples:
 
 
 @click.command("info", epilog=EXAMPLES)
+@deck_option("Main deck of the run: tells gravity, supports and imposed motion, without which flights are found.")
 @shared.history_options
 @shared.output_options(*FORMATS["overview"])
 @click.pass_context
@@ -31,7 +33,7 @@ def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **option
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
         output = Output.of(options, *run.sources)
-        overview = survey(run, asked.selection)
+        overview = survey(run, asked.selection, options["deck"])
     output.notes((), overview.cautions)
     text = write("overview", output_format, overview, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))

@@ -88,7 +88,7 @@ def command(
         output = Output.of(options, *run.sources, *(name for name in (done, *before) if name not in (None, "-")))
         model = deck_cost.model_of(options)
         plan_deck.check_model(run, model, options)
-        options = deck_cost.with_deck(run, options, settings, model)
+        run, options = deck_cost.with_deck(run, options, settings, model)
         reference = Reference(run, energy_of(run, options, prints=prints))
         settings, unknown = deck_cost.with_cost(settings, reference, model, options["merge"])
         earlier = reference.like(asked._replace(names=before).open(), asked.selection) if before else None

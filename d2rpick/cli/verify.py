@@ -73,7 +73,7 @@ def command(
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
         model = deck_cost.model_of(options)
-        options = deck_cost.with_deck(run, options, settings, model)
+        run, options = deck_cost.with_deck(run, options, settings, model)
         finished = shared.Reading.of(options)._replace(names=switched) if switched else None
         other = finished.open() if finished else None
         output = Output.of(options, *run.sources, *(other.sources if other else ()))

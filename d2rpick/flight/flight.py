@@ -11,6 +11,7 @@ import numpy as np
 
 from d2rpick.flight.energy_alone import landing_after, quiet_time
 from d2rpick.flight.level import moves_as_a_whole, settled_from
+from d2rpick.flight.supports import unheld
 from d2rpick.flight.window import SHORTEST, all_windows, marks
 
 if TYPE_CHECKING:
@@ -125,12 +126,16 @@ _CONFIRMED: WeakKeyDictionary[History, dict[tuple[tuple[str, FreeFlight], ...], 
 
 
 class Seen(NamedTuple):
-    """What the evidence says of a td: the flight around it, or the one nearest to it and what denies one at td."""
+    """What the evidence says of a td: the flight around it, or the one nearest to it and what denies one at td.
+
+    ``held``: supports do, which hold also where the end of the load is given.
+    """
 
     flight: FreeFlight | None
     source: str | None
     refusal: str | None = None
     doubts: tuple[str, ...] = ()
+    held: bool = False
 
 
 def find_flight(history: History, td: float, after: float | None, seen: Seen, span: Span | None) -> Flight:
@@ -139,6 +144,8 @@ def find_flight(history: History, td: float, after: float | None, seen: Seen, sp
     ``after`` is given as the end of the load [time]; ``seen`` what the evidence shows; ``span`` the window that an
     oscillator describes.
     """
+    if seen.held:
+        return Flight(None, None, None, refusal=seen.refusal)
     if seen.flight:
         first, last, parts, end_seen, damping, gravity = seen.flight
         given = after is not None and not (seen.refusal and first > td)
@@ -198,8 +205,17 @@ def seen_flight(history: History, td: float) -> Seen:
     """Find the free flight around ``td`` [time] in everything but the energy of the parts.
 
     The best source that shows a flight counts.  A better one that shows none at td is never overruled, nor is the
-    contact energy; where two sources show different ends, the later start and the earlier end count.
+    contact energy; where two sources show different ends, the later start and the earlier end count.  What is held at
+    td does not fly, whatever the evidence; of a whole model those parts may that nothing holds.
     """
+    held = history.surroundings.held(history.parts, td)
+    if held is None:
+        return _seen(history, td)
+    seen = None if history.parts else _seen(history, td)
+    return seen if seen and seen.flight and seen.flight.parts else Seen(None, None, held, held=True)
+
+
+def _seen(history: History, td: float) -> Seen:
     found: list[tuple[str, FreeFlight]] = []
     for witness in witnesses(history):
         flight = witness.holding(td)
@@ -264,11 +280,15 @@ def _witnesses(history: History) -> Iterator[Witness]:
     if contact_energy.shows_contacts(balance):
         plateau = partial(contact_energy.plateau_around, balance)
         around = plateau if history.momenta else partial(_level_around, history, plateau)
-        yield Witness.of("contact-energy", balance.time, around, decisive=False)
+        yield Witness.of("contact-energy", balance.time, partial(_unheld, history, around), decisive=False)
     if work.can_tell(balance):
         worked = balance.external_work is not None and bool(np.ptp(balance.external_work))
         around = partial(_level_around, history, partial(work.balanced_around, balance))
-        yield Witness.of("energy-balance", balance.time, around, decisive=worked)
+        yield Witness.of("energy-balance", balance.time, partial(_unheld, history, around), decisive=worked)
+
+
+def _unheld(history: History, around: Callable[[float], FreeFlight | None], td: float) -> FreeFlight | None:
+    return unheld(history.surroundings, around(td), history.parts, td)
 
 
 def _first(history: History, momenta: Sequence[Momenta], td: float) -> FreeFlight | None:
@@ -284,8 +304,9 @@ def _first(history: History, momenta: Sequence[Momenta], td: float) -> FreeFligh
 
 def _level_around(history: History, around: Callable[[float], FreeFlight | None], td: float) -> FreeFlight | None:
     """Give the flight around td of a source that does not see a wall that does no work."""
-    found = _keeping_level(history, around(td))
-    balance = history.balance
+    found, balance = _keeping_level(history, around(td)), history.balance
+    if found and isinf(found.gravity) and history.surroundings.gravity_on(None) == (0.0,):
+        return None  # no gravity feeds the energies
     return found if found and balance and moves_as_a_whole(balance, found.start, found.end) else None
 
 

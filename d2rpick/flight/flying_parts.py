@@ -10,10 +10,10 @@ from d2rpick.errors import FormatError
 from d2rpick.flight.momentum import all_flights
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.flight.window import FreeFlight
-    from d2rpick.histories.history import Part
+    from d2rpick.histories.history import Momenta, Part
     from d2rpick.histories.run import Run
     from d2rpick.histories.selection import Selection
 
@@ -60,19 +60,50 @@ def deformable_parts(run: Run) -> tuple[Part, ...]:
 
 
 def flying_parts(run: Run) -> tuple[Part, ...]:
-    """Give the deformable parts that fly together; FormatError where momenta do not tell.
+    """Give the deformable parts that fly as one body; FormatError where momenta do not tell.
 
     Of all sets that fly, the one with the largest product of mass and time counts: a loose tyre may fly for longer than
-    the car, which is what is to be switched.  All parts are tried first, then each that is in no set yet.
+    the car, which is what is to be switched.  Tried are the parts that hang together by the deck; without one, or where
+    none of these flies by itself, what `flying_together` tries.
     """
-    deformable = deformable_parts(run)
-    momenta = next((one for one in run.momenta(deformable, None) if one.parts), None)
+    deformable, momenta = _with_momenta(run)
+    found = list(_of_bodies(momenta, run.surroundings.bodies())) if momenta else []
+    return _heaviest(run, deformable, momenta, found) if found else flying_together(run)
+
+
+def flying_together(run: Run) -> tuple[Part, ...]:
+    """Give the deformable parts that momenta show to fly together, in one body or in several; FormatError without.
+
+    All parts are tried, and each that is in no set yet, with what hangs on it.
+    """
+    deformable, momenta = _with_momenta(run)
     found: list[FreeFlight] = []
     if momenta:
         for part, place in zip(deformable, momenta.chosen, strict=True):
             if not any(part in (flight.parts or ()) for flight in found):
                 found += all_flights(momenta.choosing((place,)))
         found += all_flights(momenta)
+    return _heaviest(run, deformable, momenta, found)
+
+
+def _with_momenta(run: Run) -> tuple[tuple[Part, ...], Momenta | None]:
+    deformable = deformable_parts(run)
+    return deformable, next((one for one in run.momenta(deformable, None) if one.parts), None)
+
+
+def _of_bodies(momenta: Momenta, bodies: Iterable[Iterable[int]]) -> Iterator[FreeFlight]:
+    """Find the flights of parts that hang together, by their numbers."""
+    places = {part.id: place for place, part in enumerate(momenta.parts or ())}
+    for body in bodies:
+        members = tuple(places[part] for part in body if part in places)
+        if members:
+            yield from all_flights(momenta.choosing(members, members))
+
+
+def _heaviest(
+    run: Run, deformable: Sequence[Part], momenta: Momenta | None, found: Sequence[FreeFlight]
+) -> tuple[Part, ...]:
+    """Give the deformable parts of the flight with the largest product of mass and time."""
     if not found or momenta is None:
         raise FormatError(f"{run.name}: no momenta show which parts fly together; name the parts to be switched")
     masses = np.ones(len(run.parts)) if momenta.masses is None else np.nan_to_num(momenta.masses)

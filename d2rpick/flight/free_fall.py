@@ -47,12 +47,22 @@ class Laws:
     """Free flight of one set of parts: under gravity and damping, or where nothing at all acts.
 
     A constant net force is no proof of gravity, and a push that fades exponentially looks like damping under such a
-    force.  So it is believed only if it is the mass times the gravity of the earth, in whatever units.
+    force.  So it is believed only if it is the mass times the gravity of the deck, one of the accelerations
+    ``gravities`` (0: none acts for a time); where these are None, times that of the earth, in whatever units.
     """
 
     def __init__(
-        self, time: Samples, momentum: Samples, mass: float, noise: float, balance: Balance | None, *, velocity: bool
+        self,
+        time: Samples,
+        momentum: Samples,
+        mass: float,
+        noise: float,
+        balance: Balance | None,
+        gravities: tuple[float, ...] | None = None,
+        *,
+        velocity: bool,
     ) -> None:
+        self.gravities = gravities
         self.fit, self.noise, self.balance, self.velocity = FreeFall(time, momentum), noise, balance, velocity
         self.mass = 1.0 if velocity else mass
         self.extent = float(np.ptp(momentum, axis=0).max())
@@ -67,8 +77,18 @@ class Laws:
             return window, gravity
         window = lasting_window(self._steady, td, self.extent, self.noise, fades=True, enough=_ENOUGH)
         if window:
-            return (None if self.fall else window), None
+            return (None if self._carried else window), None
         return self._under_gravity(td)
+
+    @property
+    def _carried(self) -> bool:
+        """Whether something must carry the parts where no force is seen."""
+        return self.fall if self.gravities is None else 0.0 not in self.gravities
+
+    def _is_gravity(self, acceleration: float, error: float = _ALIKE) -> bool:
+        if self.gravities is None:
+            return is_gravity(acceleration, error)
+        return any(one > 0 and abs(acceleration - one) <= error * one for one in self.gravities)
 
     def _braked(self, first: int, last: int) -> bool:
         """Whether what looks like damping is a brake: faster than the states show, or it has taken nearly all."""
@@ -92,7 +112,7 @@ class Laws:
             return None, None
         direction = np.round(slope / size) if np.abs(slope / size).max() > _ALONG_AXIS else slope / size
         found = []
-        for gravity in _gravities_near(size):
+        for gravity in _gravities_near(size, self.gravities):
             weight, key = direction * (self.mass * gravity), (gravity, *direction.tolist())
             if key not in self._given:
                 impulse = (time - time[0])[:, np.newaxis] * weight
@@ -124,15 +144,19 @@ class Laws:
         vector = self.fit.gravity(*window)
         force, mass = float(np.linalg.norm(vector)), self.mass if self.mass > 0 else float("nan")
         if force * (end - start) <= _UNSEEN * (TOLERANCE * self.extent + self.noise):
-            return None if self.fall else 0.0
-        if is_gravity(force / mass, _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start))):
+            return None if self._carried else 0.0
+        if self._is_gravity(force / mass, _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start))):
             return force / mass
         found = None
         if self.balance is not None:
             found = acceleration_by_work(self.balance, self.fit.time, self.fit.momentum @ (vector / force), start, end)
         if found is None:
-            return float("nan") if self.velocity or np.isnan(mass) else None
-        return found if is_gravity(found) or (self.velocity and found > 0) else None
+            return float("nan") if self._may_fall and (self.velocity or np.isnan(mass)) else None
+        return found if self._is_gravity(found) or (self._may_fall and self.velocity and found > 0) else None
+
+    @property
+    def _may_fall(self) -> bool:
+        return self.gravities is None or any(self.gravities)
 
     @cached_property
     def fall(self) -> bool:
@@ -146,8 +170,11 @@ class Laws:
         return any((self._gravity(one) or 0.0) > 0 for one in windows if one)
 
 
-def _gravities_near(acceleration: float) -> Iterator[float]:
-    """What decks have for gravity, roughly as large as an acceleration."""
+def _gravities_near(acceleration: float, known: tuple[float, ...] | None) -> Iterator[float]:
+    """What decks have for gravity, roughly as large as an acceleration: the ``known`` ones, if they are."""
+    if known is not None:
+        yield from (one for one in known if abs(acceleration - one) < _ROUGHLY * one)
+        return
     for value in _OF_DECKS if acceleration > 0 else ():
         gravity = float(value * 10.0 ** np.round(np.log10(acceleration / value)))
         if abs(acceleration / gravity - 1) < _ROUGHLY:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.flight.free_fall import Laws
+from d2rpick.flight.supports import unheld
 from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows
 from d2rpick.histories.samples import bent, window
 
@@ -125,20 +126,24 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
     extent = float(np.ptp(momentum, axis=0).max())
     noise = momenta.noise(members)
     parts = None if momenta.parts is None else tuple(momenta.parts[i] for i in members)
+    gravities = momenta.surroundings.gravity_on(parts)
     if extent <= max(2 * noise, _CONSTANT * float(np.abs(momentum).max())):
         known = float(np.abs(momentum).max()) > noise and _moves(momenta, members, noise)
-        return FreeFlight(float(time[0]), float(time[-1]), parts, False) if known else None
+        known = known and (gravities is None or 0.0 in gravities)
+        whole = FreeFlight(float(time[0]), float(time[-1]), parts, False)
+        return unheld(momenta.surroundings, whole, parts, td) if known else None
     if noise > TOLERANCE * extent:
         return None
     laws = _laws(momenta, tuple(members), balance)
     states, gravity = laws.window(td)
-    if states is None or (not gravity and _falls(momenta)):
+    if states is None or (not gravity and gravities is None and _falls(momenta)):
         return None  # what does not fall with the others is carried
     first, last = states
     if float(np.abs(momentum[(first + last) // 2 : last + 1]).max()) <= _HELD * float(np.abs(momentum).max()) + noise:
         return None  # held, or at rest
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
-    return FreeFlight(float(time[first]), float(time[last]), parts, last < time.size - 1, damping, gravity or 0.0)
+    found = FreeFlight(float(time[first]), float(time[last]), parts, last < time.size - 1, damping, gravity or 0.0)
+    return unheld(momenta.surroundings, found, parts, td)
 
 
 def _laws(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None) -> Laws:
@@ -148,7 +153,9 @@ def _laws(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = 
     key = "laws", members, whole is None
     if key not in momenta.known:
         noise, velocity = momenta.noise(members), momenta.velocity
-        momenta.known[key] = Laws(momenta.time, momenta.of(members), mass, noise, whole, velocity=velocity)
+        parts = None if momenta.parts is None else [momenta.parts[i] for i in members]
+        gravities = momenta.surroundings.gravity_on(parts)
+        momenta.known[key] = Laws(momenta.time, momenta.of(members), mass, noise, whole, gravities, velocity=velocity)
     laws: Laws = momenta.known[key]
     return laws
 

@@ -13,6 +13,7 @@ from d2rpick.errors import HistoryError, RangeError
 from d2rpick.histories.crossings import find_turns
 from d2rpick.histories.digits import told_apart
 from d2rpick.histories.samples import window
+from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterable, Sequence
@@ -109,7 +110,7 @@ class Momenta:
     ``precision`` is that of the printed numbers; ``chosen`` are the indices of the parts to switch, ``flying``
     those of the set that is known to fly together, if it is.  ``masses`` of shape (parts,), NaN where unknown; None
     where none are [mass].  ``velocity``: velocities stand for the momenta, of a mass that is not known.
-    ``known``: what was found of sets of parts: the same few are asked for at many times.
+    ``surroundings`` act from outside.  ``known``: what was found of sets of parts: the same few are asked for often.
     """
 
     time: Samples
@@ -120,6 +121,7 @@ class Momenta:
     flying: tuple[int, ...] | None = None
     masses: Samples | None = None
     velocity: bool = False
+    surroundings: Surroundings = UNKNOWN
     known: dict[Hashable, Any] = field(default_factory=dict, init=False)
 
     def choosing(self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None) -> Momenta:
@@ -248,11 +250,10 @@ class History:
     Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
     in them was taken for the energy, ``parts`` whose energy it is, None for the whole model;
     ``springs`` are those of them whose energy is left out.  ``complete``
-    is False when a file stopped inside a state; ``notes`` say in plain sentences what was left out or assumed.
-    ``files`` are the contents that were read.
+    is False when a file stopped inside a state; ``notes`` say what was left out or assumed; ``files`` were read.
     Where the energy is a sum, ``part_names`` (k,) and ``part_energies`` (n, k) are its terms that are not always zero.
     ``time_unit`` is given only where the file names it; solver databases do not.  ``evidence`` tells when parts fly
-    freely; that of a file is read when it is first asked for.
+    freely; that of a file is read when it is first asked for.  ``surroundings`` act on them from outside.
     """
 
     time: Samples
@@ -268,6 +269,7 @@ class History:
     part_names: tuple[str, ...] = ()
     part_energies: Samples | None = None
     evidence: FlightEvidence = NO_EVIDENCE
+    surroundings: Surroundings = UNKNOWN
     complete: bool = True
     notes: tuple[str, ...] = ()
     files: tuple[Source, ...] = ()

@@ -14,6 +14,7 @@ from d2rpick.histories.companions import check_sum, doubts
 from d2rpick.histories.history import History, Momenta, Track
 from d2rpick.histories.names import QUANTITIES, quantity_note
 from d2rpick.histories.selection import menu, select_parts
+from d2rpick.histories.surroundings import UNKNOWN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Part, Samples
     from d2rpick.histories.selection import Selection
     from d2rpick.histories.source import Source
+    from d2rpick.histories.surroundings import Surroundings
 
 _AXES = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
@@ -31,11 +33,21 @@ _CENTRES = ("x_center", "y_center", "z_center")
 class Run:
     """Databases of one run, one per format, those that say most of it first.
 
-    ``sources`` name their files; ``files`` are what was read of them.
+    ``sources`` name their files; ``files`` are what was read of them.  ``surroundings`` act on the model from outside.
     """
 
-    def __init__(self, sources: tuple[str, ...], databases: tuple[Legs, ...], files: tuple[Source, ...] = ()) -> None:
-        self.sources, self.databases, self.files = sources, databases, files
+    def __init__(
+        self,
+        sources: tuple[str, ...],
+        databases: tuple[Legs, ...],
+        files: tuple[Source, ...] = (),
+        surroundings: Surroundings = UNKNOWN,
+    ) -> None:
+        self.sources, self.databases, self.files, self.surroundings = sources, databases, files, surroundings
+
+    def within(self, surroundings: Surroundings) -> Run:
+        """Give the same run with what is known of its surroundings."""
+        return Run(self.sources, self.databases, self.files, surroundings)
 
     @property
     def name(self) -> str:
@@ -61,7 +73,7 @@ class Run:
         """
         history = self._energy(selection)
         flying = select_parts(selection.flying, self.parts, self.name) if selection.flying else None
-        return replace(history, evidence=_Written(self, history.parts, flying))
+        return replace(history, evidence=_Written(self, history.parts, flying), surroundings=self.surroundings)
 
     def momenta(self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> tuple[Momenta, ...]:
         """Give the momentum of the parts and that of the whole model, as far as they are written.
@@ -71,10 +83,14 @@ class Run:
         of_parts, of_whole = self._part_momenta, self._whole_momentum
         if of_parts and of_parts.parts:
             ids = [part.id for part in of_parts.parts]
-            members = tuple(ids.index(part.id) for part in chosen or of_parts.parts)
+            members = tuple(ids.index(part.id) for part in chosen or self._free(of_parts.parts))
             known = tuple(ids.index(part.id) for part in flying) if flying else None
             of_parts = of_parts.choosing(members, known)
         return tuple(one for one in (of_parts, of_whole) if one)
+
+    def _free(self, parts: Sequence[Part]) -> Sequence[Part]:
+        """Give those of all parts that nothing holds, or all where each is held."""
+        return [part for part in parts if not self.surroundings.supports_of([part])] or parts
 
     @cached_property
     def _part_momenta(self) -> Momenta | None:
@@ -87,7 +103,10 @@ class Run:
         except FormatError:
             return None  # it cannot say what flies together
         precision = holder.precisions(())[1]
-        return Momenta(holder.part_time, values, holder.parts, precision, (), masses=self._least_masses(values, holder))
+        masses = self._least_masses(values, holder)
+        return Momenta(
+            holder.part_time, values, holder.parts, precision, (), masses=masses, surroundings=self.surroundings
+        )
 
     @cached_property
     def masses(self) -> Samples | None:
@@ -134,8 +153,9 @@ class Run:
             if velocity:
                 values, mass = velocity.values[:, np.newaxis], np.array([velocity.mass or np.nan])
                 return Momenta(
-                    database.time, values, None, velocity.precision, (0,), masses=mass, velocity=velocity.mass is None
-                )
+                    database.time, values, None, velocity.precision, (0,), masses=mass,
+                    velocity=velocity.mass is None, surroundings=self.surroundings,
+                )  # fmt: skip
         return None
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:

@@ -67,9 +67,11 @@ def asked_of(
     if model is None:
         return Asked(Reference.of(run.files, chosen), chosen, settings, (), options)
     from d2rpick.choice.by_deck import selected, with_deck
+    from d2rpick.choice.surroundings import in_deck
 
-    selection = selected(run.files, chosen, settings, model)
-    reference = Reference.of(run.files, selection)
+    files = in_deck(run.files, model.inventory)
+    selection = selected(files, chosen, settings, model)
+    reference = Reference.of(files, selection)
     settings, unknown = with_deck(settings, reference, model)
     return Asked(reference, selection, settings, unknown, options)
 

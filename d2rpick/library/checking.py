@@ -115,7 +115,11 @@ def check(
         check_run(history, "history")
         judge = HistoryJudge(history.files, history.chosen, settings)
     asked = Configuration(arguments.rule_ids("select", select), arguments.rule_ids("ignore", ignore))
-    checked = tuple(check_deck(name, configuration_for(name, asked), judge) for name in names)
+    checked = []
+    for name in names:
+        if judge:
+            judge.beside(name)
+        checked.append(check_deck(name, configuration_for(name, asked), judge))
     files = [text for name in (history.sources if history else ()) for text in ("--history", name)]
     rules = [text for name in ("select", "ignore") for one in getattr(asked, name) for text in (f"--{name}", one)]
     judging = options_of(history.chosen, choosing, history.input_format) if history else ()
@@ -125,6 +129,6 @@ def check(
         windows=tuple(window for one in checked for window in one.windows),
         warnings=tuple(judge.cautions) if judge else (),
         command=("check", *files, *judging, *rules, *positional(names)),
-        _checked=checked,
+        _checked=tuple(checked),
         _history=history.sources if history else None,
     )

@@ -6,8 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.radioss.flaws import AT_REST, NOT_FOLLOWED, THROUGH_WALL
-from d2rpick.deck.radioss.starter import rigid_parts
-from d2rpick.errors import are, in_rows, name_units
+from d2rpick.deck.radioss.left_rigid import left_rigid
 from d2rpick.rules.base import RADIOSS, Rule, Severity
 from d2rpick.rules.example_runs import GOOD_RUN, WINDOW, engine_files, run_of, starter_deck
 from d2rpick.rules.run_case import RunCase
@@ -25,27 +24,15 @@ def _flaws(case: Case, *, code: str) -> Iterator[Objection]:
 
 
 def _left_rigid(case: Case) -> Iterator[Objection]:
-    """Find the bodies that no leg switches, of a run that switches others, where they hold whole parts."""
-    if not isinstance(case, RunCase) or case.run.starter is None or case.run.starter.moved or not case.windows.windows:
+    """Find the bodies that no leg switches; an error where their parts deform in the history."""
+    left = left_rigid(case.run, case.windows.windows) if isinstance(case, RunCase) else None
+    deforming = case.judge.deforming(left.parts) if left and case.judge else None
+    if left is None or deforming == ():
         return
-    bodies = [body for body in case.run.starter.bodies if not body.sensor and body.node.value not in case.named]
-    parts = rigid_parts(case.run.starter, {body.node.value: body.group for body in bodies}) if bodies else {}
-    bodies = [body for body in bodies if parts.get(body.node.value)]
-    held = sorted({part for body in bodies for part in parts[body.node.value]})
-    if not held:
-        return
-    deforming = case.judge.deforming(held) if case.judge else None
-    if deforming == ():
-        return
-    places = [card.here for card, _, _ in case.run.legs[0].switched]
-    ids, mains = (in_rows(number) for number in ((body.id for body in bodies), (body.node.value for body in bodies)))
-    found = f"no leg switches /RBODY {', '.join(ids)}, so {name_units(held)} {are(held)} rigid from time 0 to the end"
-    way_out = f"name main node{'s' * (len(bodies) > 1)} {', '.join(mains)} in the /RBODY/OFF of every leg"
-    place = places[0] if places else case.run.legs[0].run.here
     if deforming:
-        yield place, f"{found}, which deform in the history; {way_out}", Severity.ERROR
+        yield left.place, f"{left.found}, which deform in the history; {left.way_out}", Severity.ERROR
     else:
-        yield place, f"{found}; where the run without switching keeps the bodies off, {way_out}"
+        yield left.place, f"{left.found}; where the run without switching keeps the bodies off, {left.way_out}"
 
 
 def _row(*fields: float | str, width: int = 10) -> str:

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import Reference, verify_of
 from d2rpick.choice.suggest import find_better_pair, suggest_at
+from d2rpick.choice.surroundings import in_deck
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, Caution, end_of_flight, end_of_load
-from d2rpick.errors import FormatError, name_units
+from d2rpick.deck.inventory import read_inventory
+from d2rpick.errors import DeckError, FormatError, name_units
 from d2rpick.histories.digits import above, first_as_read
+from d2rpick.histories.surroundings import UNKNOWN
 from d2rpick.histories.units import in_the_record
 from d2rpick.rules.base import Fault
 
@@ -57,6 +60,18 @@ class HistoryJudge:
     _references: dict[tuple[int, ...], Reference] = field(default_factory=dict)
     _faults: dict[tuple[tuple[int, ...], float, float | None], tuple[Fault, ...]] = field(default_factory=dict)
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
+
+    def beside(self, deck: str) -> None:
+        """Let the deck that is judged next tell what acts on its parts; one without parts of its own tells nothing."""
+        try:
+            inventory = read_inventory(deck)
+        except DeckError:
+            inventory = None
+        run = in_deck(self.run.within(UNKNOWN), inventory)
+        if run.surroundings is not self.run.surroundings:
+            self.run = run
+            self._references.clear()
+            self._faults.clear()
 
     @property
     def end(self) -> float:
@@ -187,7 +202,7 @@ def _of_flight(verdict: Verdict) -> Iterator[Fault]:
     situation, tr = verdict.situation, verdict.candidate.tr
     earliest = situation.earliest_tr
     if earliest is None:
-        yield Fault("D2R204", False, _UNKNOWN)
+        yield Fault("D2R204", False, situation.flight.refusal or _UNKNOWN)
     elif tr < first_as_read(earliest):
         end = f"before {end_of_load(situation)} ({situation.flight.source})"
         yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; {_way_out(verdict)}")

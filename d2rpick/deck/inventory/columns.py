@@ -49,12 +49,12 @@ def layout(*widths: int) -> Layout:
 
 
 class Lines:
-    """Data lines of a piece of a mesh: no comments, no blank ones."""
+    """Data lines of a piece of a mesh: no comments, no blank ones; ``in_columns``: each stands in fixed columns."""
 
     def __init__(self, data: bytes, scope: Scope, comments: bytes) -> None:
         self._scope = scope
         data = data.replace(b"\r\n", b"\n")
-        self._plain = not any(letter in data for letter in _ONE_BY_ONE)
+        self.in_columns = not any(letter in data for letter in _ONE_BY_ONE)
         cells = _table(np.frombuffer(data, np.uint8))
         keep = ~np.isin(cells[:, 0], list(comments))
         unsure = np.flatnonzero(cells[:, min(_ID_ENDS, cells.shape[1] - 1)] == _BLANK)
@@ -87,7 +87,7 @@ class Lines:
     @cached_property
     def _texts(self) -> dict[int, str]:
         """Lines that do not stand in columns, or refer to parameters."""
-        if self._plain:
+        if self.in_columns:
             return {}
         special = np.isin(self.cells, [ord(letter) for letter in _ONE_BY_ONE]).any(axis=1)
         return {row: self.cells[row].tobytes().decode("latin-1") for row in np.flatnonzero(special).tolist()}

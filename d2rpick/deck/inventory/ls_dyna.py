@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.deck.cut import cuts, holds_mesh
-from d2rpick.deck.inventory import formulations, joints
+from d2rpick.deck.inventory import boundary_ls_dyna, formulations, joints, supports
 from d2rpick.deck.inventory.columns import layout, lines_of
 from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of
 from d2rpick.deck.parts import read_parts
@@ -82,7 +82,7 @@ def read(deck: Deck) -> Inventory:
     parts = read_parts(deck)
     cards = list(_element_cards(deck))
     raw = [one for card in cards if _followed(card) for one in _elements(card)]
-    ids, coordinates = _nodes(deck)
+    ids, coordinates, codes = _nodes(deck)
     kinds = sorted({kind for kind, _, _ in raw})
     table, places = placed(ids, [_joined([n for name, _, n in raw if name == kind]) for kind in kinds])
     elements = tuple(
@@ -92,10 +92,12 @@ def read(deck: Deck) -> Inventory:
     beyond = np.full((table.size - ids.size, 3), np.nan)
     notes = tuple(_notes(deck, cards, elements, parts, lost=len(beyond)))
     held = joints.of_ls_dyna(deck)
+    boundary = boundary_ls_dyna.read(deck, parts, (ids, coordinates, codes))
     return Inventory(
         "ls-dyna", _parts(deck, parts, elements), elements, np.concatenate([coordinates, beyond]), notes,
         parts.all_known and not notes, joints=joints.placed(held.found, table), ties=held.unknown,
         watched=places_of(_watched(deck), table), moved=_moves_nodes(deck), files=tuple(deck.sources),
+        boundary=supports.placed(boundary, table),
     )  # fmt: skip
 
 
@@ -200,9 +202,9 @@ def _joined(blocks: Sequence[Integers]) -> Integers:
     return np.concatenate(blocks)
 
 
-def _nodes(deck: Deck) -> tuple[Integers, Reals]:
-    """Ids and coordinates of all nodes."""
-    ids, places = [np.empty(0, np.int64)], [np.empty((0, 3))]
+def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
+    """Ids and coordinates of all nodes, and the codes of their translations that are fixed."""
+    ids, places, codes = [np.empty(0, np.int64)], [np.empty((0, 3))], [np.empty(0, np.int64)]
     for card in deck.named("NODE"):
         if card.name != "NODE":
             continue
@@ -214,7 +216,16 @@ def _nodes(deck: Deck) -> tuple[Integers, Reals]:
                 good = numbers > 0
                 ids.append(numbers[good] + card.transform.node)
                 places.append(_moved(lines, fields, card)[good])
-    return np.concatenate(ids), np.concatenate(places)
+                codes.append(_codes(lines, [*fields, (sum(fields[-1]), width)])[good])
+    return np.concatenate(ids), np.concatenate(places), np.concatenate(codes)
+
+
+def _codes(lines: Lines, fields: Layout) -> Integers:
+    """Last of some fields, 0 in most meshes."""
+    start, width = fields[-1]
+    if lines.in_columns and not (lines.cells[:, start : start + width] > ord("0")).any():
+        return np.zeros(len(lines), np.int64)
+    return lines.integers(fields)[:, -1]
 
 
 def _moved(lines: Lines, fields: Layout, card: Card) -> Reals:

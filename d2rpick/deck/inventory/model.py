@@ -12,12 +12,15 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.deck.inventory.boundary import NOTHING, Boundary
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.deck.radioss.flaws import Flaw
+    from d2rpick.deck.radioss.left_rigid import LeftRigid
     from d2rpick.deck.source import SourceFile
 
     Places = NDArray[np.int64]
@@ -117,6 +120,7 @@ class Inventory:
     written.  ``moved``: something moves nodes away from the coordinates of the deck.  ``files`` are those of the deck.
     ``history_groups`` are the ids of /THPART: groups of elements that a time history lists among its parts.
     ``kept_off`` are main nodes of rigid bodies that a Radioss run keeps off, ``flaws`` what ruins it because of bodies.
+    ``boundary`` is what acts on the model from outside, ``left_rigid`` what stays rigid in a run that switches others.
     """
 
     solver: str
@@ -134,6 +138,8 @@ class Inventory:
     history_groups: frozenset[int] = frozenset()
     kept_off: tuple[int, ...] = ()
     flaws: tuple[Flaw, ...] = ()
+    boundary: Boundary = NOTHING
+    left_rigid: LeftRigid | None = None
 
     @cached_property
     def counts(self) -> Mapping[int, Counter[str]]:

@@ -24,15 +24,20 @@ def pieces_of(inventory: Inventory, parts: Collection[int], among: Collection[in
     ``among`` are the parts through which they may hang together, by default the same; joints and springs count in any
     case.
     """
-    through, known = frozenset(parts if among is None else among), _LABELS.setdefault(inventory, {})
-    if through not in known:
-        known[through] = _labels(inventory, through)
+    labels = labels_of(inventory, frozenset(parts if among is None else among))
     nodes = [inventory.nodes_by_part.get(part, np.empty(0, np.int64)) for part in parts]
-    return np.unique(known[through][np.concatenate(nodes)]).size
+    return np.unique(labels[np.concatenate(nodes)]).size
+
+
+def labels_of(inventory: Inventory, parts: frozenset[int]) -> Places:
+    """Number of the piece of each node of the deck (nodes,): what parts, springs and joints make hang together."""
+    known = _LABELS.setdefault(inventory, {})
+    if parts not in known:
+        known[parts] = _labels(inventory, parts)
+    return known[parts]
 
 
 def _labels(inventory: Inventory, parts: frozenset[int]) -> Places:
-    """Number of the piece of each node of the deck (nodes,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

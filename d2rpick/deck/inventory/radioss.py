@@ -11,12 +11,13 @@ import numpy as np
 
 from d2rpick.deck.cut import cuts, holds_mesh
 from d2rpick.deck.expression import ExpressionError, number
-from d2rpick.deck.inventory import formulations, joints
+from d2rpick.deck.inventory import boundary_radioss, formulations, joints, supports
 from d2rpick.deck.inventory.body_flaws import flaws_of
 from d2rpick.deck.inventory.model import Elements, Inventory, Material, PartData, Section, placed, places_of
 from d2rpick.deck.inventory.radioss_mesh import KINDS, NOT_COUNTED, elements_of, nodes_of
 from d2rpick.deck.radioss.blocks import blocks, card_of, keyword, whole
 from d2rpick.deck.radioss.engine import kept_off
+from d2rpick.deck.radioss.left_rigid import left_rigid
 from d2rpick.deck.radioss.legs import find_run_windows
 from d2rpick.errors import name_units
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.inventory.model import Formulation
     from d2rpick.deck.radioss.files import Run
     from d2rpick.deck.radioss.starter import Starter
+    from d2rpick.deck.windows import Window
 
 _WIDTH, _REAL = 10, 20
 
@@ -79,7 +81,8 @@ def read(run: Run) -> Inventory:
     )
     beyond = np.full((table.size - ids.size, 3), np.nan)
     notes = tuple(_notes(run, worded, elements, starter, len(beyond)))
-    parts = _parts(run, starter, worded, elements)
+    windows = find_run_windows(run).windows.windows if run.legs else ()
+    parts = _parts(starter, worded, elements, _always_rigid(windows))
     held = joints.of_radioss(run, starter, worded)
     return Inventory(
         "radioss", parts, elements, np.concatenate([coordinates, beyond]), notes, not notes,
@@ -88,6 +91,8 @@ def read(run: Run) -> Inventory:
         files=tuple(run.deck.sources),
         history_groups=frozenset(whole(words[-1]) for _, words in worded if words[:1] == ("THPART",)),
         kept_off=kept_off(run.legs), flaws=flaws_of(run, _switched(run, starter)),
+        boundary=supports.placed(boundary_radioss.read(run, starter, worded), table),
+        left_rigid=left_rigid(run, windows),
     )  # fmt: skip
 
 
@@ -125,7 +130,7 @@ def _notes(
 
 
 def _parts(
-    run: Run, starter: Starter, cards: Sequence[tuple[Card, tuple[str, ...]]], elements: Sequence[Elements]
+    starter: Starter, cards: Sequence[tuple[Card, tuple[str, ...]]], elements: Sequence[Elements], rigid: set[int]
 ) -> Mapping[int, PartData]:
     materials = dict(_materials(cards))
     properties = dict(_properties(cards))
@@ -133,7 +138,7 @@ def _parts(
     for one in elements:
         for part in np.unique(one.part).tolist():
             kinds.setdefault(part, set()).add(one.kind)
-    rigid, unturned = _always_rigid(run), starter.unturned
+    unturned = starter.unturned
     found: dict[int, PartData] = {}
     for card, words in cards:
         rows = [row for row in card.rows if not row.blank] if words[:1] == ("PART",) else []
@@ -156,11 +161,8 @@ def _material(found: Material | None, prop: _Property | None, rigid: bool) -> Ma
     return found
 
 
-def _always_rigid(run: Run) -> set[int]:
+def _always_rigid(windows: Sequence[Window]) -> set[int]:
     """Parts in a rigid body that is on from the start to the end; none where no engine file tells."""
-    if not run.legs:
-        return set()
-    windows = find_run_windows(run).windows.windows
     return {one.unit.id for one in windows if not one.unit.is_body and one.tr == 0 and one.td is None}
 
 
