@@ -25,7 +25,7 @@ SHORTEST, FEWEST = 0.05, 12
 # largest deviation is looked for among more states and over a longer time.
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
 # Nothing is known more exactly than this share of its range: solvers add up in single precision.
-_ROUND_OFF = 1e-7
+ROUND_OFF = 1e-7
 # Every so many moments there is one from which a long flight is looked for.
 _FAR: Final = 5
 # Each time the window shrinks its middle is clearer of the contacts; it soon stays.
@@ -114,7 +114,7 @@ def lasting_window(
     """
     time = law.time
     at = min(int(np.searchsorted(time, td)), time.size - 1)
-    limit, own = TOLERANCE * extent, max(noise, _ROUND_OFF * extent)
+    limit, own = max(TOLERANCE, enough) * extent, max(noise, ROUND_OFF * extent)
     found = _converged(law, at, limit, own if fades else limit, noise, enough * extent)
     if found is None:
         return None
