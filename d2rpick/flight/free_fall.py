@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.flight.window import FEWEST, ROUND_OFF, TOLERANCE, Constant, Remembered, lasting_window, longest_window, moments
+from d2rpick.flight.window import (
+    FEWEST,
+    ROUND_OFF,
+    TOLERANCE,
+    Constant,
+    Remembered,
+    lasting_window,
+    longest_window,
+    moments,
+)
 from d2rpick.histories.samples import bent, integral, window
 
 if TYPE_CHECKING:
@@ -32,7 +41,8 @@ _DAMPED, _LEFT = 0.2, 0.05
 # It takes less than this from one state to the next.
 _SHOWN = 0.1
 # So little of the largest momentum, and of its range, may deviate in a window where nothing but gravity is admitted,
-# although a load fades on: from end to end twice as much changes.
+# although a load fades on: from end to end twice as much changes.  Of some of the parts that move only the tolerance
+# may: what acts on them is the rest of their body.
 _ENOUGH = 3e-3
 # Across a load of one direction, what bends the momentum is within so many times what digits hide; of an axis so much
 # must lie across it; along the load it bends it so many times as much.
@@ -55,13 +65,22 @@ class Laws:
     """
 
     def __init__(
-        self, time: Samples, momentum: Samples, mass: float, noise: float, balance: Balance | None, *, velocity: bool
+        self,
+        time: Samples,
+        momentum: Samples,
+        mass: float,
+        noise: float,
+        balance: Balance | None,
+        *,
+        velocity: bool,
+        complete: bool = True,
     ) -> None:
         self.fit, self.noise, self.balance, self.velocity = FreeFall(time, momentum), noise, balance, velocity
         self.mass = 1.0 if velocity else mass
         self.extent = float(np.ptp(momentum, axis=0).max())
         largest = float(np.linalg.norm(momentum, axis=1).max())
-        self._enough = _ENOUGH * min(1.0, largest / self.extent) if self.extent > 0 else 0.0
+        share = min(1.0, largest / self.extent) if self.extent > 0 else 0.0
+        self._enough = _ENOUGH * share if complete else min(TOLERANCE, _ENOUGH * share)
         self._falling, self._steady = Remembered(self.fit), Remembered(Constant(time, momentum))
         self._given: dict[tuple[float, ...], Remembered] = {}
 
@@ -117,7 +136,7 @@ class Laws:
         return longest_window(self._falling, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Weights (3,) along an axis that show across a load of one direction: it bends the momentum along that only."""
+        """Weights (3,) along an axis that show across a load of one direction: only along it is the momentum bent."""
         if last - first < FEWEST or not self.mass > 0:
             return
         time, momentum = self.fit.time[first : last + 1], self.fit.momentum[first : last + 1]

@@ -150,8 +150,15 @@ def _laws(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = 
     whole = balance if momenta.parts is None or np.isnan(mass) else None
     key = "laws", members, whole is None
     if key not in momenta.known:
-        noise, velocity = momenta.noise(members), momenta.velocity
-        momenta.known[key] = Laws(momenta.time, momenta.of(members), mass, noise, whole, velocity=velocity)
+        momenta.known[key] = Laws(
+            momenta.time,
+            momenta.of(members),
+            mass,
+            momenta.noise(members),
+            whole,
+            velocity=momenta.velocity,
+            complete=set(momenta.moving) <= set(members),
+        )
     laws: Laws = momenta.known[key]
     return laws
 
