@@ -15,6 +15,7 @@ from d2rpick.flight.level import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around
 from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Part, Precision
 from tests.benchmarks import flights as campaign
+from tests.records import printed
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -69,7 +70,7 @@ def aslant(along_x: Samples, along_z: Samples) -> Momenta:
     """Momentum of one body of mass 10 in a plane, with seven digits."""
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0], values[:, 0, 2] = along_x, along_z
-    values = campaign.printed(values.ravel(), 7).reshape(values.shape)
+    values = printed(values.ravel(), 7).reshape(values.shape)
     return Momenta(TIME, values, PARTS[:1], Precision(7), (0,), masses=np.array([10.0]))
 
 
