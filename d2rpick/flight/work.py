@@ -36,7 +36,7 @@ _OF_INTERNAL: Final = 0.1
 # of it is told from that by friction.
 _LITTLE, _MUCH = 5e-3, 0.5
 # One for each record: it is asked about many td.
-_LAWS: Final[WeakKeyDictionary[Balance, Remembered]] = WeakKeyDictionary()
+_LAWS: Final[WeakKeyDictionary[Balance, tuple[Remembered, ...]]] = WeakKeyDictionary()
 
 
 def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | None:
@@ -143,9 +143,12 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     if noise > _OWN_ERROR * extent:
         return None
     if balance not in _LAWS:
-        _LAWS[balance] = Remembered(_Parabola(time, np.stack(terms, axis=1), balance.kinetic, balance.internal))
-    window = lasting_window(_LAWS[balance], td, extent, noise)
-    rings = lasting_window(_LAWS[balance], td, extent, noise, rings=True) if window is None else None
+        energies = np.stack(terms, axis=1)
+        laws = (_Parabola(time, energies, balance.kinetic, of_rate) for of_rate in (None, balance.internal))
+        _LAWS[balance] = tuple(map(Remembered, laws))
+    exact, ringing = _LAWS[balance]  # without and with a rate, which takes up what tells a load from free flight, too
+    window = lasting_window(exact, td, extent, noise)
+    rings = lasting_window(ringing, td, extent, noise, rings=True) if window is None else None
     found = window or rings
     if found is None:
         return None
@@ -192,7 +195,7 @@ def _terms(balance: Balance) -> list[Samples]:
 class _Parabola:
     """Energies that are parabolas of time but for damping, which takes a share of the kinetic energy; a `Law`.
 
-    Solvers know velocities half a step away from places: that adds the rate of the internal energy.
+    Solvers know velocities half a step away from places: that adds the rate of the ``internal`` energy, where given.
     """
 
     def __init__(
