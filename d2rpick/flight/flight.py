@@ -298,20 +298,20 @@ def _first(history: History, momenta: Sequence[Momenta], td: float) -> FreeFligh
     for one in momenta:
         found = flight_around(one, td, history.balance)
         if found:
-            return found if one.parts is not None or one.flying else _keeping_level(history, found)
+            return found if one.parts is not None or one.flying else _keeping_level(history, found, td)
     return None
 
 
 def _level_around(history: History, around: Callable[[float], FreeFlight | None], td: float) -> FreeFlight | None:
     """Give the flight around td of a source that does not see a wall that does no work."""
-    found, balance = _keeping_level(history, around(td)), history.balance
+    found, balance = _keeping_level(history, around(td), td), history.balance
     if found and isinf(found.gravity) and history.surroundings.gravity_on(None) == (0.0,):
         return None  # no gravity feeds the energies
     return found if found and balance and moves_as_a_whole(balance, found.start, found.end) else None
 
 
-def _keeping_level(history: History, flight: FreeFlight | None) -> FreeFlight | None:
-    """Give what of a flight of the whole model the internal energy keeps its level in, or None."""
+def _keeping_level(history: History, flight: FreeFlight | None, td: float) -> FreeFlight | None:
+    """Give what of a flight of the whole model the internal energy keeps its level in, or None where td is before."""
     if flight is None:
         return None
     balance, whole, time, energy = history.balance, None, history.time, history.energy
@@ -320,7 +320,7 @@ def _keeping_level(history: History, flight: FreeFlight | None) -> FreeFlight | 
         if history.parts is not None:
             energy = np.interp(time, balance.time, balance.internal)
     start = settled_from(time, energy, whole, flight.start, flight.end)
-    if start is None or flight.end - start < SHORTEST * (time[-1] - time[0]):
+    if start is None or start > td or flight.end - start < SHORTEST * (time[-1] - time[0]):
         return None
     return flight._replace(start=start)
 

@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, Remembered, lasting_window, longest_window, moments
+from d2rpick.flight.window import (
+    FEWEST,
+    ROUND_OFF,
+    TOLERANCE,
+    Constant,
+    Remembered,
+    lasting_window,
+    longest_window,
+    moments,
+)
 from d2rpick.histories.samples import bent, integral, window
 
 if TYPE_CHECKING:
@@ -31,8 +40,13 @@ _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
 _DAMPED, _LEFT = 0.2, 0.05
 # It takes less than this from one state to the next.
 _SHOWN = 0.1
-# So little of the range may still change in a window where nothing but gravity is admitted, although a load fades on.
-_ENOUGH = TOLERANCE
+# So little of the largest momentum, and of its range, may deviate in a window where nothing but gravity is admitted,
+# although a load fades on: from end to end twice as much changes.  Of some of the parts that move only the tolerance
+# may: what acts on them is the rest of their body.
+_ENOUGH = 3e-3
+# Across a load of one direction, what bends the momentum is within so many times what digits hide; of an axis so much
+# must lie across it; along the load it bends it so many times as much.
+_REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
 # There, what acts beside gravity falls to this share from the first third to the last, and to that of the weight.
 _FADED, _LITTLE = 0.6, 0.02
 # A change of momentum that no gravity explains is none up to so many times what a window leaves open.
@@ -61,11 +75,15 @@ class Laws:
         gravities: tuple[float, ...] | None = None,
         *,
         velocity: bool,
+        complete: bool = True,
     ) -> None:
         self.gravities = gravities
         self.fit, self.noise, self.balance, self.velocity = FreeFall(time, momentum), noise, balance, velocity
         self.mass = 1.0 if velocity else mass
         self.extent = float(np.ptp(momentum, axis=0).max())
+        largest = float(np.linalg.norm(momentum, axis=1).max())
+        share = min(1.0, largest / self.extent) if self.extent > 0 else 0.0
+        self._enough = _ENOUGH * share if complete else min(TOLERANCE, _ENOUGH * share)
         self._falling, self._steady = Remembered(self.fit), Remembered(Constant(time, momentum))
         self._given: dict[tuple[float, ...], Remembered] = {}
 
@@ -75,8 +93,11 @@ class Laws:
         gravity = self._gravity(window) if window and not self._braked(*window) else None
         if gravity is not None:
             return window, gravity
-        window = lasting_window(self._steady, td, self.extent, self.noise, fades=True, enough=_ENOUGH)
+        window = lasting_window(self._steady, td, self.extent, self.noise, fades=True)
         if window:
+            return (None if self._carried else window), None
+        window = lasting_window(self._steady, td, self.extent, self.noise, fades=True, enough=self._enough)
+        if window and not self._falls_across:  # a push that balances the weight for a moment leaves it as steady
             return (None if self._carried else window), None
         return self._under_gravity(td)
 
@@ -102,29 +123,59 @@ class Laws:
     def _under_gravity(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
         """Give the window around ``td`` under one of the accelerations that decks have for gravity: a load may fade."""
         time, momentum = self.fit.time, self.fit.momentum
-        at = min(int(np.searchsorted(time, td)), time.size - 1)
-        first, last = longest_window(self._falling, at, _ENOUGH * self.extent + self.noise)
+        first, last = self._around(td)
         if last - first < FEWEST or not self.mass > 0:
             return None, None
-        slope = np.polyfit(time[first : last + 1] - time[first], momentum[first : last + 1], 1)[0] / self.mass
-        size = float(np.linalg.norm(slope))
-        if not size > 0:
-            return None, None
-        direction = np.round(slope / size) if np.abs(slope / size).max() > _ALONG_AXIS else slope / size
         found = []
-        for gravity in _gravities_near(size, self.gravities):
-            weight, key = direction * (self.mass * gravity), (gravity, *direction.tolist())
+        across = list(self._weights_across(first, last))
+        for weight in across or self._weights_near(first, last):
+            key = tuple(weight.tolist())
             if key not in self._given:
                 impulse = (time - time[0])[:, np.newaxis] * weight
                 self._given[key] = Remembered(Constant(time, momentum - impulse))
             law = self._given[key]
             window = lasting_window(law, td, self.extent, self.noise, fades=True)
             if window is None:
-                window = lasting_window(law, td, self.extent, self.noise, fades=True, enough=_ENOUGH)
-                window = window if window and self._fades_out(window, weight) else None
-            found.append((window, gravity))
+                enough = self._enough if across else TOLERANCE
+                window = lasting_window(law, td, self.extent, self.noise, fades=True, enough=enough)
+                window = window if window and (across or self._fades_out(window, weight)) else None
+            found.append((window, float(np.linalg.norm(weight)) / self.mass))
         windows = [(one, gravity) for one, gravity in found if one]
         return max(windows, key=lambda one: float(np.ptp(time[[*one[0]]])), default=(None, None))
+
+    def _around(self, td: float) -> tuple[int, int]:
+        """States around ``td`` in which a load that fades, or a constant one, bends the momentum by little."""
+        at = min(int(np.searchsorted(self.fit.time, td)), self.fit.time.size - 1)
+        return longest_window(self._falling, at, TOLERANCE * self.extent + self.noise)
+
+    def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
+        """Weights (3,) along an axis that show across a load of one direction: only along it is the momentum bent."""
+        if last - first < FEWEST or not self.mass > 0:
+            return
+        time, momentum = self.fit.time[first : last + 1], self.fit.momentum[first : last + 1]
+        rest = bent(time, momentum)
+        along = np.linalg.svd(rest, full_matrices=False)[2][0]
+        across = np.eye(along.size) - np.outer(along, along)
+        room = _REACH_OF_NOISE * max(self.noise, ROUND_OFF * self.extent)
+        if np.abs(rest @ across).max() > room or np.abs(rest @ along).max() < _CLEARLY * room:
+            return
+        slope = across @ np.polyfit(time - time[0], momentum, 1)[0]
+        for axis, seen in zip(np.eye(along.size), across, strict=True):
+            if seen @ seen > _SEEN**2:
+                size = float(slope @ seen) / float(seen @ seen)
+                if np.linalg.norm(slope - size * seen) <= _ALIKE * abs(size) and self._is_gravity(
+                    abs(size) / self.mass
+                ):
+                    yield size * axis
+
+    def _weights_near(self, first: int, last: int) -> Iterator[Samples]:
+        """Weights (3,) of decks that are roughly as large as the mean force between two states."""
+        time = self.fit.time[first : last + 1]
+        slope = np.polyfit(time - time[0], self.fit.momentum[first : last + 1], 1)[0] / self.mass
+        size = float(np.linalg.norm(slope))
+        if size > 0:
+            direction = np.round(slope / size) if np.abs(slope / size).max() > _ALONG_AXIS else slope / size
+            yield from (direction * (self.mass * gravity) for gravity in _gravities_near(size, self.gravities))
 
     def _fades_out(self, window: tuple[int, int], weight: Samples) -> bool:
         """Whether what acts in a window beside the ``weight`` (3,) fades, and is little of it at the end."""
@@ -167,7 +218,15 @@ class Laws:
         windows = (
             lasting_window(self._falling, td, self.extent, self.noise, fades=True) for td in moments(self.fit.time)
         )
-        return any((self._gravity(one) or 0.0) > 0 for one in windows if one)
+        return any((self._gravity(one) or 0.0) > 0 for one in windows if one and not self._braked(*one))
+
+    @cached_property
+    def _falls_across(self) -> bool:
+        """Whether gravity shows across a load at some time."""
+        return any(
+            next(self._weights_across(*self._around(td)), None) is not None and self._under_gravity(td)[0]
+            for td in moments(self.fit.time)
+        )
 
 
 def _gravities_near(acceleration: float, known: tuple[float, ...] | None) -> Iterator[float]:

@@ -22,6 +22,10 @@ _RESERVE: Final = 0.5
 # The means of its last two quarters differ by at most this share of that width: of a steady drift by all of it, of a
 # vibration that shows three quarters of a period in each by 0.3.
 _DRIFT: Final = 0.35
+# A slow vibration is told from a crash, which ends where the energy has swung once to and fro: so many swings by half
+# of the range, and ranges and means of both halves that are this much alike.
+_SWINGS: Final = 4
+_ALIKE: Final = 0.75
 # Below this share of the largest energy a width is round-off: tables and single precision have seven digits.
 _ROUND_OFF: Final = 1e-6
 # An energy that falls so low beside its peaks is that of one vibration, which is at rest where it peaks.  Of what has
@@ -45,7 +49,8 @@ def settled_from(time: Samples, energy: Samples, whole: Samples | None, start: f
     least = _ROUND_OFF * float(np.abs(energy).max(initial=0.0))
     first, last = inside.start, inside.stop
     while last - first >= FEWEST:
-        kept = _kept_from(energy[first:last], None if whole is None else whole[first:last], least)
+        states = energy[first:last], None if whole is None else whole[first:last], least
+        kept = 0 if _swings(*states) else _kept_from(*states)
         if kept is not None:
             return start if first + kept == inside.start else float(time[first + kept])
         first += max(1, (last - first) // 4)
@@ -64,6 +69,33 @@ def _kept_from(energy: Samples, whole: Samples | None, least: float) -> int | No
     below = low - _RESERVE * width - (0.0 if whole is None else lost[:last])
     outside = np.flatnonzero((energy[:last] < below) | (energy[:last] > high + _RESERVE * width + lost[:last]))
     return int(outside[-1]) + 1 if outside.size else 0
+
+
+def _swings(energy: Samples, whole: Samples | None, least: float) -> bool:
+    """Whether an energy swings slowly about one level: to and fro by half of its range, alike in both halves."""
+    width = float(np.ptp(energy))
+    if width <= least:
+        return True
+    one, two = np.array_split(energy, 2)
+    lost = 0.0 if whole is None else max(0.0, float(whole[0] - whole[-1]))
+    drift = float(two.mean() - one.mean())
+    if abs(drift) > _DRIFT * _ALIKE * width + (lost if drift < 0 else 0.0):
+        return False
+    if min(np.ptp(one), np.ptp(two)) < _ALIKE * width - lost:
+        return False
+    return _large_swings(energy, width / 2) >= _SWINGS
+
+
+def _large_swings(energy: Samples, least: float) -> int:
+    """How often an energy turns after it has changed by ``least``."""
+    turns, low, high, rising = 0, energy[0], energy[0], None
+    for value in energy.tolist():
+        low, high = min(low, value), max(high, value)
+        if rising is not True and value - low >= least:
+            turns, rising, high = turns + 1, True, value
+        elif rising is not False and high - value >= least:
+            turns, rising, low = turns + 1, False, value
+    return turns
 
 
 def moves_as_a_whole(balance: Balance, start: float, end: float) -> bool:

@@ -31,7 +31,7 @@ _LONGER = 1.1
 # Parts that may be attached are looked for in this share of the record before td, on so many states at most.  What
 # bends the momenta of a body cancels but for this share: digits and the solver's own errors.
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
-# What moves no faster than at this share of its largest momentum stands, or is held.
+# What moves no faster than at this share of its largest momentum stands, or is held, unless it goes on as it does.
 _HELD = 0.01
 # A body of its own flies by itself for this share of the record, at a velocity that differs by this from that of all.
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
@@ -139,8 +139,11 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
     if states is None or (not gravity and gravities is None and _falls(momenta)):
         return None  # what does not fall with the others is carried
     first, last = states
-    if float(np.abs(momentum[(first + last) // 2 : last + 1]).max()) <= _HELD * float(np.abs(momentum).max()) + noise:
-        return None  # held, or at rest
+    inside = momentum[first : last + 1]
+    if float(np.abs(inside[inside.shape[0] // 2 :]).max()) <= _HELD * float(np.abs(momentum).max()) + noise:
+        steady = _VISIBLE * max(noise, float(np.ptp(inside, axis=0).max()))
+        if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
+            return None  # held, or at rest
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
     found = FreeFlight(float(time[first]), float(time[last]), parts, last < time.size - 1, damping, gravity or 0.0)
     return unheld(momenta.surroundings, found, parts, td)
@@ -152,10 +155,17 @@ def _laws(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = 
     whole = balance if momenta.parts is None or np.isnan(mass) else None
     key = "laws", members, whole is None
     if key not in momenta.known:
-        noise, velocity = momenta.noise(members), momenta.velocity
         parts = None if momenta.parts is None else [momenta.parts[i] for i in members]
-        gravities = momenta.surroundings.gravity_on(parts)
-        momenta.known[key] = Laws(momenta.time, momenta.of(members), mass, noise, whole, gravities, velocity=velocity)
+        momenta.known[key] = Laws(
+            momenta.time,
+            momenta.of(members),
+            mass,
+            momenta.noise(members),
+            whole,
+            momenta.surroundings.gravity_on(parts),
+            velocity=momenta.velocity,
+            complete=set(momenta.moving) <= set(members),
+        )
     laws: Laws = momenta.known[key]
     return laws
 

@@ -18,6 +18,8 @@ TOLERANCE = 1e-3
 # load that fades smoothly shrinks the window too, but no more once the limit lies below what is left of it.  So the
 # limit is lowered, tenth by tenth, down to what the numbers resolve, as long as the window that was found stays.
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
+# What rings in a window has this share of its misfit in the middle half, at least.
+_RINGS = 1 / 3
 # No window is shorter than this share of the record, or holds fewer states.
 SHORTEST, FEWEST = 0.05, 12
 # The misfit of the middle of a window, without this share at each end, is that of free flight itself.  The window may
@@ -25,7 +27,7 @@ SHORTEST, FEWEST = 0.05, 12
 # largest deviation is looked for among more states and over a longer time.
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
 # Nothing is known more exactly than this share of its range: solvers add up in single precision.
-_ROUND_OFF = 1e-7
+ROUND_OFF = 1e-7
 # Every so many moments there is one from which a long flight is looked for.
 _FAR: Final = 5
 # Each time the window shrinks its middle is clearer of the contacts; it soon stays.
@@ -91,7 +93,7 @@ class Remembered:
 
 
 def lasting_window(
-    law: Law, td: float, extent: float, noise: float, *, fades: bool = False, enough: float = 0.0
+    law: Law, td: float, extent: float, noise: float, *, fades: bool = False, enough: float = 0.0, rings: bool = False
 ) -> tuple[int, int] | None:
     """Find the states around ``td`` that obey the law and go on doing so when it is taken strictly.
 
@@ -106,6 +108,8 @@ def lasting_window(
         Go on to finer limits: a load that fades smoothly shows at these only.
     enough : float
         Share of the range that a window may leave although it goes on to shrink.
+    rings : bool
+        Take a window in which the misfit is as large in its middle: a vibration, which no law of free flight describes.
 
     Returns
     -------
@@ -114,8 +118,8 @@ def lasting_window(
     """
     time = law.time
     at = min(int(np.searchsorted(time, td)), time.size - 1)
-    limit, own = TOLERANCE * extent, max(noise, _ROUND_OFF * extent)
-    found = _converged(law, at, limit, own if fades else limit, noise, enough * extent)
+    limit, own = max(TOLERANCE, enough) * extent, max(noise, ROUND_OFF * extent)
+    found = _converged(law, at, limit, own if fades else limit, noise, enough * extent, rings=rings)
     if found is None:
         return None
     window, room, from_start = found
@@ -126,7 +130,7 @@ def lasting_window(
 
 
 def _converged(
-    law: Law, at: int, limit: float, finest: float, noise: float, enough: float
+    law: Law, at: int, limit: float, finest: float, noise: float, enough: float, *, rings: bool
 ) -> tuple[tuple[int, int], float, bool] | None:
     """Find the window around the state ``at`` that hardly shrinks at a tenth of the limit; None where it does.
 
@@ -145,7 +149,7 @@ def _converged(
         share = _length(time, finer) / _length(time, window)
         if found and share < _STAYS:
             break
-        lasts = share >= (1 + np.cbrt(strict / room)) / 2
+        lasts = share >= (1 + np.cbrt(strict / room)) / 2 or (rings and _rings(law, window))
         if not _TIGHTER * limit >= finest:
             return (window, room, from_start) if lasts else found or kept
         if (
@@ -157,6 +161,12 @@ def _converged(
         window, limit, room, at = finer, _TIGHTER * limit, strict, (finer[0] + finer[1]) // 2
         found = (window, room, from_start) if lasts else None
     return found or kept
+
+
+def _rings(law: Law, window: tuple[int, int]) -> bool:
+    """Whether a law is missed in the middle half of a window as in the whole; by what is smooth it is by an eighth."""
+    quarter = (window[1] - window[0]) // 4
+    return law.misfit(window[0] + quarter, window[1] - quarter) >= _RINGS * law.misfit(*window)
 
 
 def _fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:

@@ -36,7 +36,7 @@ _OF_INTERNAL: Final = 0.1
 # of it is told from that by friction.
 _LITTLE, _MUCH = 5e-3, 0.5
 # One for each record: it is asked about many td.
-_LAWS: Final[WeakKeyDictionary[Balance, Remembered]] = WeakKeyDictionary()
+_LAWS: Final[WeakKeyDictionary[Balance, tuple[Remembered, ...]]] = WeakKeyDictionary()
 
 
 def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | None:
@@ -143,13 +143,19 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     if noise > _OWN_ERROR * extent:
         return None
     if balance not in _LAWS:
-        _LAWS[balance] = Remembered(_Parabola(time, np.stack(terms, axis=1), balance.kinetic))
-    window = lasting_window(_LAWS[balance], td, extent, noise)
-    if window is None:
+        energies = np.stack(terms, axis=1)
+        laws = (_Parabola(time, energies, balance.kinetic, of_rate) for of_rate in (None, balance.internal))
+        _LAWS[balance] = tuple(map(Remembered, laws))
+    exact, ringing = _LAWS[balance]  # without and with a rate, which takes up what tells a load from free flight, too
+    window = lasting_window(exact, td, extent, noise)
+    rings = lasting_window(ringing, td, extent, noise, rings=True) if window is None else None
+    found = window or rings
+    if found is None:
         return None
-    first, last = window
+    first, last = found
     start, end = float(time[first]), float(time[last])
-    return FreeFlight(start, end, None, last < time.size - 1, gravity=_unexplained(balance, first, last))
+    gravity = _unexplained(balance, first, last) or (np.nan if rings else 0.0)
+    return FreeFlight(start, end, None, last < time.size - 1, gravity=gravity)
 
 
 def _unexplained(balance: Balance, first: int, last: int) -> float:
@@ -187,11 +193,18 @@ def _terms(balance: Balance) -> list[Samples]:
 
 
 class _Parabola:
-    """Energies that are parabolas of time but for damping, which takes a share of the kinetic energy; a `Law`."""
+    """Energies that are parabolas of time but for damping, which takes a share of the kinetic energy; a `Law`.
 
-    def __init__(self, time: Samples, energies: Samples, kinetic: Samples | None) -> None:
+    Solvers know velocities half a step away from places: that adds the rate of the ``internal`` energy, where given.
+    """
+
+    def __init__(
+        self, time: Samples, energies: Samples, kinetic: Samples | None, internal: Samples | None = None
+    ) -> None:
         self.time, self.energies = time, energies
-        self.spent = None if kinetic is None else integral(time, kinetic)
+        self.others = [] if kinetic is None else [integral(time, kinetic)]
+        if internal is not None and time.size > 1:
+            self.others.append(np.gradient(internal, time))
 
     def misfit(self, first: int, last: int) -> float:
         """Largest deviation between two states [energy]."""
@@ -200,12 +213,8 @@ class _Parabola:
         if time.size < FEWEST_STATES:
             return 0.0
         elapsed = (time - time[0]) / (time[-1] - time[0])
-        spent = None if self.spent is None else self.spent[states]
-        extent = 0.0 if spent is None else np.ptp(spent)
-        table = np.empty((time.size, 4 if extent > 0 else 3))
-        table[:, 0], table[:, 1], table[:, 2] = 1.0, elapsed, elapsed**2
-        if spent is not None and extent > 0:
-            table[:, 3] = (spent - spent[0]) / extent
+        others = [(one[states] - one[states.start]) / extent for one in self.others if (extent := np.ptp(one[states]))]
+        table = np.stack([np.ones_like(elapsed), elapsed, elapsed**2, *others], axis=1)
         scale = 2.0 ** (np.frexp(np.abs(self.energies[states]).max())[1] - 1)  # exact; squares of 1e200 would overflow
         energies = self.energies[states] / scale
         factors, *_ = np.linalg.lstsq(table, energies, rcond=None)

@@ -13,8 +13,9 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.flight.level import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around
-from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Part
+from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Part, Precision
 from tests.benchmarks import flights as campaign
+from tests.records import printed
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -58,6 +59,44 @@ def test_the_flight_behind_a_load_that_fades_is_found(gravity: float, fade: np.u
     assert impulse[-1] - impulse[start] < 0.01 * np.abs(impulse).max()
     assert found.start < 0.6
     assert found.end == 1.0
+
+
+def impulse_of(force: Samples) -> Samples:
+    """Its integral over TIME."""
+    return np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2) * TIME[1]])
+
+
+def aslant(along_x: Samples, along_z: Samples) -> Momenta:
+    """Momentum of one body of mass 10 in a plane, with seven digits."""
+    values = np.zeros((TIME.size, 1, 3))
+    values[:, 0, 0], values[:, 0, 2] = along_x, along_z
+    values = printed(values.ravel(), 7).reshape(values.shape)
+    return Momenta(TIME, values, PARTS[:1], Precision(7), (0,), masses=np.array([10.0]))
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+def test_behind_a_power_law_little_may_still_change_and_gravity_shows_across_it(gravity: float) -> None:
+    impulse = impulse_of(5e3 * (1 + TIME / 0.1) ** -3.1)
+    found = flight_around(aslant(0.8 * impulse, 0.6 * impulse - 10 * gravity * TIME), 0.95)
+    assert found
+    assert found.gravity == pytest.approx(gravity, rel=1e-3)
+    left = impulse[-1] - impulse[int(np.searchsorted(TIME, found.start))]
+    assert 0.001 * impulse[-1] < left < 0.01 * impulse[-1]
+
+
+def test_a_push_that_balances_the_weight_for_a_moment_is_no_flight() -> None:
+    push = 3e2 * np.sin(np.pi * np.minimum(TIME / 0.6, 1))
+    body = aslant(0.8 * impulse_of(push), 0.6 * impulse_of(push) - 98.1 * TIME)
+    found = flight_around(body, 0.9)
+    assert found
+    assert found.start == pytest.approx(0.6, abs=0.02)
+    assert not [td for td in np.linspace(0.02, 0.58, 29) if flight_around(body, td)]
+
+
+@pytest.mark.parametrize("left", [0.005, 0.0])
+def test_what_hardly_moves_flies_if_it_goes_on_as_it_does(left: float) -> None:
+    thrown = momenta(np.where(TIME < 0.3, 500 * (left + (1 - left) * np.cos(np.pi * TIME / 0.6)), 500 * left))
+    assert bool(flight_around(thrown, 0.7)) is (left > 0)
 
 
 @pytest.mark.parametrize("mass", [1.0, 10.0])
@@ -125,6 +164,22 @@ def test_a_level_is_kept_by_a_vibration_and_by_one_that_damping_takes_but_not_by
     assert settled_from(TIME, 5 - 3 * TIME, 50 + 0 * TIME, 0.0, 1.0) is None
     late = settled_from(TIME, np.where(TIME < 0.4, 2.5 * TIME, 1.0) + 0.01 * ringing, 50 + 0 * TIME, 0.0, 1.0)
     assert late == pytest.approx(0.4, abs=0.02)
+
+
+def test_a_vibration_that_swings_only_a_few_times_keeps_its_level_and_a_crash_does_not() -> None:
+    whole = 50 + 0 * TIME
+    assert settled_from(TIME, 5 + np.sin(9 * TIME) ** 2, whole, 0.0, 1.0) == 0.0
+    assert settled_from(TIME, 5 + 0 * TIME + np.sin(np.pi * TIME) ** 2, whole, 0.0, 1.0) is None
+
+
+def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain() -> None:
+    """What dampers within the body take comes in steps: no parabola describes it."""
+    rung = 100 * np.sin(60 * TIME) ** 2
+    pushed = np.minimum(TIME / 0.2, 1) ** 2
+    lost = 0.5 * (TIME - np.sin(240 * TIME) / 240) * (TIME > 0.2)
+    found = find_flights(totals(pushed * (150 + rung), pushed * (900 - rung) - lost - 0.4 * np.sin(171 * TIME)), PLAIN)
+    assert any(flight.start == pytest.approx(0.2, abs=0.05) and flight.end is None for flight in found)
+    assert not [flight for flight in found if flight.certain or (flight.start or 0.0) < 0.15]
 
 
 def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor() -> None:
