@@ -15,7 +15,6 @@ from d2rpick.histories.samples import window
 from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.identify import Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, doubtful, energy_at
-from d2rpick.vibration.one_mode import LARGEST_ENERGY
 from d2rpick.vibration.second_mode import resolved
 from d2rpick.vibration.span import Span, described_span, identify_within, span_of
 
@@ -37,11 +36,6 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
         found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
         raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
     history.energy_at(td, "td")
-    largest = float(np.abs(history.energy).max())
-    if largest > LARGEST_ENERGY:
-        raise RangeError(
-            f"{', '.join(history.source)}: energies up to {largest:g}, at most {LARGEST_ENERGY:g} was expected"
-        )
     if settings.after is not None:
         history.check(settings.after, argument="after")
     seen = seen_flight(history, td)

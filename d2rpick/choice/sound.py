@@ -8,6 +8,7 @@ import numpy as np
 
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import RangeError
+from d2rpick.vibration.one_mode import LARGEST_ENERGY
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,20 +27,22 @@ _NOTHING: Final = 1e-20
 
 
 def refuse_unsound(history: History, *, choosing: bool = False) -> None:
-    """RangeError where the run blew up, and for ``choosing`` where there is nothing to choose by."""
+    """RangeError where no number of the run can be used, and for ``choosing`` where there is nothing to choose by."""
     for one in unsound(history):
-        if choosing or one.code == "blew-up":
+        if choosing or one.code != "nothing-to-judge":
             raise RangeError(f"{', '.join(history.source)}: {one.message}")
 
 
 def unsound(history: History) -> Iterator[Caution]:
     """Say why a run cannot be judged, with stable codes."""
-    found = _blew_up(history)
-    if found:
+    largest = float(np.abs(history.energy).max(initial=0.0))
+    if largest > LARGEST_ENERGY:
+        yield Caution("energy-too-large", f"energies up to {largest:g}, at most {LARGEST_ENERGY:g} was expected")
+    elif found := _blew_up(history):
         yield Caution("blew-up", found)
     elif _has_nothing(history):
-        most = f"{np.abs(history.energy).max(initial=0.0):.3g}"
-        yield Caution("nothing-to-judge", f"nothing to judge: no internal energy exceeds {most}, so nothing deforms")
+        found = f"nothing to judge: no internal energy exceeds {largest:.3g}, so nothing deforms"
+        yield Caution("nothing-to-judge", found)
 
 
 def _blew_up(history: History) -> str | None:

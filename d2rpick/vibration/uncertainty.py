@@ -149,8 +149,9 @@ def reach(slope: Samples | float, bend: Samples | float, error: Samples | float)
     (0.5, 1.0)
     """
     slope, bend, error = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (slope, bend, error)))
-    root = slope**2 - 2 * bend * error
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        regular = 2 * error / (slope + np.sqrt(np.maximum(root, 0)))
-        turning = np.sqrt(2 * error / bend)
+        steep, curved = slope / error, bend / error  # per error: squares of energies might overflow
+        root = steep**2 - 2 * curved
+        regular = 2 / (steep + np.sqrt(np.maximum(root, 0)))
+        turning = np.sqrt(2 / curved)
     return np.where(error == 0, 0.0, np.where(root > 0, regular, turning))
