@@ -110,7 +110,7 @@ def test_what_could_not_be_read_is_asked_again(tmp_path: Path) -> None:
     Path(name).write_text("nothing of use\n")
     ledger.add(ask(QUESTION, name))
     ledger.add(study.failed(name, MemoryError()))
-    assert Path(ledger.name).read_bytes() == b""
+    assert not Path(ledger.name).exists()  # the first row makes it
     short = variants.write(tmp_path / "short.csv", end=0.05)
     ledger.add(ask(QUESTION, short))
     assert values(Ledger(ledger.name, QUESTION).find(short))["status"] == "out-of-range"
