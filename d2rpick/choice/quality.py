@@ -21,8 +21,8 @@ GRADES: Final = ("poor", "fair", "good")
 # Of the vibration [-].  A residual of a half is a quarter of its energy; beyond, the error is what an engineer sees of
 # the motion after td.  A good pair keeps what the tolerance on tr asks for by default.
 _MOST_FAIR, _MOST_GOOD = 0.5, 0.2
-# What a further mode may hide at most, where an oscillator or parts tell, and where swings were only counted.
-_MOST_HIDDEN, _MOST_COUNTED = 0.5, 0.3
+# What a further mode may make of it at most in a good pair: a good grade is a promise.
+_MOST_HIDDEN: Final = 0.3
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
 _BAND: Final = 0.25
 _NOT_CERTAIN: Final = "the flight is not certain"
@@ -101,8 +101,7 @@ def _fair(situation: Situation, best: Candidate, expected: Expectation | None) -
         found.append(f"the vibration after td is off by {best.residual:.0%}")
     elif _is_loose(best):
         found.append("tr is not known well enough for its timing tolerance")
-    most = _MOST_COUNTED if situation.basis == "swings" else _MOST_HIDDEN
-    if best.residual_high is not None and best.residual_high > most:
+    if best.residual_high is not None and best.residual_high > _MOST_HIDDEN:
         found.append(f"with a further mode hidden in the record it may be off by {best.residual_high:.0%}")
     if not situation.flight.certain:
         found.append(_NOT_CERTAIN)
