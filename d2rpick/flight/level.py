@@ -88,8 +88,9 @@ def _swings(energy: Samples, whole: Samples | None, least: float) -> bool:
 
 def _large_swings(energy: Samples, least: float) -> int:
     """How often an energy turns after it has changed by ``least``."""
+    extrema = np.flatnonzero(np.diff(np.sign(np.diff(energy)))) + 1
     turns, low, high, rising = 0, energy[0], energy[0], None
-    for value in energy.tolist():
+    for value in [*energy[extrema].tolist(), float(energy[-1])]:
         low, high = min(low, value), max(high, value)
         if rising is not True and value - low >= least:
             turns, rising, high = turns + 1, True, value
