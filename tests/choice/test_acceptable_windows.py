@@ -65,7 +65,7 @@ def check(answer: Suggestion, seed: int) -> None:
         assert error_at(profile, t) == pytest.approx(error, abs=1e-3)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(
     omega=st.floats(150, 400), alpha=st.floats(0, 60), phase=st.floats(0, np.pi), td=st.floats(0.04, 0.14),
     tolerance=st.floats(0.001, 1.0), plastic=st.sampled_from([0.0, 3.0]), preload=st.sampled_from([0.0, 2.0]),
@@ -82,7 +82,7 @@ def test_windows_of_an_oscillator_hold_what_verifies(
 
 
 @example(energy=[0, 1, 0, -1, 1], share=1.0, tolerance=1.0, after=0.0, seed=60, uneven=False, margin=0.0)
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     energy=st.lists(st.floats(-1, 100), min_size=5, max_size=60), share=st.floats(0.3, 1.0),
     tolerance=st.floats(0.01, 1.0), after=st.none() | st.floats(0.0, 0.5), seed=st.integers(0, 2**16),

@@ -101,7 +101,7 @@ def histories(draw: st.DrawFn) -> History:
     return History(time, energy + share * noise, ("made",), "made", "E")
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2, deadline=None)
 @given(histories(), st.floats(0.3, 0.7), st.sampled_from([None, 0.1]))
 def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     history: History, td: float, after: float | None
@@ -113,7 +113,7 @@ def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     check(found, history, asked, [found.asked, *found.offers[::6]])
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(histories(), st.floats(0.5, 0.9), st.floats(0.1, 0.45), st.booleans())
 def test_candidates_before_the_flight_never_change_what_is_best(
     history: History, td: float, after: float, replay: bool
