@@ -38,10 +38,12 @@ def _fill_closed_streams() -> None:
             os.fstat(stream)
         except OSError:
             os.open(os.devnull, os.O_RDONLY if stream == 1 else os.O_RDWR)
-            if stream == 1:
+            if stream:
                 import io
 
-                sys.stdout = io.TextIOWrapper(io.FileIO(stream, "w", closefd=False), write_through=True)
+                file = io.FileIO(stream, "w", closefd=False)
+                writer = io.TextIOWrapper(file, errors="backslashreplace", write_through=True)
+                setattr(sys, ("stdout", "stderr")[stream - 1], writer)
 
 
 if __name__ == "__main__":
