@@ -12,7 +12,7 @@ import numpy as np
 
 from d2rpick.choice.expectation import most_energy
 from d2rpick.choice.verify import approve
-from d2rpick.histories.crossings import passages
+from d2rpick.histories.samples import passages
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.roots import narrow
 

@@ -27,8 +27,8 @@ from d2rpick.flight.flying_parts import asks_for_recommended
 if TYPE_CHECKING:
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.settings import Settings
+    from d2rpick.histories.names import Selection
     from d2rpick.histories.run import Run
-    from d2rpick.histories.selection import Selection
 
 
 def read_model(deck: str, weights: Weights | str | None = None) -> CostModel:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.cost import CostModel
     from d2rpick.deck.inventory.model import Inventory
-    from d2rpick.histories.history import Part
+    from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
 
 

@@ -19,7 +19,8 @@ from d2rpick.histories.samples import window as within
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.histories.history import Balance, Part, Samples
+    from d2rpick.histories.history import Balance, Samples
+    from d2rpick.histories.names import Part
 
 # Hourglass energy is to stay below a tenth of the peak internal energy, of the model and of each part: rule of thumb of
 # DYNAmore (dynasupport.com/howtos/element/hourglass); the same tenth in NCHRP Web-Only Document 179 (2010), table E-1.

@@ -14,12 +14,13 @@ import numpy as np
 from d2rpick.choice.rigid_parts import rigid_parts, with_energy
 from d2rpick.errors import FormatError, listing
 from d2rpick.flight.energy_alone import round_off
-from d2rpick.histories.selection import Selection
+from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from d2rpick.histories.history import History, Part
+    from d2rpick.histories.history import History
+    from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
 
 

@@ -16,14 +16,14 @@ from d2rpick.deck.folder import main_decks
 from d2rpick.deck.inventory import ls_dyna, radioss
 from d2rpick.deck.radioss import find_run_windows, read_run, run_files
 from d2rpick.errors import DeckError, FormatError
-from d2rpick.histories.timings import is_glstat, read_timing, read_zone_times
+from d2rpick.histories.listings import is_glstat, read_timing, read_zone_times
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck import Deck
     from d2rpick.deck.inventory.model import Inventory
-    from d2rpick.histories.timings import Timing, ZoneTimes
+    from d2rpick.histories.listings import Timing, ZoneTimes
 
 _US: Final = 1e6
 

@@ -13,7 +13,7 @@ from d2rpick.choice.sound import refuse_unsound
 from d2rpick.choice.suggest import Suggestion, suggest_at
 from d2rpick.choice.verify import Verdict, verify, verify_at, with_comparison
 from d2rpick.choice.warnings import cautions_of_engine
-from d2rpick.histories.balance_terms import balance_of
+from d2rpick.histories.balance import balance_of
 from d2rpick.histories.opening import Selection, open_run
 
 if TYPE_CHECKING:
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
-    from d2rpick.histories.history import History, Part, Track
+    from d2rpick.histories.history import History, Track
+    from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
     from d2rpick.vibration.fits import Fits
 

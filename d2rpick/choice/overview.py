@@ -15,16 +15,17 @@ from d2rpick.choice.warnings import cautions_of_engine
 from d2rpick.errors import FormatError, RangeError
 from d2rpick.flight.flying_parts import with_parts_by_number
 from d2rpick.flight.window import FreeFlight
-from d2rpick.histories.balance_terms import balance_of
+from d2rpick.histories.balance import balance_of
 from d2rpick.histories.companions import doubts
-from d2rpick.histories.selection import select_parts
+from d2rpick.histories.names import select_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.warnings import Caution
     from d2rpick.histories.database import Legs
-    from d2rpick.histories.history import History, Part
+    from d2rpick.histories.history import History
+    from d2rpick.histories.names import Part
     from d2rpick.histories.opening import Run, Selection
 
 

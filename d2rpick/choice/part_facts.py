@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.settings import Settings
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History, Part, Samples
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
 
 # A part whose energy in flight scatters by less than this share of its mean has stopped deforming: what it holds is

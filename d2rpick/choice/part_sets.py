@@ -28,8 +28,8 @@ from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.deck.inventory.placement import Placement
 from d2rpick.errors import FormatError, RangeError, are, name_units
 from d2rpick.flight.flying_parts import asks_for_recommended, with_parts_by_number
-from d2rpick.histories.printed_steps import printed_steps
-from d2rpick.histories.selection import Selection, select_parts
+from d2rpick.histories.listings import printed_steps
+from d2rpick.histories.names import Selection, select_parts
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.switched_run import Times
     from d2rpick.deck.inventory.model import Inventory
-    from d2rpick.histories.history import Part
+    from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
 
 # Savings that differ by less cannot be told apart: the cost model is right within some points.

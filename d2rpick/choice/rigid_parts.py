@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import History, Part, Samples
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
 
 # Of a part that is deformable fewer states follow each other without kinetic energy, or with one internal energy.

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.of_run import Reference
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History, Part
+    from d2rpick.histories.history import History
+    from d2rpick.histories.names import Part
 
     Times = tuple[float, float]
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.situation import Situation
     from d2rpick.flight.bodies import RigidBody
-    from d2rpick.histories.history import Part
+    from d2rpick.histories.names import Part
 
 # Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.
 POOR_KINETIC_SHARE = 0.5

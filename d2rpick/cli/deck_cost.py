@@ -78,7 +78,7 @@ def with_deck(
         return run, options
     from d2rpick.choice.by_deck import selected
     from d2rpick.choice.surroundings import in_deck
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.names import Selection
 
     run = in_deck(run, model.inventory)
     found = selected(run, Selection(parts=options["part"]), settings, model)

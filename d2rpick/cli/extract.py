@@ -36,9 +36,9 @@ def command(write_as: str | None, **options: Any) -> None:
     momenta of parts, those that fly together with the chosen ones count.
     """
     from d2rpick.choice.of_run import Reference
-    from d2rpick.histories.writing import TABLE_WRITERS, format_of
+    from d2rpick.histories.opening import TABLES, format_of, write_table
 
-    form = write_as or format_of(options["output_file"], list(TABLE_WRITERS))
+    form = write_as or format_of(options["output_file"], TABLES)
     asked = shared.Reading.of(options)
     with reading(asked.names, quiet=asked.quiet):
         run = asked.open()
@@ -50,7 +50,7 @@ def command(write_as: str | None, **options: Any) -> None:
             table |= {f"part_{part.id}": column for part, column in zip(history.parts, energies.T, strict=True)}
         table |= run.quantities(history.time) | _of_model(history) | _momentum(history)
     output.notes(history.notes, ())
-    output.content(TABLE_WRITERS[form](table))
+    output.content(write_table(form, table))
 
 
 def _of_model(history: History) -> dict[str, Samples]:

@@ -55,7 +55,7 @@ def command(
     displacement and velocity of frame (z) and suspended mass (y), internal and kinetic energy; at tr itself the state
     after the switch.
     """
-    from d2rpick.histories.writing import format_of
+    from d2rpick.histories.opening import format_of
     from d2rpick.models import oscillator_files
     from d2rpick.vibration.replay import Replay, trajectory
 

@@ -137,7 +137,7 @@ def _parameters(options: dict[str, Any]) -> Parameters:
 
 def _run(options: dict[str, Any]) -> None:
     """One run; for a plot also the one without switching."""
-    from d2rpick.histories.writing import format_of
+    from d2rpick.histories.opening import format_of
     from d2rpick.models.rollover import files
     from d2rpick.models.rollover.run import RigidWindow, simulate
 

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.inventory.placement import Placement
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History, Part, Samples
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.names import Part
 
 
 class RigidBody(NamedTuple):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.flight.window import FEWEST, SHORTEST
-from d2rpick.histories.crossings import find_crossings
+from d2rpick.histories.samples import find_crossings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.flight.window import FreeFlight
-    from d2rpick.histories.history import History, Momenta, Part, Samples
+    from d2rpick.histories.history import History, Momenta, Samples
+    from d2rpick.histories.names import Part
     from d2rpick.vibration.span import Span
 
 # Where a flight may be known from, best first.

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.flight.window import FreeFlight
-    from d2rpick.histories.history import Momenta, Part
+    from d2rpick.histories.history import Momenta
+    from d2rpick.histories.names import Part, Selection
     from d2rpick.histories.run import Run
-    from d2rpick.histories.selection import Selection
 
 FLYING: Final = "flying"
 ALL: Final = "all"

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.inventory.placement import Placement
     from d2rpick.flight.flight import Flight
     from d2rpick.flight.turning import Turning
-    from d2rpick.histories.history import History, Momenta, Part, Samples
+    from d2rpick.histories.history import History, Momenta, Samples
+    from d2rpick.histories.names import Part
 
     Places = NDArray[np.intp]
 

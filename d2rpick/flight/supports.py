@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.flight.window import FreeFlight
-    from d2rpick.histories.history import Part
+    from d2rpick.histories.names import Part
     from d2rpick.histories.surroundings import Surroundings
 
 

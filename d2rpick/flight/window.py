@@ -9,7 +9,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from d2rpick.histories.history import Part, Samples
+    from d2rpick.histories.history import Samples
+    from d2rpick.histories.names import Part
 
 # Misfit that free flight may leave at first, as a share of the range over the record: contact shows at once.
 TOLERANCE = 1e-3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias
@@ -10,16 +9,16 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from d2rpick.errors import HistoryError, RangeError
-from d2rpick.histories.crossings import find_turns
 from d2rpick.histories.digits import told_apart
-from d2rpick.histories.samples import window
+from d2rpick.histories.samples import find_turns, window
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterable, Sequence
+    from collections.abc import Hashable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
+    from d2rpick.histories.names import Part
     from d2rpick.histories.source import Source
 
 # in quotes: numpy.typing costs start-up
@@ -65,42 +64,6 @@ class Precision(NamedTuple):
 
 
 EXACT = Precision()
-
-
-class Part(NamedTuple):
-    """A part of the model, by the number and the title that the solver gives it."""
-
-    id: int
-    title: str
-
-    @property
-    def name(self) -> str:
-        """What to call it: its title, or its number."""
-        return self.title or f"part {self.id}"
-
-
-class Namesake(Part):
-    """A part whose title another one has too, which its number tells apart."""
-
-    __slots__ = ()
-
-    @property
-    def name(self) -> str:
-        """Title and number."""
-        return f"{self.title} ({self.id})"
-
-
-def with_namesakes(parts: Iterable[Part]) -> tuple[Part, ...]:
-    """Let parts of one title be told apart by number.
-
-    Examples
-    --------
-    >>> [part.name for part in with_namesakes([Part(1, "shell"), Part(2, "door"), Part(7, "shell"), Part(9, "")])]
-    ['shell (1)', 'door', 'shell (7)', 'part 9']
-    """
-    every = tuple(parts)
-    times = Counter(part.title for part in every if part.title)
-    return tuple(Namesake(*part) if times[part.title] > 1 else part for part in every)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -340,8 +303,8 @@ class History:
         low, high = self.time[0], self.time[-1]
         if all(low <= time <= high for time in times):
             return
-        from d2rpick.histories.legs import later_legs  # not above: pathlib costs start-up
-        from d2rpick.histories.units import in_smaller_unit
+        from d2rpick.histories.digits import in_smaller_unit
+        from d2rpick.histories.source import later_legs  # not above: pathlib costs start-up
 
         legs = later_legs(self.source) if max(times) > high else []
         more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
@@ -355,7 +318,7 @@ class History:
         """Raise RangeError where times of an ``argument`` that lie in the record look to be in another unit than it."""
         if times[-1] * 1e3 > self.time[-1]:  # as nearly always
             return
-        from d2rpick.histories.units import in_larger_unit
+        from d2rpick.histories.digits import in_larger_unit
 
         meant = in_larger_unit(self.time, times, argument, self.time_unit)
         if meant:

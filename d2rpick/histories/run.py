@@ -12,16 +12,15 @@ import numpy as np
 from d2rpick.errors import FormatError, listing
 from d2rpick.histories.companions import check_sum, doubts
 from d2rpick.histories.history import History, Momenta, Track
-from d2rpick.histories.names import QUANTITIES, quantity_note
-from d2rpick.histories.selection import menu, select_parts
+from d2rpick.histories.names import QUANTITIES, menu, quantity_note, select_parts
 from d2rpick.histories.surroundings import UNKNOWN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.database import Legs
-    from d2rpick.histories.history import Balance, Part, Samples
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.history import Balance, Samples
+    from d2rpick.histories.names import Part, Selection
     from d2rpick.histories.source import Source
     from d2rpick.histories.surroundings import Surroundings
 
@@ -146,7 +145,7 @@ class Run:
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
         """Momentum of the whole model, or its velocity, which is the same but for the mass; None if not written."""
-        from d2rpick.histories.balance_terms import velocity_of
+        from d2rpick.histories.balance import velocity_of
 
         for database in self.databases:
             velocity = velocity_of(database) if database.channels else None
@@ -172,7 +171,7 @@ class Run:
     @cached_property
     def springs(self) -> tuple[Part, ...]:
         """Parts of springs and dampers, as far as their energies tell."""
-        from d2rpick.histories.springs import springs_among
+        from d2rpick.histories.balance import springs_among
 
         holder = self._with_parts()
         if holder is None:
@@ -264,7 +263,7 @@ class Run:
 
     def _without_springs(self, database: Legs, channel: str) -> History:
         """Take the energy of the whole model, less that of springs and dampers where it has other energy too."""
-        from d2rpick.histories.springs import spring_energy
+        from d2rpick.histories.balance import spring_energy
 
         whole, springs = self._of_channels((channel,)), spring_energy(database)
         if springs is None:
@@ -346,7 +345,7 @@ class _Written:
     @cached_property
     def balance(self) -> Balance | None:
         """Energies of the whole model."""
-        from d2rpick.histories.balance_terms import terms_of
+        from d2rpick.histories.balance import terms_of
 
         return terms_of(self._run)
 

@@ -1,16 +1,18 @@
-"""Samples over time: which count and lie in a window, their running integral, and how far they are from straight."""
+"""What a sampled curve tells: which samples count, its integral, where it passes a level or turns, its outline."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    Samples = NDArray[np.float64]
 
-def window(time: NDArray[np.float64], start: float, end: float) -> slice:
+
+def window(time: Samples, start: float, end: float) -> slice:
     """Slice of ascending times from ``start`` to ``end``, both included [time].
 
     Examples
@@ -22,7 +24,7 @@ def window(time: NDArray[np.float64], start: float, end: float) -> slice:
     return slice(first, last)
 
 
-def integral(time: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def integral(time: Samples, values: Samples) -> Samples:
     """Integral of values (n,) or (n, k) from the first time on, by trapezia, of their shape.
 
     Examples
@@ -34,7 +36,7 @@ def integral(time: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[
     return np.concatenate([np.zeros_like(values[:1]), np.cumsum(areas.T, axis=0)])
 
 
-def bent(time: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def bent(time: Samples, values: Samples) -> Samples:
     """Give what is left of each column of values (n, k) beside a straight line.
 
     Examples
@@ -48,7 +50,7 @@ def bent(time: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.f
     return np.asarray(centred)
 
 
-def newest_states(time: NDArray[np.float64]) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     """Which states of a file count, and what to say of the others.
 
     A state gives way to any later one at or before its time: of equal printed times the last counts, and
@@ -88,3 +90,116 @@ def newest_states(time: NDArray[np.float64]) -> tuple[NDArray[np.bool_], tuple[s
         dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
         notes.append(f"time steps back {steps} (restart); where legs overlap the newer one counts, {dropped} dropped")
     return keep, tuple(notes)
+
+
+class Crossing(NamedTuple):
+    """The energy passes a level at ``time`` [time], upwards when ``rising``."""
+
+    time: float
+    rising: bool
+
+
+class Extremum(NamedTuple):
+    """The energy turns at ``time`` [time] with the value ``energy``; a ``peak`` or a valley."""
+
+    time: float
+    energy: float
+    peak: bool
+
+
+def find_crossings(time: Samples, energy: Samples, level: float) -> tuple[Crossing, ...]:
+    """All passages of ``energy`` through ``level``, ascending in time.
+
+    What counts is that the energy lies on different sides before and after:
+
+    * a sample exactly on the level is passed once, at that sample; a plateau on the level once, at its first;
+    * touching the level and turning back is no crossing (``find_extrema`` gives such points);
+    * a record that begins on the level has a crossing at its first sample, one that ends on it has one where
+      it arrives; ``rising`` then tells the one side there is.  A record that stays on the level has none.
+
+    Parameters
+    ----------
+    time, energy : array of shape (n,)
+        Increasing times [time] and energies [energy].
+    level : float
+        [energy]
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> find_crossings(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 4.0, 1.0, 2.0]), 1.0)
+    (Crossing(time=0.25, rising=True),)
+    >>> find_crossings(np.array([0.0, 1.0, 2.0]), np.array([3.0, 1.0, 0.0]), 1.0)
+    (Crossing(time=1.0, rising=False),)
+    """
+    times, rising = passages(time, energy, level)
+    return tuple(map(Crossing, times.tolist(), rising.tolist()))
+
+
+def passages(time: Samples, energy: Samples, level: float) -> tuple[Samples, NDArray[np.bool_]]:
+    """Times of the crossings by the rule of ``find_crossings``, and which of them rise, both of shape (k,)."""
+    side = np.sign(energy - level)
+    off = np.flatnonzero(side)
+    if not off.size:
+        return np.zeros(0), np.zeros(0, dtype=bool)
+    turn = np.flatnonzero(side[off[:-1]] != side[off[1:]])
+    before, after = off[turn], off[turn + 1]
+    share = np.where(
+        after == before + 1, (level - energy[before]) / (energy[before + 1] - energy[before]), 1.0
+    )  # with samples on the level in between, the first of them: a share of 1
+    at = time[before] + share * (time[before + 1] - time[before])
+    rising = side[after] > 0
+    if off[0] > 0:
+        at, rising = np.append(time[0], at), np.append(side[off[0]] > 0, rising)
+    if off[-1] < side.size - 1:
+        at, rising = np.append(at, time[off[-1] + 1]), np.append(rising, side[off[-1]] < 0)
+    return at, rising
+
+
+def find_extrema(time: Samples, energy: Samples) -> tuple[Extremum, ...]:
+    """Samples where the energy turns; a flat top or bottom counts once, at its first sample, the ends never.
+
+    Parameters
+    ----------
+    time, energy : array of shape (n,)
+        Increasing times [time] and energies [energy].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> find_extrema(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 4.0, 4.0, 2.0]))
+    (Extremum(time=1.0, energy=4.0, peak=True),)
+    """
+    at, peak = find_turns(energy)
+    return tuple(map(Extremum, time[at].tolist(), energy[at].tolist(), peak.tolist()))
+
+
+def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Places of the extrema among the samples, by the rule of ``find_extrema``, and which of them are peaks."""
+    slope = np.sign(np.diff(energy))
+    moving = np.flatnonzero(slope)
+    turn = np.flatnonzero(slope[moving[:-1]] != slope[moving[1:]])
+    return moving[turn] + 1, slope[moving[turn]] > 0
+
+
+def outline(time: Samples, values: Samples, stretches: int) -> Samples:
+    """Give times and values that draw the curve, shape (2, m): all, or the extremes of each of many stretches.
+
+    Parameters
+    ----------
+    time, values : array of shape (n,)
+    stretches : int
+        Stretches of equally many samples; the first and the last sample stay, too, and m is at most
+        ``2 * stretches + 2``.
+
+    Examples
+    --------
+    >>> outline(np.arange(8.0), np.array([0.0, 9.0, 0.0, 1.0, 2.0, -7.0, 1.0, 0.0]), 2).tolist()
+    [[0.0, 1.0, 4.0, 5.0, 7.0], [0.0, 9.0, 2.0, -7.0, 0.0]]
+    """
+    if time.size <= 2 * stretches:
+        return np.stack([time, values])
+    pieces = np.array_split(np.arange(time.size), stretches)
+    kept = [piece[0] + place for piece in pieces for place in (values[piece].argmin(), values[piece].argmax())]
+    at = np.unique([0, *kept, time.size - 1])
+    return np.stack([time[at], values[at]])

@@ -108,7 +108,7 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
     """
     if value is None:
         return ()
-    from d2rpick.histories.history import Part
+    from d2rpick.histories.names import Part
 
     single = isinstance(value, str | int | Part)  # a Part holds its number and its title
     listed = [value] if single else list(_each(name, value, "a number, a title or several"))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.warnings import Caution
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.names import Selection
     from d2rpick.library.arguments import Choosing, Parts
     from d2rpick.library.runs import Run
 

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.overview import Overview
     from d2rpick.histories import run as histories
-    from d2rpick.histories.history import Part
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.names import Part, Selection
     from d2rpick.histories.source import Source
     from d2rpick.library.arguments import Parts, Path
 
@@ -236,8 +235,7 @@ def selection_of(
     channels: Mapping[str, str | int] | None = None,
 ) -> Selection:
     """Give the columns that are meant; TypeError for what is no name or number, ValueError for an unknown quantity."""
-    from d2rpick.histories.names import QUANTITIES
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.names import QUANTITIES, Selection
 
     listed = [] if energy is None else [energy] if isinstance(energy, str | int) else list(energy)
     named = dict(channels or {})

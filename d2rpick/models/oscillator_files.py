@@ -9,7 +9,7 @@ from d2rpick.histories.formats import csv_table, glstat, hdf5_file, matsum
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from d2rpick.histories.writing import Table
+    from d2rpick.histories.opening import Table
     from d2rpick.vibration.oscillator import Oscillator
     from d2rpick.vibration.replay import Trajectory
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from d2rpick.choice.replayed import locked_in, response
 from d2rpick.choice.view import scale_of, view_of
-from d2rpick.histories.outline import outline
+from d2rpick.histories.samples import outline
 from d2rpick.report.explorer_rows import VALUES, error_name, row_of, saved_name, table_of
 from d2rpick.report.html import Markup, join, resource, tag
 from d2rpick.report.shell import shell_line

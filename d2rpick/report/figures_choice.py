@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from d2rpick.choice.replayed import replayed_motion
 from d2rpick.choice.view import merged, scale_of, view_of
-from d2rpick.histories.outline import outline
+from d2rpick.histories.samples import outline
 from d2rpick.report.figures import (
     BETTER,
     FLIGHT,

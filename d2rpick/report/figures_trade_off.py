@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from d2rpick.histories.outline import outline
+from d2rpick.histories.samples import outline
 from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, STRETCHES, SWITCHED, WIDTH, entries, finish, with_unit
 from d2rpick.report.figures_page import arrange
 

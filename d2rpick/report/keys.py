@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.verify import Verdict
     from d2rpick.choice.warnings import Caution
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import Part
+    from d2rpick.histories.names import Part
     from d2rpick.vibration.part_shares import PartMatch
     from d2rpick.vibration.part_signs import Unsigned
 

@@ -15,9 +15,8 @@ from d2rpick.choice.surroundings import in_deck
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, Caution, end_of_flight, end_of_load
 from d2rpick.deck.inventory import read_inventory
 from d2rpick.errors import DeckError, FormatError, name_units
-from d2rpick.histories.digits import above, first_as_read
+from d2rpick.histories.digits import above, first_as_read, in_the_record
 from d2rpick.histories.surroundings import UNKNOWN
-from d2rpick.histories.units import in_the_record
 from d2rpick.rules.base import Fault
 
 if TYPE_CHECKING:

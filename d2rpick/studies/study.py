@@ -14,8 +14,8 @@ from d2rpick.choice.error_profile import error_profile
 from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import FORESEEN, INTERNAL_ERROR, D2RPickError, RangeError, listing, one_line
-from d2rpick.histories.outline import outline
-from d2rpick.histories.selection import Selection
+from d2rpick.histories.names import Selection
+from d2rpick.histories.samples import outline
 from d2rpick.histories.source import expand
 from d2rpick.studies.common import NAMED, Common, common_tr, runs_of
 from d2rpick.studies.row import FAILED, NONE, OK, OUT_OF_RANGE, UNREADABLE, Stamp, StudyRow

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.histories.crossings import find_extrema
+from d2rpick.histories.samples import find_extrema
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples

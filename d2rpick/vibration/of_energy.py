@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.errors import listing
-from d2rpick.histories.crossings import find_turns, passages
+from d2rpick.histories.samples import find_turns, passages
 from d2rpick.vibration import measures
 from d2rpick.vibration.moments import SUNK, Moments
 from d2rpick.vibration.uncertainty import sampled_reach

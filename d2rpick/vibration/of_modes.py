@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.histories.crossings import find_crossings
+from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration import measures
 from d2rpick.vibration.equivalent import replayed_residual
 from d2rpick.vibration.moments import Moment

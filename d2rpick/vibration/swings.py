@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from d2rpick.histories.crossings import find_turns
+from d2rpick.histories.samples import find_turns
 from d2rpick.vibration.envelope import upper_envelope
 from d2rpick.vibration.measures import wrong_sign
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.settings import Settings
-from d2rpick.histories.history import Balance, Given, History, Momenta, Part, Precision
+from d2rpick.histories.history import Balance, Given, History, Momenta, Precision
+from d2rpick.histories.names import Part
 from tests.records import printed
 
 if TYPE_CHECKING:

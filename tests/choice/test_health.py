@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.health import Health, assess, cautions_of_health
-from d2rpick.histories.balance_terms import balance_of
-from d2rpick.histories.history import Balance, Part, Precision
+from d2rpick.histories.balance import balance_of
+from d2rpick.histories.history import Balance, Precision
+from d2rpick.histories.names import Part
 from d2rpick.histories.opening import open_run
 from d2rpick.report.health import measures_of
 from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from d2rpick.histories.writing import TABLE_WRITERS
+from d2rpick.histories.opening import write_table
 from tests.command import BOX, ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, run
 from tests.json_schemas import check_by_schema
 from tests.made_t01 import t01
@@ -152,7 +152,7 @@ def test_a_history_may_have_any_number_of_states(text: str, tmp_path: Path) -> N
 def test_columns_that_leave_the_choice_of_the_energy_open_are_listed(tmp_path: Path) -> None:
     time = np.linspace(0, 1, 20)
     file = tmp_path / "several.csv"
-    file.write_bytes(TABLE_WRITERS["csv"]({"time": time, "left": time, "right": time**2}))
+    file.write_bytes(write_table("csv", {"time": time, "left": time, "right": time**2}))
     assert run("suggest", "--td", "0.5", str(file)).exit_code == 2
     found = info(str(file))
     assert (found["channels"], found["states"]) == (["left", "right"], 20)
@@ -161,7 +161,7 @@ def test_columns_that_leave_the_choice_of_the_energy_open_are_listed(tmp_path: P
 def test_hdf5_columns_are_listed(tmp_path: Path) -> None:
     time = np.linspace(0, 1, 20)
     file = tmp_path / "run.h5"
-    file.write_bytes(TABLE_WRITERS["hdf5"]({"a/time": time, "a/internal_energy": time, "a/other": time**2}))
+    file.write_bytes(write_table("hdf5", {"a/time": time, "a/internal_energy": time, "a/other": time**2}))
     found = info(str(file))
     assert found["states"] == 20
     assert {"a/internal_energy", "a/other"} <= set(found["channels"])
@@ -171,7 +171,7 @@ def test_hdf5_columns_that_leave_the_choice_open_are_listed_with_the_reason(tmp_
     time = np.linspace(0, 1, 20)
     file = tmp_path / "several.h5"
     groups = ("a/time", "a/internal_energy", "b/time", "b/internal_energy")
-    file.write_bytes(TABLE_WRITERS["hdf5"](dict.fromkeys(groups, time)))
+    file.write_bytes(write_table("hdf5", dict.fromkeys(groups, time)))
     found = info(str(file))
     assert set(groups) <= set(found["channels"])
     assert (found["states"], found["time_start"], found["sampling"]) == (None, None, None)

@@ -12,7 +12,7 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
-from d2rpick.histories.selection import Selection
+from d2rpick.histories.names import Selection
 from tests.command import ROOT
 from tests.computed import stored
 

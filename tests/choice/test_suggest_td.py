@@ -15,7 +15,8 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.errors import RangeError
-from d2rpick.histories.history import EXACT, Given, History, Momenta, Part
+from d2rpick.histories.history import EXACT, Given, History, Momenta
+from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.models.rollover.as_history import history_of
 from d2rpick.models.rollover.model import Parameters

@@ -15,7 +15,8 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.errors import D2RPickError
 from d2rpick.flight.momentum import flight_around
-from d2rpick.histories.history import EXACT, Given, History, Momenta, Part
+from d2rpick.histories.history import EXACT, Given, History, Momenta
+from d2rpick.histories.names import Part
 from d2rpick.histories.surroundings import Support, Surroundings
 from d2rpick.rules import RULES
 from tests import made_car

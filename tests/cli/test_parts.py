@@ -10,7 +10,8 @@ import pytest
 from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.warnings import cautions_of
-from d2rpick.histories.history import EXACT, Given, History, Momenta, Part
+from d2rpick.histories.history import EXACT, Given, History, Momenta
+from d2rpick.histories.names import Part
 from tests.command import BOX as ROLLOVER_T01
 from tests.command import OSCILLATOR, answer, codes, run
 from tests.json_schemas import check_by_schema

@@ -10,7 +10,7 @@ import pytest
 from d2rpick.choice.by_deck import selected
 from d2rpick.choice.settings import Settings
 from d2rpick.cli.deck_cost import model_of
-from d2rpick.histories.selection import Selection
+from d2rpick.histories.names import Selection
 from tests.command import answer, run
 from tests.computed import starter, stored
 from tests.json_schemas import check_by_schema

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,9 +15,12 @@ from d2rpick.choice.of_run import read
 from d2rpick.flight.bodies import Bodies, RigidBody, bodies_in_flight
 from d2rpick.flight.flight import Flight, find_flight, seen_flight
 from d2rpick.flight.position_error import MOST_OF_PATH, Drift
-from d2rpick.histories.history import History, Part
+from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, stored
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import History
 
 TIME = np.linspace(0.0, 1.0, 11)
 

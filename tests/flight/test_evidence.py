@@ -18,8 +18,8 @@ from d2rpick.flight.energy_alone import quiet_time
 from d2rpick.flight.flight import seen_flight
 from d2rpick.histories.digits import window_as_read
 from d2rpick.histories.history import Balance, Given, History, Momenta
+from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.histories.selection import Selection
 from d2rpick.models.rollover.files import WRITERS
 from d2rpick.models.rollover.model import Parameters
 from d2rpick.models.rollover.run import simulate

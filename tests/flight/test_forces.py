@@ -13,7 +13,8 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.flight.level import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around
-from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Part, Precision
+from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Precision
+from d2rpick.histories.names import Part
 from tests.benchmarks import flights as campaign
 from tests.records import printed
 

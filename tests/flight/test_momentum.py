@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from d2rpick.flight.momentum import all_flights, flight_around, flight_of
 from d2rpick.flight.window import FreeFlight
-from d2rpick.histories.history import EXACT, Momenta, Part, Precision
+from d2rpick.histories.history import EXACT, Momenta, Precision
+from d2rpick.histories.names import Part
 from d2rpick.histories.opening import open_run
 from tests.command import BOX, answer
 from tests.computed import stored

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from d2rpick.choice.of_run import Reference, read
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
-from d2rpick.histories.history import EXACT, Momenta, Part
+from d2rpick.histories.history import EXACT, Momenta
+from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, stored
 

@@ -17,7 +17,8 @@ from d2rpick.deck.inventory import read_inventory
 from d2rpick.deck.inventory.placement import Placed, Placement
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
-from d2rpick.histories.history import EXACT, Momenta, Part
+from d2rpick.histories.history import EXACT, Momenta
+from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, starter, stored
 

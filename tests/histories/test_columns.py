@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.histories.crossings import find_extrema
 from d2rpick.histories.history import History, Precision
+from d2rpick.histories.samples import find_extrema
 
 
 def _history(time: np.ndarray, energy: np.ndarray) -> History:

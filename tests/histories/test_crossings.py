@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.histories.crossings import find_crossings, find_extrema
+from d2rpick.histories.samples import find_crossings, find_extrema
 
 # small integers hit every coincidence: samples on the level, plateaus, touching
 levels = st.integers(-3, 3)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.histories.legs import later_legs
+from d2rpick.histories.source import later_legs
 from tests.command import run
 from tests.computed import stored
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.histories.outline import outline
+from d2rpick.histories.samples import outline
 
 
 @given(st.integers(3, 3000), st.integers(0, 100), st.integers(1, 200))

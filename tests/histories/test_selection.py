@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.history import Part
-from d2rpick.histories.selection import select_parts
+from d2rpick.histories.names import Part, select_parts
 
 PARTS = [Part(12, "Roof"), Part(3, "seat, left"), Part(7, ""), Part(19, "door"), Part(20, "door"), Part(4, "12")]
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.errors import FormatError
+from d2rpick.histories.listings import printed_steps, read_timing, read_zone_times
 from d2rpick.histories.opening import open_run
-from d2rpick.histories.printed_steps import printed_steps
-from d2rpick.histories.timings import read_timing, read_zone_times
 from tests.command import GLSTAT
 from tests.text_files import glstat_text
 

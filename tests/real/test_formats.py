@@ -11,9 +11,8 @@ import pytest
 
 from d2rpick.histories.formats import matsum
 from d2rpick.histories.formats.radioss_th import TimeHistory
+from d2rpick.histories.listings import printed_steps, read_timing, read_zone_times
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.histories.printed_steps import printed_steps
-from d2rpick.histories.timings import read_timing, read_zone_times
 from tests.command import GLSTAT
 from tests.histories.formats.test_glstat import assert_numbers_of_float
 from tests.real.files import content, real

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.health import assess, cautions_of_health
-from d2rpick.histories.balance_terms import balance_of
+from d2rpick.histories.balance import balance_of
 from d2rpick.histories.history import Balance
 from d2rpick.histories.opening import open_run
 from tests.real.files import real

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from d2rpick.histories.history import History, Part
+from d2rpick.histories.history import History
+from d2rpick.histories.names import Part
 from d2rpick.report.situation import energy_name, read_line
 
 PARTS = tuple(Part(number, f"p{number}") for number in range(1, 9))

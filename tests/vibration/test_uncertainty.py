@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.histories.crossings import find_crossings
 from d2rpick.histories.history import History, Precision
+from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Modes
 from d2rpick.vibration.one_mode import Mode

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.histories.formats.printed import decode
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from d2rpick.histories.content import Content
-    from d2rpick.histories.formats.ahead import Ahead
+    from d2rpick.histories.history import Samples
 
     Bytes = NDArray[np.uint8]
 
@@ -92,3 +97,113 @@ def _differing(rows: Bytes, example: Bytes) -> Bytes:
     differing = np.bitwise_and.reduce(rows, axis=0).reshape(-1, size) ^ example
     differing |= np.bitwise_or.reduce(rows, axis=0).reshape(-1, size) ^ example
     return np.asarray(np.bitwise_or.reduce(differing, axis=0))
+
+
+BATCH: Final = 1 << 15  # numbers converted at a time: they stay in the cache
+
+
+class Ahead:
+    """Numbers at the same ``offsets`` of all blocks, of so many columns and decimals, converted in batches."""
+
+    def __init__(self, offsets: NDArray[np.int64], width: int, decimals: int, batch: int = BATCH) -> None:
+        self._offsets, self._width, self._decimals, self._batch = offsets, width, decimals, batch
+        self._waiting: list[NDArray[np.bytes_]] = []
+        self._moving = np.zeros(offsets.size, bool)
+        self._done: list[Samples] = []
+
+    def take(self, rows: Bytes, differing: Bytes) -> None:
+        """Take the numbers of further blocks, shape (count, stride), which differ in these bits, shape (stride,)."""
+        self._waiting.append(self._fields(rows))
+        self._moving |= self._fields(differing[np.newaxis])[0].view(np.uint8).reshape(-1, self._width).any(axis=1)
+        if sum(one.size for one in self._waiting) >= self._batch:
+            self._convert()
+
+    def numbers(self) -> Samples:
+        """Give all numbers taken, shape (blocks, len(offsets)); NaN for what is no number."""
+        self._convert()
+        return np.concatenate([np.empty((0, self._offsets.size)), *self._done])
+
+    def _convert(self) -> None:
+        """Turn what waits into numbers; what is the same in all blocks, as of a part at rest, only once."""
+        if not self._waiting:
+            return
+        fields, moving = np.concatenate(self._waiting), self._moving
+        values = np.empty(fields.shape)
+        values[:, ~moving] = decode(fields[0, ~moving], self._decimals)
+        values[:, moving] = decode(fields[:, moving].ravel(), self._decimals).reshape(len(fields), -1)
+        self._done.append(values)
+        self._waiting, self._moving = [], np.zeros_like(moving)
+
+    def _fields(self, rows: Bytes) -> NDArray[np.bytes_]:
+        count, size = rows.shape
+        starts = np.ndarray((count, size - self._width + 1), f"S{self._width}", rows, strides=(rows.strides[0], 1))
+        return starts[:, self._offsets]
+
+
+# A block longer than this is left to the walk, and no more than this is compared at a time.
+_LONGEST: Final = 1 << 22
+_CHUNK: Final = 1 << 18
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """What has to be equal in every repetition of a block.
+
+    ``fixed`` is 0xFF for each byte of structure and 0 for each byte of data; ``numbers`` are place and width
+    of the decimal state numbers; each goes up by a step of its own, the same from block to block.
+    """
+
+    fixed: NDArray[np.uint8]
+    numbers: tuple[tuple[int, int], ...]
+
+
+def repeats(data: Content, begin: int, pattern: Pattern) -> tuple[int, list[int]]:
+    """Count the whole repetitions that follow the block at ``begin`` without a gap.
+
+    Returns
+    -------
+    times : int
+        Number of repetitions behind the first block.
+    steps : list of int
+        How much each state number grows from one to the next.
+
+    Examples
+    --------
+    >>> from d2rpick.histories.content import Content
+    >>> blocks = Content(b"[d01:x][d02:y][d03:z][d05:x]")
+    >>> fixed = np.frombuffer(b"~~00~0~", dtype=np.uint8) // 126 * 255
+    >>> repeats(blocks, 0, Pattern(fixed, ((2, 2),)))
+    (2, [1])
+    """
+    stride = pattern.fixed.size
+    total = (len(data) - begin) // stride
+    if stride > _LONGEST or total < 2:
+        return 0, []
+    example, following = data.view(begin, begin + 2 * stride).reshape(2, stride).copy()
+    first = _decimals(example[None], pattern.numbers)
+    steps = _decimals(following[None], pattern.numbers) - first
+    if steps.min(initial=1) < 1:
+        return 0, []
+    done, rows = 1, 1
+    while done < total:
+        rows = min(rows, total - done)
+        chunk = data.view(begin + done * stride, begin + (done + rows) * stride).reshape(rows, stride)
+        differs = ((chunk ^ example) & pattern.fixed).max(axis=1) > 0
+        expected = first + steps * np.arange(done, done + len(chunk))[:, None]
+        differs |= (_decimals(chunk, pattern.numbers) != expected).any(axis=1)
+        if differs.any():
+            done += int(differs.argmax())
+            break
+        done += len(chunk)
+        rows = min(2 * rows, max(1, _CHUNK // stride))  # a pattern that soon ends costs little
+    return done - 1, steps[0].tolist()
+
+
+def _decimals(blocks: NDArray[np.uint8], places: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
+    """Decimal numbers of each block, shape (blocks, places); -1 where a byte is no digit."""
+    numbers = np.empty((len(blocks), len(places)), dtype=np.int64)
+    for column, (at, width) in enumerate(places):
+        digits = blocks[:, at : at + width].astype(np.int64) - ord("0")
+        number = digits @ 10 ** np.arange(width - 1, -1, -1, dtype=np.int64)
+        numbers[:, column] = np.where(((digits < 0) | (digits > 9)).any(axis=1), -1, number)
+    return numbers

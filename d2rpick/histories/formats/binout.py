@@ -15,14 +15,14 @@ from d2rpick.errors import FormatError, listing
 from d2rpick.histories.database import DIGITS, SolverFile
 from d2rpick.histories.formats.binout_branch import Branch
 from d2rpick.histories.formats.lsda import Lsda, recognises
-from d2rpick.histories.history import Part
+from d2rpick.histories.names import Part
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.content import Content
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
 __all__ = ["Binout", "open_legs", "recognises"]

@@ -19,15 +19,15 @@ import numpy as np
 from d2rpick.errors import FormatError, listing
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.layout import as_number
-from d2rpick.histories.formats.order import not_a_restart
+from d2rpick.histories.formats.printed import not_a_restart
 from d2rpick.histories.names import internal_energies, is_time, refuse_other_quantity, resolve, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.histories.formats.text import Text
-    from d2rpick.histories.history import Part, Precision, Samples
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.history import Precision, Samples
+    from d2rpick.histories.names import Part, Selection
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"  # compiled where it is needed

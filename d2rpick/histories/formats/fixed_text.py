@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.content import Content, content_of
-from d2rpick.histories.formats.ahead import BATCH, Ahead
-from d2rpick.histories.formats.alike import CHUNK, Stretch, like_example
-from d2rpick.histories.formats.fortran import decode
+from d2rpick.histories.formats.alike import BATCH, CHUNK, Ahead, Stretch, like_example
 from d2rpick.histories.formats.grammar import UNSURE
+from d2rpick.histories.formats.printed import decode
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping, Sequence

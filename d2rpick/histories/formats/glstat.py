@@ -16,15 +16,14 @@ import numpy as np
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
-from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, overlong, release
-from d2rpick.histories.formats.text_head import head, written_head
+from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, head, overlong, release, written_head
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Mapping, Sequence
 
     from d2rpick.histories.content import Content
-    from d2rpick.histories.history import Part, Samples
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.history import Samples
+    from d2rpick.histories.names import Part, Selection
     from d2rpick.histories.source import Source
 
 _TIME: Final = "time"

@@ -8,9 +8,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from d2rpick.version import __version__
+
 if TYPE_CHECKING:
     import re
     from collections.abc import Callable, Hashable, Mapping
+
+    from d2rpick.histories.content import Content
 
 Bytes = NDArray[np.uint8]
 
@@ -66,3 +70,25 @@ def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: in
 def overlong(block: bytes) -> bool:
     """Whether a line is longer than solvers write: states were blanked, and hide in it."""
     return max(map(len, block.split(b"\n"))) >= _OVERLONG
+
+
+def head(data: bytes | Content) -> tuple[str, str, int]:
+    """Read the head of an LS-DYNA text database.
+
+    Returns
+    -------
+    title, version : str
+        Empty if there is no head.
+    begin : int
+        Address behind it.
+    """
+    lines = data[:4096].split(b"\n")
+    if len(lines) < 3 or b"ls-dyna" not in lines[1]:
+        return "", "", 0
+    title, version = (line.decode("latin-1") for line in lines[:2])
+    return title.strip(), " ".join(version.split()), len(title) + len(version) + 2
+
+
+def written_head(title: str, database: str) -> str:
+    """Two lines as solvers write them; no release of a solver wrote this, its name alone tells the layout."""
+    return f" {title}\n{' ' * 25}d2rpick {__version__}, layout of ls-dyna {database}\n"

@@ -16,11 +16,10 @@ import numpy as np
 
 from d2rpick.errors import FormatError, listing, printable
 from d2rpick.histories.database import DIGITS, SolverFile
-from d2rpick.histories.formats.hdf5_columns import Column, columns_of, finite
-from d2rpick.histories.formats.hdf5_damage import check_data, check_file
-from d2rpick.histories.formats.order import not_a_restart
-from d2rpick.histories.history import Part, Precision
-from d2rpick.histories.names import near_miss, refuse_other_quantity
+from d2rpick.histories.formats.hdf5_columns import Column, check_data, check_file, columns_of, finite
+from d2rpick.histories.formats.printed import not_a_restart
+from d2rpick.histories.history import Precision
+from d2rpick.histories.names import Part, near_miss, refuse_other_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.database import Database
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"

@@ -18,16 +18,15 @@ import numpy as np
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import SolverFile
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
-from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, overlong, release
-from d2rpick.histories.formats.text_head import head, written_head
-from d2rpick.histories.history import Part
+from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, head, overlong, release, written_head
+from d2rpick.histories.names import Part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.content import Content
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
 QUANTITIES: Final[Mapping[str, str]] = {

@@ -19,8 +19,7 @@ from d2rpick.errors import FormatError, listing
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.database import SolverFile
 from d2rpick.histories.formats.radioss_records import INT, RUN, WIDTH, integers, is_binary, is_text, records_of
-from d2rpick.histories.history import Part
-from d2rpick.histories.names import plain_text
+from d2rpick.histories.names import Part, plain_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.content import Addresses
     from d2rpick.histories.formats.radioss_records import Records
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.selection import Selection
+    from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
 _TITLES: Final = (40, 80, 100)  # bytes of the other titles, by age of the format

@@ -8,7 +8,8 @@ import numpy as np
 
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.histories.history import EXACT, Given, History, Momenta, Part
+from d2rpick.histories.history import EXACT, Given, History, Momenta
+from d2rpick.histories.names import Part
 from d2rpick.models.rollover.record import BOX, PARTS
 
 if TYPE_CHECKING:

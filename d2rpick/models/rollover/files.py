@@ -10,7 +10,7 @@ from d2rpick.models.rollover.record import PARTS
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from d2rpick.histories.writing import Table
+    from d2rpick.histories.opening import Table
     from d2rpick.models.rollover.record import Record
 
 _TITLE: Final = "rollover box"
