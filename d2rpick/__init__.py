@@ -17,6 +17,25 @@ TYPE_CHECKING = False  # type checkers take it for theirs; importing typing is l
 if TYPE_CHECKING:
     from typing import Any
 
+    from d2rpick.api.answers import Suggestion as Suggestion
+    from d2rpick.api.answers import Verdict as Verdict
+    from d2rpick.api.answers import suggest as suggest
+    from d2rpick.api.answers import verify as verify
+    from d2rpick.api.calibrations import Calibration as Calibration
+    from d2rpick.api.calibrations import calibrate as calibrate
+    from d2rpick.api.checking import Findings as Findings
+    from d2rpick.api.checking import check as check
+    from d2rpick.api.explorations import Exploration as Exploration
+    from d2rpick.api.explorations import explore as explore
+    from d2rpick.api.part_tables import PartTable as PartTable
+    from d2rpick.api.part_tables import parts as parts
+    from d2rpick.api.plans import Plan as Plan
+    from d2rpick.api.plans import plan as plan
+    from d2rpick.api.runs import Run as Run
+    from d2rpick.api.runs import from_frame as from_frame
+    from d2rpick.api.runs import read as read
+    from d2rpick.api.studies import Study as Study
+    from d2rpick.api.studies import study as study
     from d2rpick.choice.cost import Weights as Weights
     from d2rpick.errors import ChangedError as ChangedError
     from d2rpick.errors import ConfigurationError as ConfigurationError
@@ -25,25 +44,6 @@ if TYPE_CHECKING:
     from d2rpick.errors import FormatError as FormatError
     from d2rpick.errors import HistoryError as HistoryError
     from d2rpick.errors import RangeError as RangeError
-    from d2rpick.library.answers import Suggestion as Suggestion
-    from d2rpick.library.answers import Verdict as Verdict
-    from d2rpick.library.answers import suggest as suggest
-    from d2rpick.library.answers import verify as verify
-    from d2rpick.library.calibrations import Calibration as Calibration
-    from d2rpick.library.calibrations import calibrate as calibrate
-    from d2rpick.library.checking import Findings as Findings
-    from d2rpick.library.checking import check as check
-    from d2rpick.library.explorations import Exploration as Exploration
-    from d2rpick.library.explorations import explore as explore
-    from d2rpick.library.part_tables import PartTable as PartTable
-    from d2rpick.library.part_tables import parts as parts
-    from d2rpick.library.plans import Plan as Plan
-    from d2rpick.library.plans import plan as plan
-    from d2rpick.library.runs import Run as Run
-    from d2rpick.library.runs import from_frame as from_frame
-    from d2rpick.library.runs import read as read
-    from d2rpick.library.studies import Study as Study
-    from d2rpick.library.studies import study as study
     from d2rpick.vibration.oscillator import Oscillator as Oscillator
 
 _HOME = {
@@ -59,14 +59,14 @@ _HOME = {
         ),
         "errors",
     ),
-    **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "library.answers"),
-    **dict.fromkeys(("Calibration", "calibrate"), "library.calibrations"),
-    **dict.fromkeys(("Findings", "check"), "library.checking"),
-    **dict.fromkeys(("Exploration", "explore"), "library.explorations"),
-    **dict.fromkeys(("PartTable", "parts"), "library.part_tables"),
-    **dict.fromkeys(("Plan", "plan"), "library.plans"),
-    **dict.fromkeys(("Run", "from_frame", "read"), "library.runs"),
-    **dict.fromkeys(("Study", "study"), "library.studies"),
+    **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "api.answers"),
+    **dict.fromkeys(("Calibration", "calibrate"), "api.calibrations"),
+    **dict.fromkeys(("Findings", "check"), "api.checking"),
+    **dict.fromkeys(("Exploration", "explore"), "api.explorations"),
+    **dict.fromkeys(("PartTable", "parts"), "api.part_tables"),
+    **dict.fromkeys(("Plan", "plan"), "api.plans"),
+    **dict.fromkeys(("Run", "from_frame", "read"), "api.runs"),
+    **dict.fromkeys(("Study", "study"), "api.studies"),
     "Oscillator": "vibration.oscillator",
     "Weights": "choice.cost",
 }

@@ -24,7 +24,7 @@ from d2rpick.errors import D2RPickError
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.studies.workers import answers, cores, on_cores
+from d2rpick.workers import answers, cores, on_cores
 from tests.command import DECK
 from tests.faults import Fault, damage
 from tests.hdf5_files import plain, written

@@ -27,19 +27,20 @@ PACKAGE = ROOT / "d2rpick"
 # Each folder imports only from itself and from those on the lines above its own.
 LAYERS = (
     ("errors", "file_state", "version"),
-    ("bounds",),
+    ("bounds", "workers"),
     ("histories", "deck"),
     ("vibration",),
     ("flight",),
     ("choice",),
-    ("rules", "studies"),
+    ("rules",),
     ("models",),
     ("report",),
-    ("cli", "library"),
+    ("api",),
+    ("cli",),
     ("__main__",),
 )
 # The only modules that may import these.
-RESERVED = {"click": ("cli",), "matplotlib": ("report", "library")}  # library: for types
+RESERVED = {"click": ("cli",), "matplotlib": ("report", "api")}  # api: for types
 
 
 def name_of(path: Path) -> str:

@@ -162,7 +162,7 @@ def _run(options: dict[str, Any]) -> None:
 
 def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     """Many switched runs, the tr that the tool recommends among them."""
-    from d2rpick.studies.workers import begin, cores
+    from d2rpick.workers import begin, cores
 
     begin(options["jobs"] or cores(), "d2rpick.models.rollover.run")
     from d2rpick.models.rollover.as_history import suggestion_for

@@ -22,9 +22,9 @@ from d2rpick.report.formats import FORMATS, Shown, write
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.studies.row import StudyRow
-    from d2rpick.studies.study import Question, Study
-    from d2rpick.studies.workers import Farm
+    from d2rpick.choice.study import Question, Study
+    from d2rpick.choice.study_rows import StudyRow
+    from d2rpick.workers import Farm
 
 EXAMPLES = """\b
 Examples:
@@ -92,8 +92,8 @@ def command(ctx: click.Context, /, run: tuple[str, ...], output_format: str, exi
     Each RUN is a file, a folder with the files of one run, or a pattern whose matches are runs.  One that cannot be
     read is listed in its row and does not stop the others.
     """
-    from d2rpick.studies.resume_file import fingerprint, line
-    from d2rpick.studies.study import Question, summarise
+    from d2rpick.api.resume_file import fingerprint, line
+    from d2rpick.choice.study import Question, summarise
 
     work, plot, report = Work.of(options), options["plot"], options["report"]
     td = _td(options["td"], options["td_window"])
@@ -139,7 +139,7 @@ def _td(td: float | None, window: tuple[float, float] | None) -> float | tuple[f
 
 def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
     """Names of all runs, given and listed, patterns replaced by what they match."""
-    from d2rpick.studies.study import find_runs
+    from d2rpick.choice.study import find_runs
 
     sources = find_runs([*names, *(_listed(listed) if listed is not None else ())])
     if not sources:
@@ -205,9 +205,9 @@ def _write_files(answer: Study, plot: str | None, report: str | None, output: Ou
 
 def _rows(question: Question, sources: Sequence[str], work: Work, *, quiet: bool) -> Iterator[StudyRow]:
     """Rows in the order of the runs, each as soon as those before it are there."""
-    from d2rpick.studies.resume_file import Ledger
-    from d2rpick.studies.study import ask, failed
-    from d2rpick.studies.workers import answers
+    from d2rpick.api.resume_file import Ledger
+    from d2rpick.choice.study import ask, failed
+    from d2rpick.workers import answers
 
     ledger = Ledger(work.resume, question) if work.resume is not None else None
     known = {number: row for number, source in enumerate(sources) if ledger and (row := ledger.find(source))}
@@ -234,11 +234,11 @@ def _rows(question: Question, sources: Sequence[str], work: Work, *, quiet: bool
 
 def _farm(work: Work, calls: int) -> Farm:
     """Choose where to compute so many calls; a single one needs no other process."""
-    from d2rpick.studies import workers
+    from d2rpick import workers
 
     if work.scheduler and calls:
         cluster = workers.Cluster(work.scheduler)
         if not cluster.threads and not work.quiet:
             tell(f"note: {work.scheduler}: no workers yet, waiting for some")
         return cluster
-    return workers.on_cores(min(work.jobs or workers.cores(), calls), "d2rpick.studies.study")
+    return workers.on_cores(min(work.jobs or workers.cores(), calls), "d2rpick.choice.study")

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.choice.study import row_of
+from d2rpick.choice.study_rows import common_tr
 from d2rpick.models.exhibit import Curve, Exhibit, Panel, Shape
 from d2rpick.models.rollover.as_history import suggestion_for
 from d2rpick.models.rollover.record import BOX
 from d2rpick.models.rollover.run import RigidWindow, simulate
 from d2rpick.models.rollover.scan import compare
-from d2rpick.studies.common import common_tr
-from d2rpick.studies.study import row_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from d2rpick.choice.study_rows import StudyRow
     from d2rpick.histories.history import Samples
     from d2rpick.models.rollover.model import Parameters, Plane
     from d2rpick.models.rollover.record import Record
-    from d2rpick.studies.row import StudyRow
 
 TD: Final = 0.37
 _END: Final = 0.42

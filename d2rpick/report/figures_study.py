@@ -8,20 +8,19 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from d2rpick.choice.study_rows import outliers, runs_of, short_names
 from d2rpick.choice.view import scale_of
 from d2rpick.report.figures import GOOD, REFERENCE, SWITCHED, WIDTH, finish, mark_times, plain, show_span, with_unit
 from d2rpick.report.figures_page import WIDTH as PAGE
-from d2rpick.studies.common import runs_of
-from d2rpick.studies.outliers import outliers, short_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
 
+    from d2rpick.choice.study import Study
+    from d2rpick.choice.study_rows import StudyRow
     from d2rpick.histories.history import Samples
-    from d2rpick.studies.row import StudyRow
-    from d2rpick.studies.study import Study
 
 # Okabe and Ito's palette, without the yellow that white swallows; dashes tell apart lines of the same colour.
 _COLOURS: Final = (REFERENCE, SWITCHED, GOOD, "#0072b2", "#cc79a7", "#e69f00", "#56b4e9")

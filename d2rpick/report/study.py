@@ -5,19 +5,18 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from d2rpick.choice.study_rows import PLAIN, runs_of
 from d2rpick.errors import printable
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import tables
 from d2rpick.report.keys import of_warnings
-from d2rpick.studies.common import runs_of
-from d2rpick.studies.resume_file import PLAIN, plain
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.studies.row import StudyRow
-    from d2rpick.studies.study import Study
+    from d2rpick.choice.study import Study
+    from d2rpick.choice.study_rows import StudyRow
 
 SCHEMA = "d2rpick/study/1"
 # Keys of a run in JSON, and columns of the csv.
@@ -56,7 +55,7 @@ def as_last_line(answer: Study, command: Sequence[str]) -> str:
 
 def runs(answer: Study) -> list[dict[str, Any]]:
     """Values of each run by their keys in JSON, with its error at the common tr."""
-    return [plain(row) | {"common_error": error} for row, error in _with_errors(answer)]
+    return [row.plain | {"common_error": error} for row, error in _with_errors(answer)]
 
 
 def _with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from d2rpick.choice.study_rows import runs_of
 from d2rpick.report.html import Markup, document, drawings, pairs, remarks, resource, section, table, tag
 from d2rpick.report.shell import shell_line
 from d2rpick.report.study import HEAD, outcome, rows, td_of
 from d2rpick.report.tables import known
-from d2rpick.studies.common import runs_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.studies.study import Study
+    from d2rpick.choice.study import Study
 
 
 def as_page(answer: Study, command: Sequence[str], drawing: str) -> str:

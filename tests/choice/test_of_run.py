@@ -10,12 +10,12 @@ import pytest
 from d2rpick.choice.judged_card import CardRequest, judged_card
 from d2rpick.choice.of_run import Reference, judge_of, read, suggest_of, verify_of
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.study import Question, ask
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.report.suggestion import as_json
 from d2rpick.report.verdict import as_json as verdict_as_json
 from d2rpick.rules.judgement import faults_of
-from d2rpick.studies.study import Question, ask
 from tests.command import BOX as T01
 from tests.command import ENERGY, GLSTAT, run
 from tests.counted_fits import CountedFits

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 # Layers whose messages name no options.
-SPEAKING = ("histories", "vibration", "flight", "choice", "studies", "models")
+SPEAKING = ("histories", "vibration", "flight", "choice", "models")
 
 
 def messages(folder: str) -> Iterator[str]:

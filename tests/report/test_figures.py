@@ -10,13 +10,12 @@ from matplotlib.patches import Rectangle
 
 import d2rpick as d2
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.study import Study
+from d2rpick.choice.study_rows import Common, StudyRow
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
 from d2rpick.report.figures_choice import draw_suggestion
 from d2rpick.report.figures_study import draw_study
-from d2rpick.studies.common import Common
-from d2rpick.studies.row import StudyRow
-from d2rpick.studies.study import Study
 from tests.command import BOX, ENERGY, ROOT
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from d2rpick.errors import RangeError
 from d2rpick.models.rollover.motion import Motion
 from d2rpick.models.rollover.record import BOX
 from d2rpick.models.rollover.run import RigidWindow, proceed, run_to
-from d2rpick.studies.workers import answers, cores, on_cores
+from d2rpick.workers import answers, cores, on_cores
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from d2rpick.api.resume_file import Ledger, fingerprint, line
+from d2rpick.choice import study
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.study import Question, ask
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection
-from d2rpick.studies import study
-from d2rpick.studies.resume_file import Ledger, fingerprint, line
-from d2rpick.studies.study import Question, ask
 from tests import variants
 
 if TYPE_CHECKING:
-    from d2rpick.studies.row import StudyRow
+    from d2rpick.choice.study_rows import StudyRow
 
 QUESTION = Question(variants.TD, Settings())
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Unpack
 
-from d2rpick.library import arguments
-from d2rpick.library.answers import explorer_of, written
-from d2rpick.library.asked import asked_of
-from d2rpick.library.document import Document
-from d2rpick.library.frames import frame_of
+from d2rpick.api import arguments
+from d2rpick.api.answers import explorer_of, written
+from d2rpick.api.asked import asked_of
+from d2rpick.api.document import Document
+from d2rpick.api.frames import frame_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.plan import Plan as Core
     from d2rpick.choice.plan import Planned
     from d2rpick.choice.warnings import Caution
-    from d2rpick.library.arguments import Choosing, Parts
-    from d2rpick.library.runs import Run
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Unpack
 
-from d2rpick.library import arguments
-from d2rpick.library.asked import check_run
-from d2rpick.library.document import Document
-from d2rpick.library.frames import frame_of
+from d2rpick.api import arguments
+from d2rpick.api.asked import check_run
+from d2rpick.api.document import Document
+from d2rpick.api.frames import frame_of
 from d2rpick.report.shell import positional
 
 if TYPE_CHECKING:
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from d2rpick.api.arguments import Choosing
+    from d2rpick.api.runs import Run
     from d2rpick.choice.warnings import Caution
     from d2rpick.deck import Window
-    from d2rpick.library.arguments import Choosing
-    from d2rpick.library.runs import Run
     from d2rpick.rules import Checked, Finding
 
 
@@ -102,7 +102,7 @@ def check(
     >>> [(window.part, window.td) for window in found.windows]
     [(11, 0.0687534), (12, 0.064)]
     """
-    from d2rpick.library.repeat import options_of
+    from d2rpick.api.repeat import options_of
     from d2rpick.rules import check_deck, configuration_for
     from d2rpick.rules.configuration import Configuration
 

@@ -9,9 +9,9 @@ from d2rpick.report.shell import positional
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from d2rpick.api.arguments import Choosing
+    from d2rpick.api.runs import Run
     from d2rpick.histories.names import Selection
-    from d2rpick.library.arguments import Choosing
-    from d2rpick.library.runs import Run
     from d2rpick.vibration.oscillator import Oscillator
 
 

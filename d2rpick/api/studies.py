@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
-from d2rpick.library import arguments
-from d2rpick.library.answers import written
-from d2rpick.library.document import Document
-from d2rpick.library.frames import frame_of
+from d2rpick.api import arguments
+from d2rpick.api.answers import written
+from d2rpick.api.document import Document
+from d2rpick.api.frames import frame_of
 from d2rpick.report.shell import positional
 
 if TYPE_CHECKING:
@@ -19,11 +19,10 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.choice.study import Study as Core
+    from d2rpick.choice.study_rows import Common, StudyRow
     from d2rpick.choice.warnings import Caution
-    from d2rpick.library.arguments import Choosing, Parts
-    from d2rpick.studies.common import Common
-    from d2rpick.studies.row import StudyRow
-    from d2rpick.studies.study import Study as Core
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,10 +125,10 @@ def study(
     >>> found.agree, round(found.common.tr, 4)
     (True, 0.0136)
     """
-    from d2rpick.library.repeat import options_of
-    from d2rpick.library.runs import known_format, selection_of
-    from d2rpick.studies.study import Question, ask, failed, find_runs, summarise
-    from d2rpick.studies.workers import answers, on_cores
+    from d2rpick.api.repeat import options_of
+    from d2rpick.api.runs import known_format, selection_of
+    from d2rpick.choice.study import Question, ask, failed, find_runs, summarise
+    from d2rpick.workers import answers, on_cores
 
     if (td is None) == (td_window is None):
         raise TypeError("td or td_window was expected, and not both")
@@ -141,7 +140,7 @@ def study(
     )
     question = Question(asked, arguments.settings(choosing), selection, known_format(input_format), True)
     rows: dict[int, StudyRow] = {}
-    with on_cores(min(processes, len(names)), "d2rpick.studies.study") as farm:
+    with on_cores(min(processes, len(names)), "d2rpick.choice.study") as farm:
         for answer in answers(farm, partial(ask, question), names):
             row = failed(names[answer.number], answer.error) if answer.error else answer.result
             rows[answer.number] = replace(row, source=names[answer.number])

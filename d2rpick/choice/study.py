@@ -12,13 +12,24 @@ from typing import TYPE_CHECKING, NamedTuple
 from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows, clear_of_td
 from d2rpick.choice.error_profile import error_profile
 from d2rpick.choice.of_run import read, suggest_of
+from d2rpick.choice.study_rows import (
+    FAILED,
+    NAMED,
+    NONE,
+    OK,
+    OUT_OF_RANGE,
+    UNREADABLE,
+    Common,
+    Stamp,
+    StudyRow,
+    common_tr,
+    runs_of,
+)
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import FORESEEN, INTERNAL_ERROR, D2RPickError, RangeError, listing, one_line
 from d2rpick.histories.names import Selection
 from d2rpick.histories.samples import outline
 from d2rpick.histories.source import expand
-from d2rpick.studies.common import NAMED, Common, common_tr, runs_of
-from d2rpick.studies.row import FAILED, NONE, OK, OUT_OF_RANGE, UNREADABLE, Stamp, StudyRow
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:

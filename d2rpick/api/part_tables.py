@@ -5,25 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Unpack
 
-from d2rpick.library import arguments
-from d2rpick.library.answers import written
-from d2rpick.library.asked import check_run, model_of
-from d2rpick.library.document import Document
-from d2rpick.library.frames import frame_of
-from d2rpick.library.repeat import asking
+from d2rpick.api import arguments
+from d2rpick.api.answers import written
+from d2rpick.api.asked import check_run, model_of
+from d2rpick.api.document import Document
+from d2rpick.api.frames import frame_of
+from d2rpick.api.repeat import asking
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
 
+    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.part_sets import Parts as Core
     from d2rpick.choice.part_sets import PartSet
     from d2rpick.choice.part_verdicts import PartRow
     from d2rpick.choice.warnings import Caution
-    from d2rpick.library.arguments import Choosing, Parts
-    from d2rpick.library.runs import Run
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.study import Question, ask, failed, find_runs, summarise
+from d2rpick.choice.study_rows import OK, StudyRow, fewest_digits
 from d2rpick.choice.verify import verify
 from d2rpick.histories.opening import Selection
-from d2rpick.studies.common import fewest_digits
-from d2rpick.studies.row import OK, StudyRow
-from d2rpick.studies.study import Question, ask, failed, find_runs, summarise
 from tests import variants
 from tests.command import BOX
 from tests.computed import stored

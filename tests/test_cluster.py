@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from d2rpick.errors import D2RPickError
-from d2rpick.studies.workers import Cluster
+from d2rpick.workers import Cluster
 from tests import variants
 from tests.command import ROOT, run
 

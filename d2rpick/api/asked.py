@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.library import arguments
-from d2rpick.library.repeat import asking
+from d2rpick.api import arguments
+from d2rpick.api.repeat import asking
 
 if TYPE_CHECKING:
     from typing import Any
 
+    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.runs import Run
     from d2rpick.choice.cost import CostModel, Weights
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.warnings import Caution
     from d2rpick.histories.names import Selection
-    from d2rpick.library.arguments import Choosing, Parts
-    from d2rpick.library.runs import Run
 
 # Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
 _IN_MEMORY: Final = "<weights in memory>"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from d2rpick.library import arguments
-from d2rpick.library.answers import written
-from d2rpick.library.document import Document
-from d2rpick.library.frames import frame_of
+from d2rpick.api import arguments
+from d2rpick.api.answers import written
+from d2rpick.api.document import Document
+from d2rpick.api.frames import frame_of
 from d2rpick.report.shell import positional
 
 if TYPE_CHECKING:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from d2rpick.studies.outliers import outliers, short_names
-from d2rpick.studies.row import NONE, OK, UNREADABLE, StudyRow
+from d2rpick.choice.study_rows import NONE, OK, UNREADABLE, StudyRow, outliers, short_names
 
 
 def row(name: str, tr: float | None = None, status: str = OK) -> StudyRow:

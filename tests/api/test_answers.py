@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import d2rpick as d2
-from d2rpick.library.answers import written
+from d2rpick.api.answers import written
 from d2rpick.report.keys import MEASURES
 from tests.command import BOX, DECK, ENERGY, GLSTAT, ROLLOVER, answer, run
 from tests.sample_deck import DECK as SAMPLE_DECK

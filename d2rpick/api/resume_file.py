@@ -12,19 +12,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from d2rpick.choice.study import stamps
+from d2rpick.choice.study_rows import FAILED, PLAIN, UNREADABLE, Stamp, StudyRow
 from d2rpick.errors import INTERNAL_ERROR, FormatError
-from d2rpick.studies.row import FAILED, UNREADABLE, Stamp, StudyRow
-from d2rpick.studies.study import stamps
 
 if TYPE_CHECKING:
-    from d2rpick.studies.study import Question
-
-# Keys of a line that are a row's plain values, in the order of the output.
-PLAIN: Final = (
-    *("source", "tr", "tr_low", "tr_high", "energy_td", "residual", "status", "message", "basis", "warnings"),
-    *("time_unit", "td"),
-)
-
+    from d2rpick.choice.study import Question
 
 _FIRST: Final = b'{"source": '
 _LAST: Final = b'{"schema": '  # of the summary behind the rows
@@ -37,17 +30,12 @@ def fingerprint(question: Question) -> str:
     return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def plain(row: StudyRow) -> dict[str, Any]:
-    """Give the values of a row by their keys in JSON results."""
-    return {name: getattr(row, name) for name in PLAIN}
-
-
 def line(row: StudyRow, asked: str) -> str:
     """Write a row as one line: its values, and what is needed to take it from there later.
 
     ``asked`` is the ``fingerprint`` of the question.
     """
-    record = plain(row) | {
+    record = row.plain | {
         "acceptable": [windows.tolist() for windows in (row.acceptable, row.alike)],
         "profile": None if row.profile is None else row.profile.tolist(),
         "files": [stamp._asdict() for stamp in row.files],

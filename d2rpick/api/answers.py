@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from d2rpick.api import arguments
+from d2rpick.api.asked import asked_of
+from d2rpick.api.document import Document
+from d2rpick.api.frames import frame_of
 from d2rpick.file_state import write_whole
-from d2rpick.library import arguments
-from d2rpick.library.asked import asked_of
-from d2rpick.library.document import Document
-from d2rpick.library.frames import frame_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.runs import Run
     from d2rpick.choice import suggest as choice
     from d2rpick.choice import verify as judgement
     from d2rpick.choice.candidates import Candidate
@@ -30,8 +32,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.choice.warnings import Caution
     from d2rpick.flight.flight import Flight
-    from d2rpick.library.arguments import Choosing, Parts
-    from d2rpick.library.runs import Run
     from d2rpick.report.explorer import Explorer
     from d2rpick.report.page import PageContext
 
@@ -243,7 +243,7 @@ def suggest(
     **choosing
         How to choose: ``after``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``, ``oscillator``
         with ``v0``, ``fit_window``, ``replay``, ``strict``, ``cost_share``, ``step_ratio``; what they mean stands in
-        ``d2rpick.library.arguments.Choosing``.
+        ``d2rpick.api.arguments.Choosing``.
 
     Returns
     -------

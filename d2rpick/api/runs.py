@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
-from d2rpick.library import arguments
+from d2rpick.api import arguments
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     import pandas as pd
 
+    from d2rpick.api.arguments import Parts, Path
     from d2rpick.choice.overview import Overview
     from d2rpick.histories import run as histories
     from d2rpick.histories.names import Part, Selection
     from d2rpick.histories.source import Source
-    from d2rpick.library.arguments import Parts, Path
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,8 +1,10 @@
-"""One tr for many runs: the earliest that is good in all of them."""
+"""What a study keeps of each run, one tr for all of them, and which of them stand out."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from dataclasses import dataclass, field
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -15,12 +17,69 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.history import Samples
-    from d2rpick.studies.row import StudyRow
 
+# A run has one of these; the first two were judged.
+OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = "ok", "none", "unreadable", "out-of-range", "failed"
+# Keys of a row in JSON results that are its plain values, in the order of the output.
+PLAIN: Final = (
+    *("source", "tr", "tr_low", "tr_high", "energy_td", "residual", "status", "message", "basis", "warnings"),
+    *("time_unit", "td"),
+)
+# Tukey's fences: so many times the distance of the quartiles beyond them.
+_FENCE: Final = 1.5
 # Runs that a sentence names.
 NAMED: Final = 3
 # Share of the rigid time that may be given up for a number of few digits.
 _ROUNDED: Final = 0.001
+
+
+class Stamp(NamedTuple):
+    """A file as it was when its run was read: size in bytes, modification time in nanoseconds."""
+
+    name: str
+    size: int
+    mtime_ns: int
+
+
+@dataclass(frozen=True, eq=False)
+class StudyRow:
+    """Answer for one run; times in the unit of its history, None for what is not known.
+
+    ``status``: "ok"; "none", nothing can be recommended; "unreadable"; "out-of-range", the record does not reach td or
+    is too short to choose; "failed", its process died; "internal-error", the program failed on it.  ``message`` says
+    why it is not "ok"; ``warnings`` are codes.  ``td`` is that of the run; ``acceptable`` are its windows of
+    acceptable tr, shape (n, 2), ``alike`` those in which the error is at most 0.05 above that of its tr, ``profile``
+    the errors, shape (2, m).  ``files`` is what was read; ``curve`` an outline of the energy, shape (2, k), where one
+    was asked for.
+    """
+
+    source: str
+    status: str
+    message: str | None = None
+    tr: float | None = None
+    tr_low: float | None = None
+    tr_high: float | None = None
+    energy_td: float | None = None
+    residual: float | None = None
+    basis: str | None = None
+    time_unit: str = ""
+    warnings: tuple[str, ...] = ()
+    td: float | None = None
+    acceptable: Samples = field(default_factory=lambda: np.zeros((0, 2)))
+    alike: Samples = field(default_factory=lambda: np.zeros((0, 2)))
+    profile: Samples | None = None
+    files: tuple[Stamp, ...] = ()
+    curve: Samples | None = None
+
+    @property
+    def judged(self) -> bool:
+        """Whether the run could be read and judged."""
+        return self.status in (OK, NONE)
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        """Its values by their keys in JSON results."""
+        return {name: getattr(self, name) for name in PLAIN}
 
 
 class Common(NamedTuple):
@@ -113,3 +172,36 @@ def _why_none(judged: Sequence[StudyRow]) -> str:
 
 def _holds(windows: Samples, time: float) -> bool:
     return bool(np.any((windows[:, 0] <= time) & (time <= windows[:, 1])))
+
+
+def outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
+    """Give the judged runs that stand out: those without a tr, then those whose tr lies beyond Tukey's fences.
+
+    The farthest from the median come first.
+    """
+    without = [row for row in rows if row.judged and row.tr is None]
+    chosen = [(row, row.tr) for row in rows if row.tr is not None]
+    if not chosen:
+        return tuple(without)
+    low, middle, high = np.quantile([tr for _, tr in chosen], [0.25, 0.5, 0.75]).tolist()
+    reach = _FENCE * (high - low)
+    far = [(row, abs(tr - middle)) for row, tr in chosen if not low - reach <= tr <= high + reach]
+    return (*without, *(row for row, _ in sorted(far, key=lambda one: -one[1])))
+
+
+def short_names(sources: Sequence[str]) -> tuple[str, ...]:
+    """Give of each name what tells it from the others: folders and file names that all share are left out.
+
+    Examples
+    --------
+    >>> short_names(["runs/soft/glstat", "runs/hard/glstat"])
+    ('soft', 'hard')
+    >>> short_names(["runs/a.csv", "runs/b.csv"])
+    ('a.csv', 'b.csv')
+    """
+    paths = [PurePath(source).parts for source in sources]
+    depth = min(map(len, paths), default=0)
+    first = next((i for i in range(depth) if len({path[i] for path in paths}) > 1), max(depth - 1, 0))
+    last = next((i for i in range(1, depth + 1) if len({path[-i] for path in paths}) > 1), 1)
+    kept = (path[first : len(path) - last + 1] or path[-1:] for path in paths)
+    return tuple("/".join(part.strip("/") for part in one) or source for one, source in zip(kept, sources, strict=True))

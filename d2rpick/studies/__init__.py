@@ -1,1 +1,0 @@
-"""The same question for many runs, on many cores, resumable."""
