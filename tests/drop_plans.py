@@ -16,8 +16,8 @@ from d2rpick.choice.of_run import read
 from d2rpick.choice.plan import plan_of
 from d2rpick.choice.settings import Settings
 from d2rpick.histories.opening import Selection
-from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.run import RigidWindow, simulate
+from d2rpick.models.box_model import Parameters
+from d2rpick.models.box_run import RigidWindow, simulate
 from tests.drops import written
 
 SETS = tuple(

@@ -5,14 +5,14 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from d2rpick.models.rollover import files
-from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.run import RigidWindow, simulate
+from d2rpick.models import files
+from d2rpick.models.box_model import Parameters
+from d2rpick.models.box_run import RigidWindow, simulate
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from d2rpick.models.rollover.record import Record
+    from d2rpick.models.box_run import Record
 
 MESH = 6  # coarse, for speed
 T_END = 1.2
@@ -31,6 +31,6 @@ def written(record: Record, folder: Path) -> list[str]:
     names = []
     for form in ("matsum", "glstat"):
         path = folder / form
-        path.write_bytes(files.WRITERS[form](record))
+        path.write_bytes(files.BOX_WRITERS[form](record))
         names.append(str(path))
     return names

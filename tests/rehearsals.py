@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.models.rollover import files
-from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.record import BOX, Record
-from d2rpick.models.rollover.run import RigidWindow, simulate
-from d2rpick.models.rollover.scan import scan, scan_times
+from d2rpick.models import files
+from d2rpick.models.box_model import Parameters
+from d2rpick.models.box_run import BOX, Record, RigidWindow, simulate
+from d2rpick.models.box_scan import scan, scan_times
 from tests.command import answer
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from d2rpick.models.rollover.scan import Outcome
+    from d2rpick.models.box_scan import Outcome
 
 T_END = 0.55
 # td is this long before the ground comes [s], to the millisecond; as in the published study.
@@ -90,7 +89,7 @@ def rehearse(parameters: Parameters, folder: Path, *, every: int = 1, interval: 
     shown = reference.time <= reference.landed + 0.04
     td = round(reference.landed - BEFORE_LANDING, 3)
     file = folder / "reference.matsum"
-    file.write_bytes(files.as_matsum(_until(reference, int(shown.sum()))))
+    file.write_bytes(files.BOX_WRITERS["matsum"](_until(reference, int(shown.sum()))))
     found = answer("suggest", "--td", str(td), "--part", "box", str(file))
     tr = found["recommended"]["tr"] if found["recommended"] else None
     flight = found["flight"]

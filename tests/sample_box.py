@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.models.rollover.files import WRITERS
-from d2rpick.models.rollover.model import Parameters, build
-from d2rpick.models.rollover.record import PARTS, Record
-from d2rpick.models.rollover.run import simulate
+from d2rpick.models.box_model import Parameters, build
+from d2rpick.models.box_run import PARTS, Record, simulate
+from d2rpick.models.files import BOX_WRITERS
 from tests.command import ROOT
 from tests.made_binout import LsdaWriter
 from tests.made_t01 import T01Writer
@@ -35,7 +34,7 @@ def files(record: Record) -> Mapping[str, bytes]:
     """Content by the name of the file."""
     suffixes = {"csv": "csv", "hdf5": "h5", "glstat": "glstat", "matsum": "matsum"}
     return {
-        **{f"rollover_box.{suffixes[form]}": write(record) for form, write in WRITERS.items()},
+        **{f"rollover_box.{suffixes[form]}": write(record) for form, write in BOX_WRITERS.items()},
         "rollover_box.binout": binout(record),
         "rollover_boxT01": t01(record),
     }

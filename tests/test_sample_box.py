@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from d2rpick.histories.opening import READERS, Selection, open_run
-from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.run import simulate
+from d2rpick.models.box_model import Parameters
+from d2rpick.models.box_run import simulate
 from tests import sample_box
 from tests.command import ROOT, answer
 

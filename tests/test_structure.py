@@ -15,7 +15,7 @@ import pytest
 
 from d2rpick.cli import options, replay
 from d2rpick.histories.opening import READERS
-from d2rpick.models import oscillator_files
+from d2rpick.models.files import OSCILLATOR_WRITERS
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
 
 if TYPE_CHECKING:
@@ -242,7 +242,7 @@ def test_no_garbage_is_looked_for_at_the_end() -> None:
 
 def test_the_command_line_offers_the_formats_there_are() -> None:
     assert tuple(READERS) == options.FORMATS
-    assert tuple(oscillator_files.WRITERS) == replay.FORMATS
+    assert tuple(OSCILLATOR_WRITERS) == replay.FORMATS
 
 
 # The result of each command that knows JSON, and the number of its schema.

@@ -74,7 +74,6 @@ class Answer(Document):
 
     def _record(
         self,
-        figures: dict[str, str],
         tr: float | None,
         td_window: tuple[float, float] | None = None,
     ) -> PageContext:
@@ -85,7 +84,7 @@ class Answer(Document):
         reference = Reference(self.run.files, self.situation.history)
         explorer = explorer_of([explored_around(reference, self.situation, td_window)], self._asking)
         card = None if tr is None else input_for(reference, self.situation, tr, CardRequest())
-        return page_record(self.run, self.command, figures, card, explorer)
+        return page_record(self.run, self.command, card, explorer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +142,10 @@ class Suggestion(Answer):
 
     def report(self, path: arguments.Path) -> Path:
         """Write the answer to one HTML page that needs no network; an existing file is replaced."""
-        from d2rpick.report.suggestion_page import as_page, drawn
+        from d2rpick.report.pages import suggestion_page
 
         pair = self.recommended
-        page = as_page(self._core, self._record(drawn(self._core), pair.tr if pair else None, self._core.td_window))
+        page = suggestion_page(self._core, self._record(pair.tr if pair else None, self._core.td_window))
         return written(path, page)
 
 
@@ -204,9 +203,9 @@ class Verdict(Answer):
 
     def report(self, path: arguments.Path) -> Path:
         """Write the verdict to one HTML page that needs no network; an existing file is replaced."""
-        from d2rpick.report.verdict_page import as_page, drawn
+        from d2rpick.report.pages import verdict_page
 
-        return written(path, as_page(self._core, self._record(drawn(self._core), self.tr if self.verified else None)))
+        return written(path, verdict_page(self._core, self._record(self.tr if self.verified else None)))
 
 
 def suggest(
@@ -368,14 +367,13 @@ def explorer_of(found: Iterable[TradeOff | None], asking: Sequence[str]) -> Expl
 def page_record(
     run: Run,
     command: Sequence[str],
-    figures: dict[str, str],
     card: SolverInput | None,
     explorer: Explorer | None,
 ) -> PageContext:
     """Give what a page shows besides the answer that ``command`` repeats."""
     from d2rpick.report.page import PageContext
 
-    return PageContext(run.files, ("d2rpick", *command), (), figures, card, explorer=explorer)
+    return PageContext(run.files, ("d2rpick", *command), (), card, explorer=explorer)
 
 
 def written(path: arguments.Path, page: str) -> Path:

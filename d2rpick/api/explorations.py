@@ -73,7 +73,7 @@ class Exploration(Document):
 
     def plot(self) -> Figure:
         """Draw energy, error and rigid time over td, as a matplotlib Figure."""
-        from d2rpick.report.figures_trade_off import draw_trade_off
+        from d2rpick.report.figures_choice import draw_trade_off
 
         return draw_trade_off(self._core)
 
@@ -81,13 +81,13 @@ class Exploration(Document):
         """Write the answer to one HTML page that needs no network; an existing file is replaced."""
         from d2rpick.choice.judged_card import CardRequest, input_for
         from d2rpick.choice.of_run import Reference
-        from d2rpick.report.trade_off_page import as_page, drawn
+        from d2rpick.report.pages import trade_off_page
 
         core = self._core
         pair, explorer = core.suggestion.recommended, explorer_of([core], self._asking)
         there = core.suggestion.situation
         card = input_for(Reference(self.run.files, there.history), there, pair.tr, CardRequest()) if pair else None
-        return written(path, as_page(core, page_record(self.run, self.command, drawn(core), card, explorer)))
+        return written(path, trade_off_page(core, page_record(self.run, self.command, card, explorer)))
 
 
 def explore(

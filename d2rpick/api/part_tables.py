@@ -71,9 +71,9 @@ class PartTable(Document):
 
     def report(self, path: arguments.Path) -> Path:
         """Write everything to one HTML page that needs no network; an existing file is replaced."""
-        from d2rpick.report.parts_page import as_page
+        from d2rpick.report.pages import parts_page
 
-        return written(path, as_page(self._core, ("d2rpick", *self.command)))
+        return written(path, parts_page(self._core, ("d2rpick", *self.command)))
 
 
 def parts(

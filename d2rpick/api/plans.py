@@ -71,7 +71,7 @@ class Plan(Document):
 
     def plot(self) -> Figure:
         """Draw the energy with the flights and the rigid windows, as a matplotlib Figure."""
-        from d2rpick.report.figures_plan import draw_plan
+        from d2rpick.report.figures_choice import draw_plan
 
         return draw_plan(self._core)
 
@@ -80,12 +80,12 @@ class Plan(Document):
         from d2rpick.choice.explored import explored_flights
         from d2rpick.choice.judged_card import CardRequest, card_of_plan
         from d2rpick.choice.of_run import Reference
-        from d2rpick.report.plan_page import as_page
+        from d2rpick.report.pages import plan_page
 
         card = card_of_plan(self._core, self.run.files, CardRequest())
         found = explored_flights(Reference(self.run.files, self._core.history), self._core)
         text = card[0].text if card else None
-        page = as_page(self._core, self.run.files, ("d2rpick", *self.command), text, explorer_of(found, self._asking))
+        page = plan_page(self._core, self.run.files, ("d2rpick", *self.command), text, explorer_of(found, self._asking))
         return written(path, page)
 
 

@@ -69,12 +69,9 @@ class Study(Document):
 
     def report(self, path: arguments.Path) -> Path:
         """Write the study to one HTML page that needs no network; an existing file is replaced."""
-        from d2rpick.report.figures_page import svg_element
-        from d2rpick.report.figures_study import draw_study
-        from d2rpick.report.study_page import as_page
+        from d2rpick.report.pages import study_page
 
-        drawing = svg_element(draw_study(self._core, page=True), "runs-")
-        return written(path, as_page(self._core, ("d2rpick", *self.command), drawing))
+        return written(path, study_page(self._core, ("d2rpick", *self.command)))
 
 
 def study(

@@ -87,7 +87,7 @@ def command(
     output.notes(reference.history.notes, found.cautions)
     if extras.plot:
         from d2rpick.report import figures
-        from d2rpick.report.figures_trade_off import draw_trade_off
+        from d2rpick.report.figures_choice import draw_trade_off
 
         output.write(extras.plot, figures.render(draw_trade_off(found), extras.plot))
     if extras.report:
@@ -100,14 +100,13 @@ def command(
 
 
 def _page(found: TradeOff, reference: Reference, options: dict[str, Any]) -> str:
-    """Draw the figures, and write the page around them."""
+    """Write the page."""
     from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import PageContext
-    from d2rpick.report.trade_off_page import as_page, drawn
+    from d2rpick.report.pages import trade_off_page
 
     request = card_request(reference.run, options, found.situation.history)
     pair, judging = found.suggestion.recommended, typed.judging(options)
     card = input_for(reference, found.suggestion.situation, pair.tr, request) if pair else None
-    return as_page(
-        found, PageContext(reference.run, typed.repeat(), judging, drawn(found), card, explorer=explorer_of([found]))
-    )
+    shown = PageContext(reference.run, typed.repeat(), judging, card, explorer=explorer_of([found]))
+    return trade_off_page(found, shown)

@@ -70,9 +70,9 @@ def command(
     found = parts_of(run, settings, model, given=given, times=times, beside=beside)
     output.notes(run.notes, found.cautions)
     if options["report"]:
-        from d2rpick.report.parts_page import as_page
+        from d2rpick.report.pages import parts_page
 
-        output.write(options["report"], text_bytes(with_options(as_page(found, typed.repeat()))))
+        output.write(options["report"], text_bytes(with_options(parts_page(found, typed.repeat()))))
     text = write("parts", output_format, found, Shown(ctx.meta["d2rpick.command"]))
     output.result(in_words(text, output_format))
     return finish(ctx, objection=found.recommended is None, exit_zero=exit_zero)

@@ -132,17 +132,17 @@ def _beside(plan: Plan, reference: Reference, options: dict[str, Any], output: O
     """Write the figure and the page, as far as they are asked for."""
     if options["plot"]:
         from d2rpick.report import figures
-        from d2rpick.report.figures_plan import draw_plan
+        from d2rpick.report.figures_choice import draw_plan
 
         output.write(options["plot"], figures.render(draw_plan(plan), options["plot"]))
     if options["report"]:
         from d2rpick.choice.explored import explored_flights
-        from d2rpick.report.plan_page import as_page
+        from d2rpick.report.pages import plan_page
 
         found = _judged(plan, reference, options, every=False)
         card = found[0].text if found else None
         explorer = explorer_of(explored_flights(reference, plan))
-        page = as_page(plan, reference.run, typed.repeat(), card, explorer)
+        page = plan_page(plan, reference.run, typed.repeat(), card, explorer)
         output.write(options["report"], text_bytes(with_options(page)))
 
 

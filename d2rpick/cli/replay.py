@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import State
 
 MOST_STATES = 10_000_000  # their text takes some gigabytes
-FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.models.oscillator_files, which --help does without
+FORMATS = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.models.files, which --help does without
 
 EXAMPLES = """\b
 Examples:
@@ -56,7 +56,7 @@ def command(
     after the switch.
     """
     from d2rpick.histories.opening import format_of
-    from d2rpick.models import oscillator_files
+    from d2rpick.models import files
     from d2rpick.vibration.replay import Replay, trajectory
 
     start = _start(**options)
@@ -77,7 +77,7 @@ def command(
 
         output.write(plot, figures.render(figures_models.draw_replay(motion, switched), plot))
     if options["output_file"] or not plot:
-        output.content(oscillator_files.WRITERS[form](motion, oscillator))
+        output.content(files.OSCILLATOR_WRITERS[form](motion, oscillator))
 
 
 def _start(

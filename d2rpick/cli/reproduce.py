@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from d2rpick.histories.history import Samples
-    from d2rpick.models.exhibit import Exhibit
+    from d2rpick.models.published_figures import Exhibit
     from d2rpick.report.reproduction import Reproduction
 
 EXAMPLES = """\b
@@ -81,9 +81,9 @@ def command(
     answer = Reproduction(table(), list(_exhibits(section, curves)))
     files = _write(output, place, answer)
     if report:
-        from d2rpick.report.reproduction_page import as_page
+        from d2rpick.report.pages import reproduction_page
 
-        output.write(report, as_page(answer.rows, answer.exhibits, typed.repeat()).encode())
+        output.write(report, reproduction_page(answer.rows, answer.exhibits, typed.repeat()).encode())
     answer = answer._replace(files=files)
     output.result(write("reproduction", output_format, answer, Shown(ctx.meta["d2rpick.command"])))
     output.notes([f"{len(files)} files in {output_dir}"], ())
@@ -93,7 +93,7 @@ def command(
 def _exhibits(sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]) -> Iterator[Exhibit]:
     """Give the figures of these sections, of all without any, in the order of the paper."""
     from d2rpick.models import published_box, published_figures, saving
-    from d2rpick.models.rollover.model import Parameters
+    from d2rpick.models.box_model import Parameters
 
     of_box, of_oscillator = published_box.exhibits_of(Parameters()), published_figures.exhibits_of(solver)
     makers = sorted([*of_box, *of_oscillator, (5, saving.exhibit)], key=lambda one: one[0])

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.warnings import Caution
-    from d2rpick.models.rollover.model import Parameters
-    from d2rpick.models.rollover.record import Record
+    from d2rpick.models.box_model import Parameters
+    from d2rpick.models.box_run import Record
 
 MOST_STATES = 1_000_000
-HISTORIES = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.models.rollover.files, which --help does without
+HISTORIES = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.models.files, which --help does without
 PARAMETERS = ("speed", "stiffness", "yield_strain", "damping", "mesh", "drop", "tilt", "ground_stiffness")
 TD = 0.37  # of the published study, 10 ms before the ground comes
 TILT = 30.0  # of a box that falls: on an edge, so that it tumbles
@@ -127,7 +127,7 @@ def _check_windows(starts: Sequence[float], ends: Sequence[float], t_end: float)
 
 
 def _parameters(options: dict[str, Any]) -> Parameters:
-    from d2rpick.models.rollover.model import Parameters
+    from d2rpick.models.box_model import Parameters
 
     given = {name: options[name] for name in PARAMETERS if options[name] is not None}
     if options["drop"] is not None:
@@ -138,8 +138,8 @@ def _parameters(options: dict[str, Any]) -> Parameters:
 def _run(options: dict[str, Any]) -> None:
     """One run; for a plot also the one without switching."""
     from d2rpick.histories.opening import format_of
-    from d2rpick.models.rollover import files
-    from d2rpick.models.rollover.run import RigidWindow, simulate
+    from d2rpick.models import files
+    from d2rpick.models.box_run import RigidWindow, simulate
 
     form = options["write_as"] or format_of(options["output_file"], HISTORIES)
     output = Output.of(options)
@@ -157,17 +157,16 @@ def _run(options: dict[str, Any]) -> None:
         reference, switched = (simulated(), record) if windows else (record, None)
         output.write(plot, figures.render(figures_models.draw_rollover(parameters, reference, switched, windows), plot))
     if options["output_file"] or not plot:
-        output.content(files.WRITERS[form](record))
+        output.content(files.BOX_WRITERS[form](record))
 
 
 def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     """Many switched runs, the tr that the tool recommends among them."""
     from d2rpick.workers import begin, cores
 
-    begin(options["jobs"] or cores(), "d2rpick.models.rollover.run")
-    from d2rpick.models.rollover.as_history import suggestion_for
-    from d2rpick.models.rollover.run import simulate
-    from d2rpick.models.rollover.scan import comparison_end, scan, scan_times
+    begin(options["jobs"] or cores(), "d2rpick.models.box_run")
+    from d2rpick.models.box_run import simulate
+    from d2rpick.models.box_scan import comparison_end, scan, scan_times, suggestion_for
     from d2rpick.report.formats import Shown, write
     from d2rpick.report.rollover import Scan
 

@@ -21,7 +21,7 @@ Examples:
 @shared.file_options
 def command(id: tuple[str, ...], **options: Any) -> None:  # noqa: A002  the name is that of the argument in usage
     """Explain a rule of `d2rpick check`, with decks that pass and fail; without ID, list all rules."""
-    from d2rpick.report import rules as report
+    from d2rpick.report import findings as report
     from d2rpick.rules import find_rules
 
     output = Output.of(options)

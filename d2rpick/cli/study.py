@@ -189,18 +189,14 @@ def _write_files(answer: Study, plot: str | None, report: str | None, output: Ou
     for name in (output.file, plot, report):
         if name is not None:
             output.claim(name)
-    if plot is None and report is None:
-        return
-    from d2rpick.report import figures, figures_study
-
     if plot is not None:
+        from d2rpick.report import figures, figures_study
+
         output.write(plot, figures.render(figures_study.draw_study(answer), plot))
     if report is not None:
-        from d2rpick.report.figures_page import svg_element
-        from d2rpick.report.study_page import as_page
+        from d2rpick.report.pages import study_page
 
-        drawing = svg_element(figures_study.draw_study(answer, page=True), "runs-")
-        output.write(report, text_bytes(with_options(as_page(answer, typed.repeat(), drawing))))
+        output.write(report, text_bytes(with_options(study_page(answer, typed.repeat()))))
 
 
 def _rows(question: Question, sources: Sequence[str], work: Work, *, quiet: bool) -> Iterator[StudyRow]:

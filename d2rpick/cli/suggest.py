@@ -123,14 +123,14 @@ def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> 
     from d2rpick.choice.judged_card import input_for
     from d2rpick.cli.explorer import explorer_of
     from d2rpick.report.page import PageContext
-    from d2rpick.report.suggestion_page import as_page, drawn
+    from d2rpick.report.pages import suggestion_page
 
     run = reference.run
     request, pair = card_request(run, options, answer.situation.history), answer.recommended
     card = input_for(reference, answer.situation, pair.tr, request) if pair else None
     explorer = explorer_of([explored_around(reference, answer.situation, answer.td_window)])
     judging = typed.judging(options)
-    return as_page(answer, PageContext(run, typed.repeat(), judging, drawn(answer), card, explorer=explorer))
+    return suggestion_page(answer, PageContext(run, typed.repeat(), judging, card, explorer=explorer))
 
 
 def _card(answer: Suggestion, reference: Reference, options: dict[str, Any], output: Output) -> bool:

@@ -102,11 +102,11 @@ def _page(answer: Verdict, reference: Reference, switched: Run | None, options: 
     from d2rpick.choice.explored import explored_around
     from d2rpick.choice.judged_card import input_for
     from d2rpick.report.page import PageContext
-    from d2rpick.report.verdict_page import as_page, drawn
+    from d2rpick.report.pages import verdict_page
 
     run = reference.run
     request = card_request(run, options, answer.situation.history)
     card = input_for(reference, answer.situation, answer.candidate.tr, request) if answer.verified else None
     explorer = explorer_of([explored_around(reference, answer.situation)])
     judging = typed.judging(options)
-    return as_page(answer, PageContext(run, typed.repeat(), judging, drawn(answer), card, switched, explorer))
+    return verdict_page(answer, PageContext(run, typed.repeat(), judging, card, switched, explorer))

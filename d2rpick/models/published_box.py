@@ -10,19 +10,17 @@ import numpy as np
 
 from d2rpick.choice.study import row_of
 from d2rpick.choice.study_rows import common_tr
-from d2rpick.models.exhibit import Curve, Exhibit, Panel, Shape
-from d2rpick.models.rollover.as_history import suggestion_for
-from d2rpick.models.rollover.record import BOX
-from d2rpick.models.rollover.run import RigidWindow, simulate
-from d2rpick.models.rollover.scan import compare
+from d2rpick.models.box_run import BOX, RigidWindow, simulate
+from d2rpick.models.box_scan import compare, suggestion_for
+from d2rpick.models.published_figures import Curve, Exhibit, Panel, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from d2rpick.choice.study_rows import StudyRow
     from d2rpick.histories.history import Samples
-    from d2rpick.models.rollover.model import Parameters, Plane
-    from d2rpick.models.rollover.record import Record
+    from d2rpick.models.box_model import Parameters, Plane
+    from d2rpick.models.box_run import Record
 
 TD: Final = 0.37
 _END: Final = 0.42

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.choice.cost import POINT, Weights, saved_share
-from d2rpick.models.exhibit import Curve, Exhibit, Panel
+from d2rpick.models.published_figures import Curve, Exhibit, Panel
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:

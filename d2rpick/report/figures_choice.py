@@ -1,9 +1,10 @@
-"""Figures of a choice and of a verdict: the flight with its level, what is acceptable in it, and the motion."""
+"""Figures of a choice: of suggest and verify with the flight, its level and the motion; of a plan; of a trade-off."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from d2rpick.choice.replayed import replayed_motion
@@ -17,13 +18,14 @@ from d2rpick.report.figures import (
     STRETCHES,
     SWITCHED,
     WIDTH,
+    arrange,
+    entries,
     finish,
     mark_times,
     plain,
     show_span,
     with_unit,
-)  # fmt: skip
-from d2rpick.report.figures_page import arrange
+)
 from d2rpick.report.situation import energy_name
 
 if TYPE_CHECKING:
@@ -32,11 +34,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.plan import Plan
     from d2rpick.choice.replayed import Motion
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.suggest import Pair, Suggestion
+    from d2rpick.choice.trade_off import TradeOff
     from d2rpick.choice.verify import Verdict
     from d2rpick.choice.view import View
+
 
 # Height of a file's figure of the energy alone, and with the motion; on a page, that of a panel [inch].
 _HEIGHTS: Final = (4.0, 6.5)
@@ -147,3 +152,84 @@ def _draw_motion(axes: Axes, motion: Motion) -> None:
     ):
         axes.plot(motion.time, values, color=colour, linewidth=1, label=name)
     axes.set_ylabel("deformation [√energy]")
+
+
+_COLOURS: Final = {"supported": GOOD, "re-plan": SWITCHED, "done": "#999999"}
+_HATCHES: Final = {"supported": None, "re-plan": "//", "done": None}  # told apart without colour, too
+# Of the figure in a file, and of the axes on a page [inch].
+_PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
+# Share of the axes below the energy in which the windows are drawn.
+_STRIP: Final = 0.07
+
+
+def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
+    """Draw the energy over time, the flights behind it and the rigid windows below it."""
+    figure = Figure(figsize=(WIDTH, _PLAN_HEIGHT), layout=None if page else "constrained")
+    axes = figure.subplots()
+    history = plan.history
+    axes.plot(history.time, history.energy, color=REFERENCE, linewidth=1, label="internal energy")
+    for row in plan.rows:
+        axes.axvspan(row.start, row.end, color=FLIGHT, alpha=0.15, linewidth=0, label="flight")
+        if row.window:
+            axes.axvspan(
+                *row.window, ymax=_STRIP, facecolor=_COLOURS[row.status], hatch=_HATCHES[row.status],
+                edgecolor="white", linewidth=0, label=f"rigid, {row.status}",
+            )  # fmt: skip
+            axes.annotate(
+                str(row.number), (sum(row.window) / 2, _STRIP), xycoords=("data", "axes fraction"), xytext=(0, 2),
+                textcoords="offset points", ha="center", fontsize="small",
+            )  # fmt: skip
+    low, high = axes.get_ylim()
+    axes.set_ylim(low - 2 * _STRIP * (high - low), high)
+    axes.set(xlabel=with_unit("time", history.time_unit), ylabel="internal energy")
+    finish(axes, legend=False)
+    if page:
+        arrange(figure, [axes], _PLAN_PANEL)
+    else:
+        known = entries([axes])
+        figure.legend(known.values(), known, loc="outside lower left", ncols=4, fontsize="small", frameon=False)
+    return figure
+
+
+# Of the figure in a file, and of one of its axes on a page [inch].
+_TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
+_ERRORS: Final = {True: "shortfall of the level", False: "residual"}
+
+
+def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
+    """Draw the energy in the window of td, and below it error and saving of the best pair for each td."""
+    figure = Figure(figsize=(WIDTH, _TRADE_HEIGHT), layout=None if page else "constrained")
+    energy, error, rigid = figure.subplots(3, sharex=True)
+    history = found.situation.history
+    inner = history.between(*found.td_window)
+    energy.plot(*outline(*inner, stretches=STRETCHES), color=REFERENCE, linewidth=1)
+    energy.set(ylabel="internal energy")
+    by_energy = bool(found.offers) and all(one.basis == "energy" for one in found.offers)
+    _curve(error, found, [one.error for one in found.offers])
+    error.set(ylabel=_ERRORS[by_energy], ylim=(0, None))
+    saved = [one.saving for one in found.offers]
+    cost = any(one is not None for one in saved)
+    _curve(rigid, found, saved if cost else [one.rigid_time for one in found.offers])
+    td = with_unit("td", history.time_unit)
+    rigid.set(ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None))
+    panels = (energy, error, rigid)
+    for axes in panels:
+        for one, colour, name in ((found.asked, FLIGHT, "td asked for"), (found.recommended, SWITCHED, "recommended")):
+            if one:
+                axes.axvline(one.td, color=colour, linewidth=1, linestyle="--", label=name)
+        finish(axes, legend=False)
+    if page:
+        arrange(figure, panels, _TRADE_PANEL)
+    else:
+        known = entries(panels)
+        figure.legend(known.values(), known, loc="outside lower left", ncols=4, frameon=False)
+    return figure
+
+
+def _curve(axes: Axes, found: TradeOff, values: list[float | None]) -> None:
+    """Draw one measure of all offers, with gaps where it is unknown, and mark those that nothing beats."""
+    td = np.array([one.td for one in found.offers])
+    shown = np.array([np.nan if value is None else value for value in values])
+    best = np.array([one.unbeaten for one in found.offers], dtype=bool)
+    axes.plot(td, shown, color=REFERENCE, linewidth=0.8, label="best pair for each td")
+    axes.plot(td[best], shown[best], "o", color=GOOD, markersize=4, label="nothing beats it")

@@ -10,8 +10,18 @@ from matplotlib.figure import Figure
 
 from d2rpick.choice.study_rows import outliers, runs_of, short_names
 from d2rpick.choice.view import scale_of
-from d2rpick.report.figures import GOOD, REFERENCE, SWITCHED, WIDTH, finish, mark_times, plain, show_span, with_unit
-from d2rpick.report.figures_page import WIDTH as PAGE
+from d2rpick.report.figures import (
+    GOOD,
+    PAGE_WIDTH,
+    REFERENCE,
+    SWITCHED,
+    WIDTH,
+    finish,
+    mark_times,
+    plain,
+    show_span,
+    with_unit,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -55,7 +65,7 @@ class _Named(NamedTuple):
 def draw_study(answer: Study, *, page: bool = False) -> Figure:
     """Draw energies around td over each other, the tr of each, the common one and td."""
     # names of runs stand beside the axes, so that the margins are not known, on a page neither
-    figure = Figure(figsize=(PAGE if page else WIDTH, _HEIGHT), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH if page else WIDTH, _HEIGHT), layout="constrained")
     axes = figure.subplots()
     drawn = [row for row in answer.rows if row.curve is not None]
     named = _named(drawn)

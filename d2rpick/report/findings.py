@@ -1,9 +1,10 @@
-"""Findings of ``check`` as table, JSON, one JSON line per deck, GitHub annotations, JUnit XML and SARIF."""
+"""Findings of check as table, JSON, GitHub annotations, JUnit XML and SARIF; its rules as text."""
 
 from __future__ import annotations
 
 import os
 import re
+import textwrap
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,14 +15,15 @@ from xml.etree import ElementTree as ET
 from d2rpick.deck.source import STDIN
 from d2rpick.errors import name_units, printable
 from d2rpick.report import tables
-from d2rpick.rules import RULES, Severity
+from d2rpick.rules import RULES, Example, Severity
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck import Window
-    from d2rpick.rules import Checked, Finding, Unreadable
+    from d2rpick.rules import Checked, Finding, Rule, Unreadable
+
 
 SCHEMA: Final = "d2rpick/check/1"
 SARIF_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
@@ -262,3 +264,43 @@ def _escaped(text: str, more: str = "") -> str:
 def _xml(text: str) -> str:
     """Return the text in characters that XML 1.0 can write and a terminal shows."""
     return _NOT_XML.sub("?", printable(text))
+
+
+_WIDTH = 100
+
+
+def as_list() -> str:
+    """Id, severity and summary of every rule."""
+    return "\n".join(f"{rule.id}  {rule.severity:<7}  {rule.summary}" for rule in RULES.values())
+
+
+def as_text(rule: Rule) -> str:
+    """One rule: what it finds, why that matters, and decks that pass and fail."""
+    lines = [f"{rule.id} ({rule.severity}): {rule.summary}", "", *textwrap.wrap(rule.explanation, _WIDTH)]
+    for title, examples in (("Passes", rule.passing), ("Fails", rule.failing)):
+        for example in examples:
+            lines += ["", *_example(title, example)]
+    return "\n".join(lines)
+
+
+def _example(title: str, example: Example) -> Iterator[str]:
+    """A deck as it stands in its file, with what it includes and what it is checked against."""
+    if example.history:
+        yield f"{title}, with the history of"
+        yield f"  d2rpick replay {example.history} -o energy.csv"
+        yield f"checked by d2rpick check {example.name} --history energy.csv {example.options}".rstrip() + ":"
+    elif example.stdin:
+        yield f"{title}, read by d2rpick check -:"
+    elif example.name != Example.name:
+        yield f"{title}, as {example.name}:"
+    else:
+        yield f"{title}:"
+    yield ""
+    yield from _indented(example.deck)
+    for name, text in example.files.items():
+        yield from ("", f"with {name}:", "")
+        yield from _indented(text)
+
+
+def _indented(text: str) -> Iterator[str]:
+    return (f"    {line}".rstrip() for line in text.rstrip("\n").split("\n"))

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.health import head, measures_of
-from d2rpick.report.situation import spoken
+from d2rpick.report.situation import head, measures_of, spoken
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""What the HTML pages of ``suggest`` and ``verify`` have in common; a page needs nothing but itself."""
+"""What HTML pages have in common: cards of a pair, what was read, and how to repeat it."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.printing import DEFAULT, SOLVERS
-from d2rpick.report.explorer import scripts, styles
-from d2rpick.report.health import measures_of
-from d2rpick.report.html import Markup, document, join, pairs, resource, section, table, tag
+from d2rpick.report.explorer import explorer, scripts, styles
+from d2rpick.report.html import Markup, document, drawings, join, pairs, resource, section, table, tag
 from d2rpick.report.shell import shell_line
-from d2rpick.report.situation import heading
+from d2rpick.report.situation import heading, measures_of
 from d2rpick.report.tables import short
 
 if TYPE_CHECKING:
@@ -37,14 +36,13 @@ class PageContext:
     """What a page shows besides the answer.
 
     ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the
-    options of ``card`` that judge by the same history.  ``figures`` are SVG elements by caption.  ``card`` is the
+    options of ``card`` that judge by the same history.   ``card`` is the
     solver input of a pair that is recommended or verified; ``explorer`` makes the page live.
     """
 
     run: Run
     command: Sequence[str]
     judging: Sequence[str]
-    figures: Mapping[str, str]
     card: SolverInput | None = None
     switched: Run | None = None
     explorer: Explorer | None = None
@@ -54,6 +52,23 @@ def run_page(run: Run, sections: Iterable[Markup], explored: Explorer | None = N
     """Write a page about one run; with what can be ``explored`` it runs a script."""
     needed = {"styles": styles(), "scripts": scripts()} if explored else {}
     return document(f"Switch times: {title_of(run)}", *sections, signed=SIGNED, **needed)
+
+
+def front(cards: Sequence[Markup], *below: Markup) -> Markup:
+    """Give the first section: cards of what was chosen or judged beside each other, and what to know of them."""
+    return tag("section", tag("div", *cards, class_="choice"), *below)
+
+
+def refused(reason: str) -> Markup:
+    """Give the card of an answer that recommends nothing."""
+    return tag("div", tag("h2", "Nothing recommended"), tag("p", reason), class_="card refused")
+
+
+def shown(figures: Mapping[str, str], record: PageContext) -> Iterator[Markup]:
+    """Give what can be explored, and ``figures``, SVG elements by caption."""
+    if record.explorer:
+        yield explorer(record.explorer)
+    yield drawings(figures)
 
 
 def title_of(run: Run) -> str:
@@ -115,9 +130,24 @@ def evidence(situation: Situation, health: Health | None, record: PageContext) -
     """Tell what was read, how healthy it is, by what method it was judged, and how to repeat that."""
     yield section("What was read", _read(situation, record.run))
     yield section("Health of the reference run", *_health(health))
+    yield from method(record.command, "-" in record.run.sources)
+
+
+def method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
+    """Tell by what method an answer was found, and how to repeat it."""
     yield section("Method and limits", resource("method.html"))
-    stdin = [tag("p", "with the same history on standard input:")] if "-" in record.run.sources else []
-    yield section("To repeat this", *stdin, tag("pre", shell_line(record.command), class_="wrap"))
+    yield repeated(command, stdin)
+
+
+def repeated(command: Sequence[str], stdin: bool = False) -> Markup:
+    """Give the arguments that repeat an answer as a line to paste."""
+    said = [tag("p", "with the same history on standard input:")] if stdin else []
+    return section("To repeat this", *said, tag("pre", shell_line(command), class_="wrap"))
+
+
+def named(lines: Iterable[str]) -> list[tuple[str, str]]:
+    """Part lines, as they stand above a table, in their name and what it stands for."""
+    return [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in lines]
 
 
 def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
@@ -136,8 +166,7 @@ def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
 
 
 def _read(situation: Situation, run: Run) -> Markup:
-    listed = [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in heading(situation)]
-    listed += [*digests(run.files), *digests_of(situation.settings)]
+    listed = [*named(heading(situation)), *digests(run.files), *digests_of(situation.settings)]
     listed += [(f"{database.format} by", database.version) for database in run.databases if database.version]
     whole = "the files end after a complete state" if situation.history.complete else "only complete states were used"
     listed += [("complete", whole)]

@@ -11,8 +11,8 @@ from d2rpick.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.models.exhibit import Exhibit
     from d2rpick.models.published import PublishedValue
+    from d2rpick.models.published_figures import Exhibit
 
 SCHEMA = "d2rpick/reproduce/2"
 MODEL = "k = 660e3 N/m, M = 31.4 kg, beta = 2, alpha = 50 1/s, V0 = 6 m/s"

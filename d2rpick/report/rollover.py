@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.models.rollover.record import BOX
+from d2rpick.models.box_run import BOX
 from d2rpick.report import tables
 from d2rpick.report.keys import of_warnings
 from d2rpick.version import __version__
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.warnings import Caution
-    from d2rpick.models.rollover.record import Record
-    from d2rpick.models.rollover.scan import Outcome
+    from d2rpick.models.box_run import Record
+    from d2rpick.models.box_scan import Outcome
 
 SCHEMA = "d2rpick/rollover/1"
 # Of each run, in JSON and as columns: written down, for these names are promised.

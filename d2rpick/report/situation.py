@@ -1,10 +1,12 @@
-"""What suggest and verify have in common in their output: history, flight, oscillator, warnings."""
+"""What suggest and verify have in common in their output: history, flight, oscillator, health of the run."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from d2rpick.choice import health as limits
 from d2rpick.errors import listing, printable
+from d2rpick.flight.flight import MOST_WORK
 from d2rpick.report import keys
 from d2rpick.report.tables import measure
 from d2rpick.version import __version__
@@ -12,10 +14,12 @@ from d2rpick.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from d2rpick.choice.health import Health
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.warnings import Caution
     from d2rpick.histories.history import History
+
 
 # Parts that a line names of those that are switched or fly together; the JSON document has all.
 _NAMED = 5
@@ -164,3 +168,49 @@ def _modes(situation: Situation) -> list[dict[str, float]] | None:
         {"omega": one.omega, "alpha": one.alpha, "vibration_energy_td": float(one.vibration_energy(situation.td))}
         for one in modes
     ]
+
+
+def head(health: Health) -> tuple[str, ...]:
+    """Names of the columns of a table of health; the first says up to when the run was judged."""
+    return "health" if health.until is None else f"health up to {health.until:.6g}", "this run", "practice", "verdict"
+
+
+class Measure(NamedTuple):
+    """A measure for people: ``value`` None where the files lack it, and then ``good`` is None too."""
+
+    what: str
+    value: str | None
+    limit: str
+    good: bool | None
+
+
+def measures_of(health: Health) -> list[Measure]:
+    """All measures of a run, those of its window last."""
+    low, high = health.energy_ratio_min, health.energy_ratio_max
+    span = None if low is None or high is None else (low, high)
+    part = f"hourglass energy of {health.part.name if health.part else 'parts'}"
+    found = [
+        _share("hourglass energy", health.hourglass_share, limits.MOST_HOURGLASS),
+        _share(part, health.part_hourglass_share, limits.MOST_HOURGLASS),
+        Measure(
+            "energy ratio",
+            span and f"{span[0]:.4g} to {span[1]:.4g}",
+            f"within {limits.MOST_IMBALANCE:.0%} of 1",
+            span and max(1 - span[0], span[1] - 1) <= limits.MOST_IMBALANCE,
+        ),
+        _share("contact energy", health.sliding_share, limits.MOST_SLIDING),
+        _share("negative contact energy", health.negative_sliding_share, limits.MOST_NEGATIVE_SLIDING),
+        _share("energy of deleted elements", health.eroded_share, MOST_WORK),
+    ]
+    if health.window:
+        found += [
+            _share("change of contact energy in the window", health.window_sliding, MOST_WORK),
+            _share("work beyond gravity and damping there", health.window_work, MOST_WORK),
+            _share("energy deleted there", health.window_eroded, 0.0),
+        ]
+    return found
+
+
+def _share(what: str, share: float | None, most: float) -> Measure:
+    limit = f"at most {most:.0%}" if most else "none"
+    return Measure(what, None if share is None else f"{share:.2%}", limit, None if share is None else share <= most)

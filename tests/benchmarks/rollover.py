@@ -19,9 +19,9 @@ from time import perf_counter
 
 import numpy as np
 
-from d2rpick.models.rollover.as_history import suggestion_for
-from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.run import RigidWindow, simulate
+from d2rpick.models.box_model import Parameters
+from d2rpick.models.box_run import RigidWindow, simulate
+from d2rpick.models.box_scan import suggestion_for
 from tests.rehearsals import SETS, Rehearsal, rehearse
 
 WINDOW = RigidWindow(0.0970, 0.370)  # what suggest recommends for the default

@@ -13,7 +13,7 @@ from d2rpick.histories.balance import balance_of
 from d2rpick.histories.history import Balance, Precision
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import open_run
-from d2rpick.report.health import measures_of
+from d2rpick.report.situation import measures_of
 from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run
 from tests.computed import stored
 from tests.made_t01 import t01, value

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.run import RigidWindow, simulate
+from d2rpick.models.box_model import Parameters
+from d2rpick.models.box_run import RigidWindow, simulate
 from d2rpick.report import figures_models
 from tests.command import answer, codes, run
 from tests.json_schemas import check_by_schema

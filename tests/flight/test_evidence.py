@@ -20,9 +20,9 @@ from d2rpick.histories.digits import window_as_read
 from d2rpick.histories.history import Balance, Given, History, Momenta
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.models.rollover.files import WRITERS
-from d2rpick.models.rollover.model import Parameters
-from d2rpick.models.rollover.run import simulate
+from d2rpick.models.box_model import Parameters
+from d2rpick.models.box_run import simulate
+from d2rpick.models.files import BOX_WRITERS
 from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, run
 from tests.computed import columns, stored
 from tests.json_schemas import check_by_schema
@@ -58,9 +58,9 @@ def rolled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     assert record.released is not None
     assert record.landed is not None
     folder = tmp_path_factory.mktemp("rolled")
-    files = {name: folder / f"run.{name}" for name in (*WRITERS, "T01")}
+    files = {name: folder / f"run.{name}" for name in (*BOX_WRITERS, "T01")}
     for name, file in files.items():
-        file.write_bytes(t01(record) if name == "T01" else WRITERS[name](record))
+        file.write_bytes(t01(record) if name == "T01" else BOX_WRITERS[name](record))
     return Rolled(files, record.released, record.landed)
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from d2rpick.models import published, published_box, published_figures, saving
+from d2rpick.models.box_model import Parameters
 from d2rpick.models.published import MISPRINTS, table
-from d2rpick.models.rollover.model import Parameters
 from d2rpick.report.figures_models import draw_exhibit
 from d2rpick.vibration.integration import integrated
 from d2rpick.vibration.oscillator import Oscillator, State

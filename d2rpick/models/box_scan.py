@@ -1,4 +1,4 @@
-"""Many switched runs of one model: how roll and energy after td depend on tr."""
+"""Many switched runs of the box: how roll and energy after td depend on tr, and what the tool says of it."""
 
 from __future__ import annotations
 
@@ -7,17 +7,43 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.choice.settings import Settings
+from d2rpick.choice.suggest import suggest
 from d2rpick.errors import RangeError
-from d2rpick.models.rollover.motion import Motion
-from d2rpick.models.rollover.record import BOX
-from d2rpick.models.rollover.run import RigidWindow, proceed, run_to
+from d2rpick.histories.history import EXACT, Given, History, Momenta
+from d2rpick.histories.names import Part
+from d2rpick.models.box_motion import Motion
+from d2rpick.models.box_run import BOX, PARTS, RigidWindow, proceed, run_to
 from d2rpick.workers import answers, cores, on_cores
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.models.rollover.model import Parameters
-    from d2rpick.models.rollover.record import Record
+    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.models.box_model import Parameters
+    from d2rpick.models.box_run import Record
+
+
+def history_of(record: Record) -> History:
+    """Give the energy of the box, with the momenta of both parts."""
+    parts = tuple(Part(number, title) for number, title in enumerate(PARTS, start=1))
+    momentum = np.stack([record.momentum.real, 0 * record.momentum.real, record.momentum.imag], axis=2)
+    return History(
+        time=record.time,
+        energy=record.internal_energy[:, BOX],
+        source=("rollover",),
+        format="rollover",
+        channel="internal energy of box",
+        parts=parts[:1],
+        evidence=Given((Momenta(record.time, momentum, parts, EXACT, chosen=(BOX,)),)),
+        time_unit="s",
+    )
+
+
+def suggestion_for(record: Record, td: float) -> Suggestion:
+    """Let the tool choose tr for ``td`` [s], by nothing but the record."""
+    return suggest(history_of(record), td, Settings())
+
 
 # Between the times of a scan [s], while the load may last and then; and how long before td the last one is.  In the
 # flight the energy swings at 40 Hz, twice the lowest mode: six times in each swing show it as it is.
@@ -75,7 +101,7 @@ def scan(
     ready: dict[int, Record] = {}
     ordered = sorted(times)
     following = 0
-    with on_cores(jobs or cores(), "d2rpick.models.rollover.run") as farm:
+    with on_cores(jobs or cores(), "d2rpick.models.box_run") as farm:
         for answer in answers(farm, _switched, _branches(Motion(parameters, _interval(reference)), ordered, td, end)):
             if answer.error:
                 raise answer.error

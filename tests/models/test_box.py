@@ -8,14 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.errors import RangeError
-from d2rpick.models.rollover.bars import Bars, stiffest_rate
-from d2rpick.models.rollover.contact import SLIP, Contact
-from d2rpick.models.rollover.model import GRAVITY, Parameters, Truss, build
-from d2rpick.models.rollover.motion import Motion
-from d2rpick.models.rollover.record import BOX
-from d2rpick.models.rollover.rigid import RigidBody
-from d2rpick.models.rollover.run import RigidWindow, proceed, run_to, simulate
-from d2rpick.models.rollover.scan import compare, comparison_end, scan, scan_times
+from d2rpick.models.box_model import GRAVITY, Bars, Parameters, Truss, build, stiffest_rate
+from d2rpick.models.box_motion import SLIP, Contact, Motion, RigidBody
+from d2rpick.models.box_run import BOX, RigidWindow, proceed, run_to, simulate
+from d2rpick.models.box_scan import compare, comparison_end, scan, scan_times
 
 COARSE = Parameters(mesh=4, damping=1.0)
 INTERVAL = 5e-4

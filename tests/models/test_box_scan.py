@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.models.rollover.as_history import suggestion_for
+from d2rpick.models.box_scan import suggestion_for
 from tests.faults import thirds
 from tests.rehearsals import SETS, rehearse
 

@@ -1,22 +1,56 @@
-"""A run of the rollover box as a file: which columns each format has of it."""
+"""What is computed here as files: which columns each format has of the oscillator's motion and of a run of the box."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.histories.formats import csv_table, glstat, hdf5_file, matsum
-from d2rpick.models.rollover.record import PARTS
+from d2rpick.models.box_run import PARTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from d2rpick.histories.opening import Table
-    from d2rpick.models.rollover.record import Record
+    from d2rpick.models.box_run import Record
+    from d2rpick.vibration.oscillator import Oscillator
+    from d2rpick.vibration.replay import Trajectory
 
-_TITLE: Final = "rollover box"
+
+def oscillator_table(motion: Trajectory) -> Table:
+    """Columns time z y vz vy internal_energy kinetic_energy."""
+    state = motion.state
+    return {
+        "time": motion.time, "z": state.z, "y": state.y, "vz": state.vz, "vy": state.vy,
+        "internal_energy": motion.internal_energy, "kinetic_energy": motion.kinetic_energy,
+    }  # fmt: skip
 
 
-def table(record: Record) -> Table:
+def _oscillator_glstat(motion: Trajectory, _: Oscillator) -> bytes:
+    """Energies of the oscillator; its time step is the output interval."""
+    step = float(motion.time[1] - motion.time[0]) if motion.time.size > 1 else 0.0
+    internal, kinetic = motion.internal_energy, motion.kinetic_energy
+    return glstat.write(
+        "floating oscillator",
+        {
+            "time": motion.time, "time step": 0 * motion.time + step, "kinetic energy": kinetic,
+            "internal energy": internal, "total energy": kinetic + internal,
+        },
+    )  # fmt: skip
+
+
+def _oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
+    """Parts frame, suspended mass and spring with their energies and momenta."""
+    frame, suspended, state = oscillator.frame_mass, oscillator.mass, motion.state
+    zero = 0.0 * motion.time
+    parts = (
+        matsum.PartColumns("frame", zero, frame / 2 * state.vz**2, zero, frame * state.vz),
+        matsum.PartColumns("suspended mass", zero, suspended / 2 * state.vy**2, zero, suspended * state.vy),
+        matsum.PartColumns("spring", motion.internal_energy, zero, zero, zero),
+    )
+    return matsum.write("floating oscillator", motion.time, parts)
+
+
+def box_table(record: Record) -> Table:
     """Columns of the box, time to kinetic_energy; the momentum of box and step together; the balance of the model.
 
     Internal and kinetic energy are those of the box, so that it can be switched by them; those of the step, the terms
@@ -38,7 +72,7 @@ def table(record: Record) -> Table:
     }  # fmt: skip
 
 
-def as_glstat(record: Record) -> bytes:
+def _box_glstat(record: Record) -> bytes:
     """Energies of box and step together, what was exchanged with sled, curb and ground, and the mean velocity.
 
     The walls of the model are floor, curb and ground, see `Record`; the friction on them is energy of the contacts and
@@ -48,7 +82,7 @@ def as_glstat(record: Record) -> bytes:
     zero = 0 * record.time
     speed = record.momentum.sum(axis=1) / record.mass
     return glstat.write(
-        _TITLE,
+        "rollover box",
         {
             "time": record.time, "time step": zero + record.dt, "kinetic energy": kinetic, "internal energy": internal,
             "stonewall energy": record.wall_energy, "system damping energy": record.damping_energy,
@@ -60,18 +94,24 @@ def as_glstat(record: Record) -> bytes:
     )  # fmt: skip
 
 
-def as_matsum(record: Record) -> bytes:
+def _box_matsum(record: Record) -> bytes:
     """Parts box and step with their energies and momenta; while the box is rigid, those of its motion as one body."""
     columns = zip(
         PARTS, record.internal_energy.T, record.kinetic_energy.T, record.momentum.T.real, record.momentum.T.imag,
         strict=True,
     )  # fmt: skip
-    return matsum.write(_TITLE, record.time, tuple(matsum.PartColumns(*one) for one in columns))
+    return matsum.write("rollover box", record.time, tuple(matsum.PartColumns(*one) for one in columns))
 
 
-WRITERS: Final[Mapping[str, Callable[[Record], bytes]]] = {
-    "csv": lambda record: csv_table.write(table(record)),
-    "hdf5": lambda record: hdf5_file.write(table(record)),
-    "glstat": as_glstat,
-    "matsum": as_matsum,
+OSCILLATOR_WRITERS: Final[Mapping[str, Callable[[Trajectory, Oscillator], bytes]]] = {
+    "csv": lambda motion, _: csv_table.write(oscillator_table(motion)),
+    "hdf5": lambda motion, _: hdf5_file.write(oscillator_table(motion)),
+    "glstat": _oscillator_glstat,
+    "matsum": _oscillator_matsum,
+}
+BOX_WRITERS: Final[Mapping[str, Callable[[Record], bytes]]] = {
+    "csv": lambda record: csv_table.write(box_table(record)),
+    "hdf5": lambda record: hdf5_file.write(box_table(record)),
+    "glstat": _box_glstat,
+    "matsum": _box_matsum,
 }

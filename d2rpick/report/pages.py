@@ -1,0 +1,323 @@
+"""Answers as HTML pages to be read, printed and signed, one function for each; a page needs nothing but itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from d2rpick.choice.study_rows import runs_of
+from d2rpick.report import page, parts, plan, study, suggestion, trade_off, verdict
+from d2rpick.report.explorer import explorer
+from d2rpick.report.html import Markup, document, drawings, pairs, remarks, section, table, tag
+from d2rpick.report.keys import of_verdict
+from d2rpick.report.tables import known, measure, short
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from d2rpick.choice.comparison import Comparison
+    from d2rpick.choice.part_sets import Parts, PartSet
+    from d2rpick.choice.plan import Plan, Planned
+    from d2rpick.choice.study import Study
+    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.verify import Verdict
+    from d2rpick.histories.opening import Run
+    from d2rpick.histories.source import Source
+    from d2rpick.models.published import PublishedValue
+    from d2rpick.models.published_figures import Exhibit
+    from d2rpick.report.explorer import Explorer
+
+# More rows than one compares by eye; csv and json hold all.
+_MOST_ROWS = 20
+# What is said of the pair of ``suggest`` beside its times.
+_TOLD = ("quality", "keeps", "saves")
+_CHECKED = ("checked by", "date", "signature")
+
+
+def _draw_suggestion(answer: Suggestion) -> dict[str, str]:
+    """Draw the figure of ``suggestion_page``."""
+    from d2rpick.report.figures import svg_element
+    from d2rpick.report.figures_choice import draw_suggestion
+
+    shown = "the choice, and a better pair" if answer.clearly_better else "and the choice"
+    caption = f"Internal energy with its level at td, {shown}"
+    return {caption: svg_element(draw_suggestion(answer, page=True), "choice-")}
+
+
+def suggestion_page(answer: Suggestion, record: page.PageContext) -> str:
+    """Write the page of ``suggest``."""
+    return page.run_page(record.run, _of_suggestion(answer, record), record.explorer)
+
+
+def _of_suggestion(answer: Suggestion, record: page.PageContext) -> Iterator[Markup]:
+    yield _choice(answer)
+    yield from page.shown(_draw_suggestion(answer), record)
+    yield from _below_figures(answer, record)
+
+
+def _below_figures(answer: Suggestion, record: page.PageContext) -> Iterator[Markup]:
+    yield section("Candidates", *_candidates(answer))
+    yield page.parts(answer.chosen)
+    yield from page.evidence(answer.situation, answer.health, record)
+    if answer.recommended:
+        yield page.solver_input((answer.recommended.tr, answer.recommended.td), record)
+
+
+def _choice(answer: Suggestion) -> Markup:
+    """Give the section above the figures: the pairs, large, and what to know of them."""
+    cards, better = [_recommended(answer)], answer.clearly_better
+    if better:
+        told, times = tag("p", suggestion.better_about(answer, better)), (better.tr, better.td)
+        cards.append(page.pair("Better pair: another td", times, told, answer.situation.history, "card"))
+    return page.front(cards, remarks(answer.cautions), pairs(suggestion.outlook(answer)))
+
+
+def _recommended(answer: Suggestion) -> Markup:
+    pair, quality = answer.recommended, answer.quality
+    if pair is None or quality is None:
+        return page.refused("No tr can be recommended for this td.")
+    wrong = [("residual", measure(pair.residual))] if pair.residual is not None else []
+    told = pairs([*((name, text) for name, text in suggestion.verdict(answer) if name in _TOLD), *wrong])
+    title = suggestion.headline(answer).capitalize()
+    class_ = "card refused" if quality.grade == "poor" else "card chosen"
+    return page.pair(title, (pair.tr, pair.td), told, answer.situation.history, class_)
+
+
+def _candidates(answer: Suggestion) -> Iterator[Markup]:
+    if not answer.candidates:
+        yield tag("p", "None.")
+        return
+    shown = answer.candidates[:_MOST_ROWS]
+    marked = next((i for i, candidate in enumerate(shown) if candidate.recommended), None)
+    head = [name.replace("+-", "±") for name in suggestion.HEAD[1:]]
+    yield table("Candidates", *known(head, [row[1:] for row in suggestion.rows(answer, _MOST_ROWS)]), marked)
+    left = len(answer.candidates) - len(shown)
+    if left:
+        yield tag("p", f"{left} more in the csv and json results.", class_="soft")
+
+
+def _draw_verdict(answer: Verdict) -> dict[str, str]:
+    """Draw the figure of ``verdict_page``."""
+    from d2rpick.report.figures import svg_element
+    from d2rpick.report.figures_choice import draw_verdict
+
+    caption = "Internal energy with its level at td, and the pair"
+    return {caption: svg_element(draw_verdict(answer, page=True), "pair-")}
+
+
+def verdict_page(answer: Verdict, record: page.PageContext) -> str:
+    """Write the page of ``verify``."""
+    return page.run_page(record.run, _of_verdict(answer, record), record.explorer)
+
+
+def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
+    situation, candidate = answer.situation, answer.candidate
+    times = candidate.tr, situation.td
+    poor = answer.quality is not None and answer.quality.grade == "poor"
+    off = candidate.residual
+    left_over = "judged by its energy level alone" if off is None else f"residual {measure(off)}"
+    card = page.pair(
+        f"{answer.word.capitalize()}{', but of poor quality' * poor}",
+        times,
+        tag("p", left_over, "; ", page.rigid_for(times, situation.history)),
+        situation.history,
+        "card chosen" if answer.verified and not poor else "card refused",
+    )
+    yield page.front([card], remarks(answer.cautions, answer.reasons))
+    yield from page.shown(_draw_verdict(answer), record)
+    measures = ((name.replace("_", " "), short(one)) for name, one in of_verdict(answer).items() if one is not None)
+    yield section("Measures", pairs(measures))
+    yield page.parts(candidate)
+    if answer.switched:
+        yield _switched(answer.switched, record.switched.files if record.switched else ())
+    yield from page.evidence(situation, answer.health, record)
+    if answer.verified:
+        yield page.solver_input(times, record)
+
+
+def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
+    """Show what the finished switched run has of the reference."""
+    title = "The switched run"
+    listed = [("compared", f"from td to {found.end:.6g}"), *verdict.deviations(found), *page.digests(files)]
+    listed += [("note", note) for note in found.notes]
+    return section(title, table(title, ("quantity", *verdict.COMPARED[1:]), verdict.comparison(found)), pairs(listed))
+
+
+def _draw_trade_off(found: TradeOff) -> dict[str, str]:
+    """Draw the figures of ``trade_off_page``."""
+    from d2rpick.report.figures import svg_element
+    from d2rpick.report.figures_choice import draw_trade_off
+
+    curve = svg_element(draw_trade_off(found, page=True), "explore-")
+    return {**_draw_suggestion(found.suggestion), "Error and rigid time of the best pair for each td": curve}
+
+
+def trade_off_page(found: TradeOff, record: page.PageContext) -> str:
+    """Write the page of ``explore``."""
+    return page.run_page(record.run, _of_trade_off(found, record), record.explorer)
+
+
+def _of_trade_off(found: TradeOff, record: page.PageContext) -> Iterator[Markup]:
+    yield _choice(found.suggestion)
+    further = [one for one in found.cautions if one not in found.suggestion.cautions]
+    yield tag("section", tag("p", trade_off.answer(found)), remarks(further))
+    yield from page.shown(_draw_trade_off(found), record)
+    best = trade_off.some_of(found, _MOST_ROWS)
+    marked = next((i for i, one in enumerate(best) if one.recommended), None)
+    shown = table("Pairs", *known(trade_off.HEAD[1:], [row[1:] for row in trade_off.rows(best)]), marked)
+    left = tag("p", f"{len(found.offers) - len(best)} more td in the csv and json results.", class_="soft")
+    yield section("Pairs that nothing beats", shown, left)
+    yield from _below_figures(found.suggestion, record)
+
+
+def plan_page(found: Plan, run: Run, command: Sequence[str], card: str | None, explored: Explorer | None = None) -> str:
+    """Write the page of ``plan``.
+
+    Parameters
+    ----------
+    found : Plan
+    run : Run
+        What was read.
+    command : sequence of str
+        Arguments that repeat the answer.
+    card : str or None
+        Solver input for the next run, where it is known whom it switches.
+    explored : Explorer, optional
+        The flights of the plan.
+    """
+    return page.run_page(run, _of_plan(found, run, command, card, explored), explored)
+
+
+def _of_plan(
+    found: Plan, run: Run, command: Sequence[str], card: str | None, explored: Explorer | None
+) -> Iterator[Markup]:
+    from d2rpick.report.figures import svg_element
+    from d2rpick.report.figures_choice import draw_plan
+
+    cards = [_window(row, found) for row in found.supported]
+    cards = cards or [page.refused("No window of this run can be recommended.")]
+    yield page.front(cards, remarks(found.cautions), pairs(plan.outlook(found)))
+    if explored:
+        yield explorer(explored)
+    caption = "Internal energy with the flights, and below it the rigid windows with their numbers"
+    yield drawings({caption: svg_element(draw_plan(found, page=True), "plan-")})
+    reasons = pairs([(f"flight {row.number}", row.reason) for row in found.rows if row.reason])
+    yield section("Flights", table("Flights", plan.head(found)[1:], [row[1:] for row in plan.rows(found)]), reasons)
+    if card:
+        yield section("For the solver's input", tag("pre", card, tabindex="0"))
+    files = [*page.digests(run.files), *page.digests_of(found.settings)]
+    notes = [("note", note) for note in found.history.notes]
+    yield section("What was read", pairs([*page.named([plan.heading(found)]), *files, *notes]))
+    yield from page.method(command)
+
+
+def _window(row: Planned, found: Plan) -> Markup:
+    assert row.window is not None
+    assert row.quality is not None
+    saves = page.rigid_for(row.window, found.history)
+    told = pairs([("saves", saves), ("quality", row.quality.told), ("error", plan.error(row) or "-")])
+    return page.pair(f"Flight {row.number}", row.window, told, found.history, "card chosen")
+
+
+def study_page(answer: Study, command: Sequence[str]) -> str:
+    """Write the page of ``study``; ``command`` are the arguments that repeat it."""
+    title = f"Switch times of {runs_of(len(answer.rows))}"
+    return document(title, *_of_study(answer, command), signed=_CHECKED)
+
+
+def _of_study(answer: Study, command: Sequence[str]) -> Iterator[Markup]:
+    from d2rpick.report.figures import svg_element
+    from d2rpick.report.figures_study import draw_study
+
+    yield page.front([_common(answer)], remarks(answer.cautions), pairs(study.outcome(answer)))
+    caption = "Internal energies of all runs, with the tr of each, the common one and td"
+    yield drawings({caption: svg_element(draw_study(answer, page=True), "runs-")})
+    head = [name.replace("+-", "\u00b1") for name in study.HEAD]
+    yield section("Runs", table("Runs", *known(head, study.rows(answer))))
+    yield section("Files", tag("pre", _files(answer), class_="wrap"))
+    yield from page.method(command)
+
+
+def _common(answer: Study) -> Markup:
+    tr, title = answer.common.tr, tag("h2", "One tr for all runs")
+    if tr is None:
+        return tag("div", title, tag("p", "None: ", answer.common.reason or ""), class_="card")
+    times = (tag("span", tag("i", name), text) for name, text in (("tr", f"{tr:.6g}"), ("td", study.td_of(answer))))
+    exact = f"in full: tr = {tr!r}" + ("" if answer.td is None else f", td = {answer.td!r}")
+    rule = "Acceptable by the rules of d2rpick verify in every run that was judged."
+    lines = (tag("div", *times, class_="times"), tag("p", rule), tag("p", exact, class_="soft"))
+    return tag("div", title, *lines, class_="card chosen")
+
+
+def _files(answer: Study) -> str:
+    """Name what was read, with size and time, in the order of the runs."""
+    from datetime import UTC, datetime
+
+    files = dict.fromkeys(stamp for row in answer.rows for stamp in row.files)
+    return "\n".join(
+        f"{datetime.fromtimestamp(stamp.mtime_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC {stamp.size:>12} {stamp.name}"
+        for stamp in files
+    )
+
+
+def parts_page(found: Parts, command: Sequence[str]) -> str:
+    """Write the page of ``parts``; ``command`` are the arguments that repeat the answer."""
+    return document(f"Parts to switch: {page.title_of(found.run)}", *_of_parts(found, command), signed=page.SIGNED)
+
+
+def _of_parts(found: Parts, command: Sequence[str]) -> Iterator[Markup]:
+    yield page.front([_set(found.recommended)], remarks(found.cautions))
+    if found.sets:
+        marked = next((at for at, one in enumerate(found.sets) if one.recommended), None)
+        body = parts.columns(parts.SET_HEAD, parts.SETS, parts.set_rows(found))
+        yield section("Sets", table("Sets", parts.SETS, body, marked))
+    for caption, names in parts.TABLES.items():
+        yield section(caption, table(caption, names, parts.columns(parts.HEAD, names, parts.rows(found))))
+    yield section("What it means", pairs(parts.outlook(found)))
+    weights = [("weights", found.weights.source)] if found.weights else []
+    deck = page.deck_digests(found.inventory.files, found.weights) if found.inventory else []
+    read = [*page.named(parts.heading(found)), *weights, *page.digests(found.run.files), *deck]
+    yield section("What was read", pairs(read))
+    yield page.repeated(command)
+
+
+def _set(best: PartSet | None) -> Markup:
+    if best is None:
+        return page.refused("No set of parts can be recommended.")
+    saved = tag("span", tag("i", "saves about"), f"{best.saving:.0%}", tag("i", " of the run time"))
+    listed = tag("p", f"parts {parts.ranges(best.parts)}")
+    return tag("div", tag("h2", best.name), tag("div", saved, class_="times"), listed, class_="card chosen")
+
+
+def reproduction_page(rows: Sequence[PublishedValue], exhibits: Sequence[Exhibit], command: Sequence[str]) -> str:
+    """Write the page of ``reproduce``: every figure with what the paper shows and what is found, then the table."""
+    from d2rpick.models.published import MISPRINTS
+    from d2rpick.report import reproduction
+
+    published = table("Published and here", reproduction.HEAD, [reproduction.cells(row) for row in rows])
+    return document(
+        "Analysis of switched-rigid floating oscillator, reproduced",
+        tag("p", f"{reproduction.MODEL}. The box is a model of our own; the paper states none of its figures."),
+        *(_exhibited(one) for one in exhibits),
+        section("Published and here", published),
+        tag("ul", *(tag("li", text) for text in reproduction.pairs_of())),
+        section("Misprints in the paper", tag("ul", *(tag("li", misprint) for misprint in MISPRINTS))),
+        page.repeated(command),
+        signed=_CHECKED,
+    )
+
+
+def _exhibited(one: Exhibit) -> Markup:
+    from d2rpick.report import reproduction
+    from d2rpick.report.figures import svg_element
+    from d2rpick.report.figures_models import draw_exhibit
+
+    drawing = Markup(svg_element(draw_exhibit(one), f"{one.name}-"))
+    class_ = {True: "good", False: "bad", None: "soft"}[one.agrees]
+    return section(
+        reproduction.heading(one),
+        tag("figure", tag("div", drawing, role="img", aria_label=one.title)),
+        tag("p", tag("b", "Paper: "), one.paper),
+        tag("p", tag("b", "Here: "), one.found),
+        tag("p", "Agrees: ", tag("span", reproduction.verdict(one), class_=class_)),
+    )
