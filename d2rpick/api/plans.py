@@ -136,7 +136,7 @@ def plan(
     [(0.097, 0.37)]
     """
     from d2rpick.choice.plan import plan_of
-    from d2rpick.deck.printing.common import check_windows
+    from d2rpick.deck.printed_card import check_windows
 
     shortest = None if min_rigid is None else arguments.number("min_rigid", min_rigid, 0.0)
     pairs = [arguments.window(f"done[{number}]", list(pair)) for number, pair in enumerate(done)]

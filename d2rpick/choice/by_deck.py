@@ -17,10 +17,10 @@ from d2rpick.choice.deck_doubts import (
 from d2rpick.choice.part_sets import recommended_parts, with_cost_of
 from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.warnings import Caution
-from d2rpick.deck.inventory import read_inventory
-from d2rpick.deck.inventory.model import DISCRETE
-from d2rpick.deck.inventory.placement import Placement
-from d2rpick.deck.radioss.flaws import RUINS
+from d2rpick.deck import read_inventory
+from d2rpick.deck.geometry import Placement
+from d2rpick.deck.model import DISCRETE
+from d2rpick.deck.radioss_run import RUINS
 from d2rpick.errors import FormatError
 from d2rpick.flight.flying_parts import asks_for_recommended
 

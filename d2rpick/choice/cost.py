@@ -23,7 +23,7 @@ from d2rpick.errors import ConfigurationError, are, name_units
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
 
-    from d2rpick.deck.inventory.model import Inventory
+    from d2rpick.deck.model import Inventory
     from d2rpick.deck.source import SourceFile
     from d2rpick.histories.source import Source
 

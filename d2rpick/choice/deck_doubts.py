@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.warnings import Caution
-from d2rpick.deck.inventory.pieces import pieces_of
-from d2rpick.deck.radioss.flaws import LEFT_RIGID
+from d2rpick.deck.pieces import pieces_of
+from d2rpick.deck.radioss_run import LEFT_RIGID
 from d2rpick.errors import FormatError, are, name_units
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from d2rpick.choice.cost import CostModel
-    from d2rpick.deck.inventory.model import Inventory
+    from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
 

@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.of_run import Reference, judge_of, verify_of
+from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
-from d2rpick.deck.printing.common import Printing
 from d2rpick.errors import D2RPickError
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.verify import Verdict
-    from d2rpick.deck.printing.common import PrintedCard, Times
+    from d2rpick.deck.printed_card import PrintedCard, Times
     from d2rpick.histories.history import History
     from d2rpick.histories.run import Run
 
@@ -81,7 +81,7 @@ def judged_card(
     None where nobody says whom the card switches: the chosen parts, or main nodes for a solver that asks for these.
     """
     solver, printing = request.of(history)
-    if not getattr(printing, SOLVERS[solver].SWITCHES):
+    if not getattr(printing, SOLVERS[solver].switches):
         return None
     every = sorted((*done, *windows))
     plain = cards(every, printing, solver)

@@ -11,10 +11,9 @@ import numpy as np
 from d2rpick.choice.calibrate import Observation
 from d2rpick.choice.cost import POINT
 from d2rpick.choice.warnings import Caution
-from d2rpick.deck import find_windows, read_deck, read_parts, read_switching
+from d2rpick.deck import find_windows, ls_dyna, radioss, read_deck, read_parts, read_switching
 from d2rpick.deck.folder import main_decks
-from d2rpick.deck.inventory import ls_dyna, radioss
-from d2rpick.deck.radioss import find_run_windows, read_run, run_files
+from d2rpick.deck.radioss_run import find_run_windows, read_run, run_files
 from d2rpick.errors import DeckError, FormatError
 from d2rpick.histories.listings import is_glstat, read_timing, read_zone_times
 
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck import Deck
-    from d2rpick.deck.inventory.model import Inventory
+    from d2rpick.deck.model import Inventory
     from d2rpick.histories.listings import Timing, ZoneTimes
 
 _US: Final = 1e6

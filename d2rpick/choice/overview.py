@@ -134,7 +134,7 @@ def _in_deck(run: Run, deck: str) -> tuple[Run, tuple[Caution, ...]]:
     """Let a deck tell what acts on a run; DeckError where it cannot be read."""
     from d2rpick.choice.deck_doubts import doubts_of_solver, of_another_model  # not above: few name a deck
     from d2rpick.choice.surroundings import in_deck
-    from d2rpick.deck.inventory import read_inventory
+    from d2rpick.deck import read_inventory
 
     inventory = read_inventory(deck)
     foreign = of_another_model(run, inventory)

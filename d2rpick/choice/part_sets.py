@@ -25,7 +25,7 @@ from d2rpick.choice.part_verdicts import rows_of
 from d2rpick.choice.rigid_bodies import bodies_of
 from d2rpick.choice.surroundings import in_deck
 from d2rpick.choice.warnings import Caution, out_of_place
-from d2rpick.deck.inventory.placement import Placement
+from d2rpick.deck.geometry import Placement
 from d2rpick.errors import FormatError, RangeError, are, name_units
 from d2rpick.flight.flying_parts import asks_for_recommended, with_parts_by_number
 from d2rpick.histories.listings import printed_steps
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.switched_run import Times
-    from d2rpick.deck.inventory.model import Inventory
+    from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from d2rpick.deck.inventory.size import masses_and_steps
+from d2rpick.deck.geometry import masses_and_steps
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
-    from d2rpick.deck.inventory.model import Inventory
+    from d2rpick.deck.model import Inventory
 
 
 @dataclass(frozen=True)

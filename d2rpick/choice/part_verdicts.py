@@ -6,8 +6,8 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck.inventory.model import DISCRETE
-from d2rpick.deck.inventory.pieces import pieces_of
+from d2rpick.deck.model import DISCRETE
+from d2rpick.deck.pieces import pieces_of
 from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.cost import CostModel
     from d2rpick.choice.part_facts import InFlight, PartFacts, RunFacts
     from d2rpick.choice.part_steps import Steps
-    from d2rpick.deck.inventory.model import Inventory, PartData
+    from d2rpick.deck.model import Inventory, PartData
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
 # A part drives the landing alone where it takes nearly all of its energy at first, and is so small a part of the cost

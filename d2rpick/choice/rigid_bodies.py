@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.deck.inventory.pieces import pieces_of
+from d2rpick.deck.pieces import pieces_of
 from d2rpick.flight.bodies import RigidBody
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from d2rpick.deck.inventory.model import Inventory
+    from d2rpick.deck.model import Inventory
 
 
 def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, ...]:

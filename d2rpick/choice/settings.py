@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from d2rpick.choice.cost import ByDeck
-    from d2rpick.deck.inventory.placement import Placement
+    from d2rpick.deck.geometry import Placement
     from d2rpick.flight.bodies import RigidBody
     from d2rpick.vibration.one_mode import Mode
 

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.choice.deck_doubts import of_another_model
-from d2rpick.deck.inventory.supports import supports_of
+from d2rpick.deck.pieces import supports_of
 from d2rpick.histories.surroundings import Support, Surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.inventory.boundary import Gravity, Hold
-    from d2rpick.deck.inventory.model import Inventory
+    from d2rpick.deck.model import Gravity, Hold, Inventory
     from d2rpick.histories.run import Run
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.settings import Settings
-    from d2rpick.deck.printing.common import PrintedCard, Printing, Times
+    from d2rpick.deck.printed_card import PrintedCard, Printing, Times
     from d2rpick.histories.opening import Run
 
 EXAMPLES = """\b
@@ -83,7 +83,7 @@ def _windows(options: dict[str, Any]) -> Sequence[Times]:
     if options["windows"] is not None:
         if tr or td:
             raise click.UsageError("--windows excludes --tr and --td")
-        from d2rpick.deck.printing.common import read_windows
+        from d2rpick.deck.printed_card import read_windows
 
         with click.open_file(options["windows"], encoding="utf-8", errors="replace") as stream:
             return read_windows(stream.read(), options["windows"])
@@ -104,12 +104,12 @@ def _alone(options: dict[str, Any], solver: str) -> Printing:
 
     check_solver(options, solver)
     module = SOLVERS[solver]
-    if not options[module.SWITCHES]:
+    if not options[module.switches]:
         raise click.UsageError(needed(module))
-    if options["part"] and module.SWITCHES != "part":
-        raise click.UsageError(_ONLY_JUDGED.format(module.TITLE))
-    if "end" in module.TAKES and options["end"] is None:
-        raise click.UsageError(f"a card for {module.TITLE} needs --end, the end of the run, or a --history")
+    if options["part"] and module.switches != "part":
+        raise click.UsageError(_ONLY_JUDGED.format(module.title))
+    if "end" in module.takes and options["end"] is None:
+        raise click.UsageError(f"a card for {module.title} needs --end, the end of the run, or a --history")
     return printing(options, numbers("--part", options["part"]))
 
 
@@ -125,8 +125,8 @@ def _judged(
     history = energy_of(run, options, prints=True)
     request = card_request(run, options, history)
     module = SOLVERS[request.of(history)[0]]
-    if request.printing.part and module.SWITCHES != "part":
-        raise click.UsageError(_ONLY_JUDGED.format(module.TITLE))
+    if request.printing.part and module.switches != "part":
+        raise click.UsageError(_ONLY_JUDGED.format(module.title))
     judge = partial(verify_of, Reference(run, history), settings=settings)
     found = judged_card(windows, history, judge, request)
     if found is None:

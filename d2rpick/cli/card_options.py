@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.judged_card import CardRequest
     from d2rpick.choice.verify import Verdict
     from d2rpick.choice.warnings import Caution
-    from d2rpick.deck.printing.common import Printing
-    from d2rpick.deck.printing.common import Solver as Module
+    from d2rpick.deck.printed_card import Printing
+    from d2rpick.deck.printed_card import Solver as Module
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
 
@@ -89,7 +89,7 @@ def card_options(function: shared.Decorated) -> shared.Decorated:
 
 def printing(options: dict[str, Any], parts: Sequence[int] = ()) -> Printing:
     """Collect what a card says besides its times and its solver."""
-    from d2rpick.deck.printing.common import Printing
+    from d2rpick.deck.printed_card import Printing
 
     given = {name: options[name] for name in _given(options)}
     if "node" in given:
@@ -101,11 +101,11 @@ def check_solver(options: dict[str, Any], solver: str) -> None:
     """Raise UsageError where an option says what the input of ``solver`` has no place for."""
     from d2rpick.deck.printing import SOLVERS as MODULES
 
-    takes = {MODULES[solver].SWITCHES, *MODULES[solver].TAKES}
+    takes = {MODULES[solver].switches, *MODULES[solver].takes}
     for name in _given(options):
         if name not in takes:
-            owner = next(one for one, module in MODULES.items() if name in {module.SWITCHES, *module.TAKES})
-            hint = "" if options["solver"] else f"; without --solver the card is one for {MODULES[solver].TITLE}"
+            owner = next(one for one, module in MODULES.items() if name in {module.switches, *module.takes})
+            hint = "" if options["solver"] else f"; without --solver the card is one for {MODULES[solver].title}"
             raise click.UsageError(f"--{name.replace('_', '-')} is an option of --solver {owner}{hint}")
 
 
@@ -120,7 +120,7 @@ def need_ids(request: CardRequest, history: History) -> str:
 def needed(solver: Module) -> str:
     """Say which option names whom the card of ``solver`` switches."""
     what = {"part": "the parts to switch", "node": "the main nodes of the rigid bodies"}
-    return f"a card for {solver.TITLE} needs --{solver.SWITCHES}, {what[solver.SWITCHES]}"
+    return f"a card for {solver.title} needs --{solver.switches}, {what[solver.switches]}"
 
 
 def prints_card(options: dict[str, Any], output_format: str) -> bool:

@@ -141,7 +141,7 @@ def _main_decks(named: Sequence[str]) -> tuple[list[str], list[Unreadable]]:
 
 def _apart(names: Sequence[str]) -> Iterator[str]:
     """Each deck once: by one of its spellings, and a Radioss run by the first of its files."""
-    from d2rpick.deck.radioss import run_files
+    from d2rpick.deck.radioss_run import run_files
 
     seen: set[str] = set()
     for name in names:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.verify import Verdict
-    from d2rpick.deck.printing.common import PrintedCard
+    from d2rpick.deck.printed_card import PrintedCard
 
 EXAMPLES = """\b
 Examples:
@@ -122,7 +122,7 @@ def _check_usage(form: str, options: dict[str, Any], *, every: bool, done: str |
 
 def _windows(file: str) -> tuple[Times, ...]:
     """Read the windows of a file, which must follow each other."""
-    from d2rpick.deck.printing.common import check_windows, read_windows
+    from d2rpick.deck.printed_card import check_windows, read_windows
 
     with click.open_file(file, encoding="utf-8", errors="replace") as stream:
         return check_windows(read_windows(stream.read(), file))

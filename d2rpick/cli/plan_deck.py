@@ -13,7 +13,7 @@ from d2rpick.errors import DeckError, printable
 if TYPE_CHECKING:
     from d2rpick.choice.cost import CostModel
     from d2rpick.choice.plan import Plan
-    from d2rpick.deck.printing.common import PrintedCard
+    from d2rpick.deck.printed_card import PrintedCard
     from d2rpick.histories.opening import Run
 
 
@@ -45,11 +45,11 @@ def for_deck(options: dict[str, Any]) -> dict[str, Any]:
     """Let a card take the solver and the name of the run from the deck, unless they are given."""
     if options["deck"] is None:
         return options
-    from d2rpick.deck import radioss
+    from d2rpick.deck.radioss_run import read_run, run_files
 
-    if not radioss.run_files(options["deck"]):
+    if not run_files(options["deck"]):
         return {**options, "solver": options["solver"] or "ls-dyna"}
-    legs = radioss.read_run(options["deck"]).legs
+    legs = read_run(options["deck"]).legs
     name = options["name"] or (legs[0].name if legs else None)
     return {**options, "solver": options["solver"] or "radioss", "name": name}
 

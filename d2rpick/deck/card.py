@@ -1,17 +1,279 @@
-"""Cards: a keyword with its data lines, and what their fields say."""
+"""Cards: a keyword with its data lines, and what their fields say; each field with file, line and column.
+
+A field may refer to parameters: who defined them where, which definition counts, and what a reference is worth.
+"""
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
-from d2rpick.deck.expression import ExpressionError, names_in
-from d2rpick.deck.rows import STANDARD, Field, Row, Value
+from d2rpick.deck.expression import ExpressionError, Number, evaluate, names_in, number
 
 if TYPE_CHECKING:
-    from d2rpick.deck.parameters import Scope
+    from collections.abc import Iterator, Sequence
+
     from d2rpick.deck.source import Block
+
+
+STANDARD, LONG = 10, 20  # columns of a field
+
+T = TypeVar("T", int, float, str)
+
+
+class Field(NamedTuple):
+    """The text of one field, without the blanks around it, and where it stands (counted from 1)."""
+
+    text: str
+    block: Block
+    distance: int  # lines below the keyword
+    column: int
+
+    @property
+    def file(self) -> str:
+        """Name of the file."""
+        return self.block.source.name
+
+    @property
+    def line(self) -> int:
+        """Number of the line in its file; counted when it is asked for."""
+        return self.block.line + self.distance
+
+
+Problem = tuple[Field, str]
+"""A field that says nothing usable, and why."""
+
+
+class Value(NamedTuple, Generic[T]):
+    """What a field says: ``problem`` is empty, or tells why ``value`` is only the default."""
+
+    value: T
+    field: Field
+    problem: str = ""
+    parameters: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One data line of a card."""
+
+    block: Block
+    distance: int
+    text: str
+    width: int
+
+    @property
+    def blank(self) -> bool:
+        """Whether nothing stands on the line."""
+        return not self.text.strip()
+
+    def field(self, position: int) -> Field:
+        """Field ``position`` from 0, between commas or in fixed columns; empty beyond the end of the line."""
+        start, text = self._pieces[position] if position < len(self._pieces) else (len(self.text), "")
+        found = text.strip()
+        indent = text.index(found[0]) if found else 0
+        return Field(found, self.block, self.distance, start + indent + 1)
+
+    @cached_property
+    def _pieces(self) -> list[tuple[int, str]]:
+        if "," in self.text:
+            return list(_between_commas(self.text))
+        return [(start, self.text[start : start + self.width]) for start in range(0, len(self.text), self.width)]
+
+
+def _between_commas(text: str) -> Iterator[tuple[int, str]]:
+    start, depth = 0, 0
+    for position, letter in enumerate(text):
+        if letter in "<>":
+            depth = int(letter == "<")  # a comma inside <max(1,2)> belongs to the expression
+        elif letter == "," and not depth:
+            yield start, text[start:position]
+            start = position + 1
+    yield start, text[start:]
+
+
+_LISTED = re.compile(r"\s*[RIC]\s*&?\s*\w+\s*", re.ASCII | re.IGNORECASE)
+_REFERENCE = re.compile(r"&\s*([a-z_]\w*)", re.ASCII | re.IGNORECASE)
+_PAIRS = 4  # name and value, repeated in a line of *PARAMETER
+
+
+@dataclass(frozen=True)
+class Definition:
+    """One line that gives a parameter a value; ``problem`` says why it has none, ``order`` counts all of a deck."""
+
+    name: str
+    value: Number | str
+    place: Field
+    order: int
+    replaceable: bool = False
+    uses: tuple[str, ...] = ()
+    problem: str = ""
+
+
+_Table = dict[str, list[Definition]]
+
+
+@dataclass(eq=False)
+class _Whole:
+    """What all files of a deck share."""
+
+    definitions: _Table = field(default_factory=dict)
+    latest_wins: bool = False
+    count: int = 0
+
+
+class Scope:
+    """Parameters visible in one file: its own local ones first, then those of the files that include it.
+
+    The parameters that are not local come last.
+
+    Of several definitions the first counts (Vol I R17 as quoted by a converter: DFLAG 1 warns and keeps the
+    first), unless ``*PARAMETER_DUPLICATION`` or ``_MUTABLE`` let the later one win.
+    """
+
+    def __init__(self, outer: Scope | None = None) -> None:
+        self._outer = outer
+        self._local: _Table = {}
+        self._whole: _Whole = outer._whole if outer else _Whole()
+        self._known: float = math.inf  # how many definitions of the deck were read before
+
+    def as_of_now(self) -> Scope:
+        """Return the same scope as a card sees it that stands here: later definitions do not count for its values."""
+        seen = Scope(self._outer)
+        seen._local, seen._whole, seen._known = self._local, self._whole, self._whole.count
+        return seen
+
+    def definitions(self, name: str) -> tuple[Definition, ...]:
+        """All definitions of ``name`` (lower case), later ones too, in the innermost scope that has one by now."""
+        found = [table[name] for table in self._tables() if name in table]
+        return tuple(next((each for each in found if each[0].order < self._known), found[0] if found else ()))
+
+    def definition(self, name: str) -> Definition | None:
+        """Return the definition that counts."""
+        found = [definition for definition in self.definitions(name) if definition.order < self._known]
+        if not found:
+            return None
+        return found[-1] if self._whole.latest_wins or found[-1].replaceable else found[0]
+
+    def closure(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Return ``names`` and all parameters their definitions refer to, directly or not."""
+        seen: dict[str, None] = {}
+        waiting = list(names)
+        while waiting:
+            name = waiting.pop(0)
+            if name not in seen:
+                seen[name] = None
+                waiting.extend(use for definition in self.definitions(name) for use in definition.uses)
+        return tuple(seen)
+
+    def value(self, text: str) -> Number:
+        """Value of a field: a number, a reference, or an expression; ExpressionError if it is none."""
+        text = text.strip()
+        if text.startswith("<") and text.endswith(">"):
+            return evaluate(text[1:-1], self._number)
+        if "&" in text:
+            return evaluate(text, self._number)
+        return number(text)
+
+    def text(self, text: str) -> str:
+        """Return the text of a field, where ``&name`` of a character parameter stands for its text."""
+
+        def value(reference: re.Match[str]) -> str:
+            found = self.definition(reference[1].lower())
+            return found.value if found and isinstance(found.value, str) else reference[0]
+
+        return _REFERENCE.sub(value, text)
+
+    def define(self, keyword: str, rows: Sequence[Row]) -> None:
+        """Take over the definitions of a ``*PARAMETER`` card."""
+        options = set(keyword.split("_")[1:])
+        if "DUPLICATION" in options:
+            flags = [row.field(0).text for row in rows[:1]]
+            self._whole.latest_wins = flags[:1] in (["2"], ["4"])
+            return
+        target = self._local if "LOCAL" in options else self._whole.definitions
+        for row, name, text in _pairs(rows, options):
+            definition = self._definition(row, name, text, "MUTABLE" in options)
+            if definition is not None:
+                target.setdefault(definition.name, []).append(definition)
+                self._whole.count += 1
+
+    def _tables(self) -> Iterator[_Table]:
+        yield self._local
+        yield from self._outer._tables() if self._outer else (self._whole.definitions,)
+
+    def _definition(self, row: Row, named: str, text: str, replaceable: bool) -> Definition | None:
+        kind, name = named[:1].upper(), named[1:].strip().lstrip("&").strip().lower()
+        if kind not in {"R", "I", "C"} or not name:
+            return None
+        value: Number | str
+        problem = ""
+        uses = names_in(text)
+        if kind == "C":
+            value = text.strip().strip('"')
+        else:
+            try:
+                value = evaluate(text, self._number) if uses or not _is_number(text) else number(text)
+                value = int(value) if kind == "I" else float(value)
+            except ExpressionError as error:
+                value, problem = 0, str(error)
+        return Definition(name, value, row.field(0), self._whole.count, replaceable, uses, problem)
+
+    def _number(self, name: str) -> Number:
+        definition = self.definition(name)
+        if definition is None:
+            if later := self.definitions(name):
+                place = later[0].place
+                raise ExpressionError(f"parameter &{name} is defined only below, at {place.file}:{place.line}")
+            raise ExpressionError(f"parameter &{name} is not defined")
+        if definition.problem:
+            place = definition.place
+            raise ExpressionError(f"parameter &{name} has no value ({place.file}:{place.line}: {definition.problem})")
+        if isinstance(definition.value, str):
+            raise ExpressionError(f"parameter &{name} is a text, a number was expected")
+        return definition.value
+
+
+def _is_number(text: str) -> bool:
+    try:
+        number(text)
+    except ExpressionError:
+        return False
+    return True
+
+
+def _pairs(rows: Sequence[Row], options: set[str]) -> Iterator[tuple[Row, str, str]]:
+    """Name (with its type letter) and value text of every definition on the card."""
+    if "EXPRESSION" in options:
+        yield from _expressions(rows)
+        return
+    for row in rows:
+        for pair in range(1 if "TYPE" in options else _PAIRS):
+            name = row.field(2 * pair).text
+            if name:
+                yield row, name, row.field(2 * pair + 1).text
+
+
+def _expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:
+    """One definition per line; a line whose name field is blank goes on with the expression before."""
+    pending: tuple[Row, str, str] | None = None
+    for row in rows:
+        before, comma, after = row.text.partition(",")
+        if comma and _LISTED.fullmatch(before):
+            name, text = before.strip(), after
+        else:
+            name, text = row.text[: row.width].strip(), row.text[row.width :]
+        if name or pending is None:
+            if pending is not None:
+                yield pending
+            pending = (row, name, text)
+        else:
+            pending = (pending[0], pending[1], pending[2] + text)
+    if pending is not None:
+        yield pending
 
 
 @dataclass(frozen=True)

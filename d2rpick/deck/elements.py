@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck.rows import LONG
+from d2rpick.deck.card import LONG
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping

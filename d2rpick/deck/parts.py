@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck.rows import Value
+from d2rpick.deck.card import Value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.deck.card import Card
+    from d2rpick.deck.card import Card, Problem, Row
     from d2rpick.deck.reader import Deck
-    from d2rpick.deck.rows import Problem, Row
 
 _EXTRA_LINES: Final = {"CONTACT": 1, "REPOSITION": 1, "PRINT": 1, "FIELD": 1, "INERTIA": 3}
 _WITHOUT_LINES: Final = {"AVERAGED", "TITLE"}

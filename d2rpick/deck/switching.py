@@ -12,15 +12,14 @@ from difflib import get_close_matches
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal
 
+from d2rpick.deck.card import Value
 from d2rpick.deck.reader import SWITCHING
-from d2rpick.deck.rows import Value
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.deck.card import Card
+    from d2rpick.deck.card import Card, Field, Row
     from d2rpick.deck.reader import Deck
-    from d2rpick.deck.rows import Field, Row
 
 Kind = Literal["automatic", "plain", "inertia", "restart"]
 

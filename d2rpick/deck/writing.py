@@ -6,13 +6,11 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from d2rpick.deck import radioss
-from d2rpick.deck.cut import cure, cuts
 from d2rpick.deck.parts import read_parts
-from d2rpick.deck.printing.radioss import listed, off
-from d2rpick.deck.radioss.blocks import blocks, keyword
-from d2rpick.deck.radioss.engine import kept_off, read_legs
-from d2rpick.deck.reader import read_deck
+from d2rpick.deck.printing import listed, off
+from d2rpick.deck.radioss_engine import blocks, kept_off, keyword, read_legs
+from d2rpick.deck.radioss_run import read_run, run_files
+from d2rpick.deck.reader import cure, cuts, read_deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import read_switching
 from d2rpick.deck.windows import find_windows
@@ -22,8 +20,8 @@ from d2rpick.file_state import write_whole
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.deck.printing.common import PrintedCard
-    from d2rpick.deck.radioss.engine import Leg
+    from d2rpick.deck.printed_card import PrintedCard
+    from d2rpick.deck.radioss_engine import Leg
     from d2rpick.deck.reader import Deck
     from d2rpick.deck.source import Block
 
@@ -60,7 +58,7 @@ def write_deck(main: str, card: PrintedCard, folder: str, *, overwrite: bool = F
         from ``folder``, or has a main file that seems to be cut; if a file exists; if the card is one for another
         solver.
     """
-    files = dict(_radioss(main, card) if radioss.run_files(main) else _ls_dyna(main, card))
+    files = dict(_radioss(main, card) if run_files(main) else _ls_dyna(main, card))
     place = Path(folder)
     try:
         place.mkdir(parents=True, exist_ok=True)
@@ -140,7 +138,7 @@ def _copies(files: Sequence[SourceFile], main: str, taken: set[str]) -> Iterator
 
 
 def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
-    run = radioss.read_run(main)
+    run = read_run(main)
     printed = [leg for text in card.files.values() for leg in read_legs(SourceFile("the card", text.encode()))]
     if not printed:
         raise DeckError(f"{main}: a Radioss run, but the cards are for another solver")

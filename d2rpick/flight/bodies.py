@@ -15,7 +15,7 @@ from d2rpick.flight.position_error import Drift, apart_in_flight, drift_in_fligh
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.deck.inventory.placement import Placement
+    from d2rpick.deck.geometry import Placement
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part

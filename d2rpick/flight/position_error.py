@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.deck.inventory.placement import Placement
+    from d2rpick.deck.geometry import Placement
     from d2rpick.flight.flight import Flight
     from d2rpick.flight.turning import Turning
     from d2rpick.histories.history import History, Momenta, Samples

@@ -25,7 +25,7 @@ from d2rpick.histories.samples import integral, window
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from d2rpick.deck.inventory.placement import Placement
+    from d2rpick.deck.geometry import Placement
     from d2rpick.histories.history import Momenta, Samples
 
 # Parts of the body may be this far from the places that one rotation of the deck gives them, as a share of the size

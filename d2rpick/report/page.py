@@ -160,7 +160,7 @@ def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
         return section(title, tag("pre", card.text, tabindex="0"))
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
     command += [] if card.solver == DEFAULT else ["--solver", card.solver]
-    switches = f"--{SOLVERS[card.solver].SWITCHES}"
+    switches = f"--{SOLVERS[card.solver].switches}"
     line = tag("pre", shell_line([*command, switches, "IDS", *record.judging]), class_="wrap")
     return section(title, tag("p", "Printed, and judged again as printed, by"), line)
 

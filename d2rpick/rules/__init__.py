@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck import radioss, read_deck
+from d2rpick.deck import radioss_run, read_deck
 from d2rpick.errors import ConfigurationError
 from d2rpick.rules import (
     bodies,
@@ -152,8 +152,8 @@ def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
 
 def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
     """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck."""
-    if radioss.recognises(content) if content is not None else radioss.run_files(path):
-        return RunCase.of(radioss.read_run(path, content), judge)
+    if radioss_run.recognises(content) if content is not None else radioss_run.run_files(path):
+        return RunCase.of(radioss_run.read_run(path, content), judge)
     return Case(read_deck(path, content), judge)
 
 

@@ -13,9 +13,8 @@ from d2rpick.deck.sections import NOT_TURNED, solid_formulations
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.includes import Unread
-    from d2rpick.deck.rows import Field, Value
+    from d2rpick.deck.card import Card, Field, Value
+    from d2rpick.deck.reader import Unread
 
 
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"

@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck.radioss.flaws import AT_REST, NOT_FOLLOWED, THROUGH_WALL
-from d2rpick.deck.radioss.left_rigid import left_rigid
+from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, left_rigid
 from d2rpick.rules.base import RADIOSS, Rule, Severity
 from d2rpick.rules.example_runs import GOOD_RUN, WINDOW, engine_files, run_of, starter_deck
 from d2rpick.rules.run_case import RunCase

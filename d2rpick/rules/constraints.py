@@ -14,8 +14,8 @@ from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, aut
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from d2rpick.deck.card import Field
     from d2rpick.deck.constraints import Constraint
-    from d2rpick.deck.rows import Field
     from d2rpick.deck.switching import Header
     from d2rpick.rules.base import Case, Objection
 

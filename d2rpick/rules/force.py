@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck.contacts import read_contacts, read_rigid_walls
+from d2rpick.deck.constraints import read_contacts, read_rigid_walls
 from d2rpick.errors import listing
 from d2rpick.rules.base import Example, Rule, Severity
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
@@ -13,7 +13,7 @@ from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, aut
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.contacts import Entities, Entity
+    from d2rpick.deck.constraints import Entities, Entity
     from d2rpick.deck.switching import Header
 from d2rpick.rules.base import Case, Objection
 

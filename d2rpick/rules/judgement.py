@@ -13,7 +13,7 @@ from d2rpick.choice.of_run import Reference, verify_of
 from d2rpick.choice.suggest import find_better_pair, suggest_at
 from d2rpick.choice.surroundings import in_deck
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, Caution, end_of_flight, end_of_load
-from d2rpick.deck.inventory import read_inventory
+from d2rpick.deck import read_inventory
 from d2rpick.errors import DeckError, FormatError, name_units
 from d2rpick.histories.digits import above, first_as_read, in_the_record
 from d2rpick.histories.surroundings import UNKNOWN

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.deck.cut import cure, cuts
-from d2rpick.deck.includes import UNKNOWN_KIND
-from d2rpick.deck.rows import Field
+from d2rpick.deck.card import Field
+from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
 from d2rpick.deck.switching import misspelt
 from d2rpick.rules.base import BOTH, Example, Rule, Severity
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
@@ -14,8 +13,7 @@ from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, aut
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.rows import Problem
+    from d2rpick.deck.card import Card, Problem
     from d2rpick.rules.base import Case, Objection
 
 

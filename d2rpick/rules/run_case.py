@@ -7,18 +7,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from d2rpick.deck import Parts
-from d2rpick.deck.radioss import find_run_windows
+from d2rpick.deck.radioss_run import find_run_windows
 from d2rpick.rules.base import RADIOSS, Case
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from d2rpick.deck import SwitchSet, Window, Windows
-    from d2rpick.deck.includes import Unread
-    from d2rpick.deck.radioss import RunWindows
-    from d2rpick.deck.radioss.files import Run
-    from d2rpick.deck.radioss.flaws import Flaw
-    from d2rpick.deck.rows import Field, Value
+    from d2rpick.deck.card import Field, Value
+    from d2rpick.deck.radioss_run import Flaw, Run, RunWindows
+    from d2rpick.deck.reader import Unread
     from d2rpick.rules.base import Judge
 
 
@@ -105,7 +103,7 @@ class RunCase(Case):
             return ()
         if not (starter.walls or starter.velocities or any(leg.starts for leg in legs)):
             return ()
-        from d2rpick.deck.inventory.body_flaws import flaws_of  # loads numpy
+        from d2rpick.deck.radioss_flaws import flaws_of  # loads numpy
 
         return flaws_of(self.run, self.named)
 

@@ -13,7 +13,7 @@ from d2rpick.rules.run_case import RunCase
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.radioss.engine import Leg
+    from d2rpick.deck.radioss_engine import Leg
     from d2rpick.rules.base import Case, Objection
 
 _MOST_CAP = 0.01  # of the rigid window: the release comes up to a step late

@@ -59,8 +59,8 @@ def number_cards(path: Path) -> None:
 
 def inventory(path: Path) -> None:
     """Count the elements of every part, with masses, steps and shared nodes."""
-    from d2rpick.deck.inventory import read_inventory
-    from d2rpick.deck.inventory.size import masses_and_steps
+    from d2rpick.deck import read_inventory
+    from d2rpick.deck.geometry import masses_and_steps
 
     found = read_inventory(str(path))
     assert sum(counts.total() for counts in found.counts.values()) == ELEMENTS

@@ -11,7 +11,7 @@ from d2rpick.choice.calibrate import Observation, calibrate
 from d2rpick.choice.cost import MEASURED
 from d2rpick.choice.observed_cost import observations_of, observations_of_runs
 from d2rpick.errors import ConfigurationError, DeckError, FormatError
-from tests.deck.inventory.test_radioss import BEGIN, PROPS, nodes, wide
+from tests.deck.test_radioss import BEGIN, PROPS, nodes, wide
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

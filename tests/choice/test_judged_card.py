@@ -10,7 +10,7 @@ import pytest
 from d2rpick.choice.judged_card import CardRequest, judged_card
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.verify import verify
-from d2rpick.deck.printing.common import Printing
+from d2rpick.deck.printed_card import Printing
 from tests.command import ENERGY, GLSTAT
 from tests.reading import read_history
 

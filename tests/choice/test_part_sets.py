@@ -14,7 +14,7 @@ from d2rpick.choice.part_sets import Parts, parts_of, recommended_parts
 from d2rpick.choice.part_steps import Steps
 from d2rpick.choice.part_verdicts import PartRow, landing_alone, rows_of
 from d2rpick.choice.settings import Settings
-from d2rpick.deck.inventory import read_inventory
+from d2rpick.deck import read_inventory
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import open_run
 from d2rpick.vibration.measures import run_time_share

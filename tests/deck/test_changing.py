@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from d2rpick.deck import read_deck
+from d2rpick.deck import read_deck, read_inventory
 from d2rpick.deck.folder import main_decks
-from d2rpick.deck.inventory import read_inventory
+from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import cards
-from d2rpick.deck.printing.common import Printing
 from d2rpick.deck.writing import write_deck
 from d2rpick.errors import DeckError
 from d2rpick.rules import RULES, check_deck

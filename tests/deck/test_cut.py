@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from d2rpick.deck.cut import holds_mesh
-from d2rpick.deck.inventory.radioss_mesh import KINDS, NOT_COUNTED
+from d2rpick.deck.radioss_mesh import KINDS, NOT_COUNTED
+from d2rpick.deck.reader import holds_mesh
 from d2rpick.deck.source import Block, SourceFile
 
 

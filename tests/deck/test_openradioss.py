@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import cards
-from d2rpick.deck.printing.common import Printing
 from d2rpick.deck.writing import write_deck
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.rules import check_deck

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.deck import read_deck, read_switching
-from d2rpick.deck.marks import find_marks
+from d2rpick.deck.source import find_marks
 from d2rpick.deck.stored import Held
 from d2rpick.errors import DeckError
 from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic

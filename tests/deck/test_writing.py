@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import cards
-from d2rpick.deck.printing.common import Printing
-from d2rpick.deck.radioss import read_run
+from d2rpick.deck.radioss_run import read_run
 from d2rpick.deck.writing import write_deck
 from d2rpick.errors import DeckError
 from d2rpick.rules import RULES, check_deck
@@ -19,7 +19,7 @@ from tests.decks import write
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.radioss.engine import Leg
+    from d2rpick.deck.radioss_engine import Leg
 
 WINDOWS = [(0.02, 0.09), (0.1, 0.15)]
 CARD = cards(WINDOWS, Printing(part=(1,)))

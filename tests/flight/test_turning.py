@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.of_run import read
-from d2rpick.deck.inventory import read_inventory
-from d2rpick.deck.inventory.placement import Placed, Placement
+from d2rpick.deck import read_inventory
+from d2rpick.deck.geometry import Placed, Placement
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.histories.history import EXACT, Momenta

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.deck.inventory import ls_dyna, read_inventory
+from d2rpick.deck import ls_dyna, read_inventory
 from d2rpick.deck.reader import read_deck
 from d2rpick.errors import DeckError
 from d2rpick.rules import Checked, check_deck
-from tests.deck.inventory.test_ls_dyna import counted
+from tests.deck.test_ls_dyna import counted
 from tests.real.files import real
 
 FOUND: dict[str, dict[str, int]] = {

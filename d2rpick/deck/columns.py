@@ -1,0 +1,246 @@
+"""Fixed columns of many lines at once: ids and reals of a mesh as arrays.
+
+A mesh of millions of lines is read in pieces.  Lines between commas and fields with parameters are rare there; they are
+taken one by one.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.deck.expression import ExpressionError, number
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from d2rpick.deck.card import Card, Scope
+    from d2rpick.deck.source import Block
+
+    Layout = Sequence[tuple[int, int]]  # first column and width of each field
+
+    Integers = NDArray[np.int64]
+    Places = NDArray[np.int64]
+    Reals = NDArray[np.float64]
+
+_WIDEST: Final = 240  # columns that any line of a mesh uses
+_BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
+_ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")  # in lines that do not stand in columns
+_ID_ENDS: Final = 7  # last column of most ids: a line that has something there is not blank
+_HIGHEST: Final = 10**17  # no id comes near: a longer number would overflow
+NO_NODE: Final = -1  # in place of a node that there is not
+_DENSE: Final = 50_000_000  # up to this id a table of all ids is small enough
+NOTHING: Final = -1  # in place of what is not an id
+
+
+def layout(*widths: int) -> Layout:
+    """Place fields one behind the other.
+
+    Examples
+    --------
+    >>> layout(8, 16, 16)
+    [(0, 8), (8, 16), (24, 16)]
+    """
+    ends = np.cumsum(widths).tolist()
+    return [(end - width, width) for end, width in zip(ends, widths, strict=True)]
+
+
+class Lines:
+    """Data lines of a piece of a mesh: no comments, no blank ones; ``in_columns``: each stands in fixed columns."""
+
+    def __init__(self, data: bytes, scope: Scope, comments: bytes) -> None:
+        self._scope = scope
+        data = data.replace(b"\r\n", b"\n")
+        self.in_columns = not any(letter in data for letter in _ONE_BY_ONE)
+        cells = _table(np.frombuffer(data, np.uint8))
+        keep = ~np.isin(cells[:, 0], list(comments))
+        unsure = np.flatnonzero(cells[:, min(_ID_ENDS, cells.shape[1] - 1)] == _BLANK)
+        keep[unsure] &= (cells[unsure] != _BLANK).any(axis=1)
+        self.cells = cells if keep.all() else cells[keep]
+
+    def __len__(self) -> int:
+        """Give the number of lines."""
+        return len(self.cells)
+
+    def integers(self, fields: Layout) -> Integers:
+        """Ids in these fields, shape (lines, fields): 0 for a blank, `NOTHING` for what is not an id."""
+        found = np.stack([_integers(self._field(*place)) for place in fields], axis=1)
+        for row, texts in self._texts.items():
+            found[row] = [_id(self._value(text)) for text in self._pieces(texts, fields)]
+        return found
+
+    def reals(self, fields: Layout, wanted: slice) -> Reals:
+        """Give the numbers in ``wanted`` of the fields, shape (lines, wanted): 0 for a blank, NaN for what is none."""
+        found = np.stack([_reals(self._field(*place)) for place in fields[wanted]], axis=1)
+        for row, texts in self._texts.items():
+            found[row] = [self._value(text) for text in self._pieces(texts, fields)[wanted]]
+        return found
+
+    def _field(self, start: int, width: int) -> NDArray[np.uint8]:
+        found = self.cells[:, start : start + width]
+        missing = width - found.shape[1]
+        return np.pad(found, ((0, 0), (0, missing)), constant_values=_BLANK) if missing else found
+
+    @cached_property
+    def _texts(self) -> dict[int, str]:
+        """Lines that do not stand in columns, or refer to parameters."""
+        if self.in_columns:
+            return {}
+        special = np.isin(self.cells, [ord(letter) for letter in _ONE_BY_ONE]).any(axis=1)
+        return {row: self.cells[row].tobytes().decode("latin-1") for row in np.flatnonzero(special).tolist()}
+
+    def _pieces(self, text: str, fields: Layout) -> list[str]:
+        if "," in text:
+            cells = text.split(",")
+            return [cells[place] if place < len(cells) else "" for place in range(len(fields))]
+        return [text.expandtabs(8)[start : start + width] for start, width in fields]
+
+    def _value(self, text: str) -> float:
+        """Value of a field; 0 for a blank, NaN for what is no number."""
+        if not text.strip():
+            return 0.0
+        try:
+            return float(self._scope.value(text))
+        except (ExpressionError, OverflowError):
+            return math.nan
+
+
+def lines_of(card: Card, comments: bytes = b"$") -> Iterator[Lines]:
+    """Read the data lines of a card, piece by piece."""
+    for data in _pieces_of(card.block):
+        if data:
+            yield Lines(data, card.scope, comments)
+
+
+def _pieces_of(block: Block) -> Iterator[bytes]:
+    """Bytes below the keyword line, in pieces that end with a line."""
+    pieces = block.source.pieces(block.start, block.end)
+    yield next(pieces).partition(b"\n")[2]
+    yield from pieces
+
+
+def _table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Lines as rows of equal width, blanks behind those that are shorter; without line ends."""
+    ends = np.flatnonzero(raw == ord("\n"))
+    if not raw.size or raw[-1] != ord("\n"):
+        ends = np.append(ends, raw.size)
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    lengths = ends - starts
+    longest = int(lengths.max(initial=0))
+    if (lengths == longest).all() and raw.size == lengths.size * (longest + 1):
+        return raw.reshape(lengths.size, longest + 1)[:, : max(1, longest)]
+    columns = np.arange(max(1, min(longest, _WIDEST)))
+    places = np.minimum(np.add.outer(starts, columns), raw.size - 1)
+    return np.where(columns < lengths[:, np.newaxis], raw[places], _BLANK)
+
+
+def _integers(field: NDArray[np.uint8]) -> Integers:
+    value = np.zeros(len(field), np.int64)
+    known, groups = np.ones(len(field), bool), np.zeros(len(field), np.uint8)
+    before = np.zeros(len(field), bool)
+    for letters in np.ascontiguousarray(field.T):
+        digits = letters - _ZERO
+        is_digit = digits <= 9
+        value = np.where(is_digit, 10 * value + digits, value)
+        known &= (is_digit | (letters == _BLANK)) & (value < _HIGHEST)
+        groups += is_digit & ~before
+        before = is_digit
+    return np.where(known & (groups <= 1), value, NOTHING)
+
+
+def _reals(field: NDArray[np.uint8]) -> Reals:
+    blank = (field == _BLANK).all(axis=1)
+    texts = np.ascontiguousarray(field).view(f"S{field.shape[1]}").ravel()
+    texts = np.where(blank, b"0", texts)
+    try:
+        return texts.astype(np.float64)
+    except ValueError:  # 1.5-3 is a number for a solver
+        return np.array([_real(text.decode("latin-1")) for text in texts.tolist()])
+
+
+def _real(text: str) -> float:
+    try:
+        return float(number(text.strip()))
+    except ExpressionError:
+        return math.nan
+
+
+def _id(value: float) -> int:
+    return int(value) if value >= 0 and value == int(value) else NOTHING
+
+
+def distinct(values: Places) -> Places:
+    """Give the distinct values, ascending; by sorting, which is quicker here than by a table of hashes."""
+    ordered = np.sort(values, axis=None)
+    return ordered[np.append(True, ordered[1:] != ordered[:-1])] if ordered.size else ordered
+
+
+def places_of(ids: Places, table: Places) -> Places:
+    """Places in a table of node ids; ids that it does not have are left out.
+
+    Examples
+    --------
+    >>> places_of(np.array([7, 9]), np.array([3, 7, 5])).tolist()
+    [1]
+    """
+    order = np.argsort(table, kind="stable")
+    at = np.minimum(np.searchsorted(table[order], ids), max(table.size - 1, 0))
+    found = order[at] if table.size else order
+    return np.asarray(found[table[found] == ids] if table.size else found)
+
+
+def _used(wanted: Sequence[Places]) -> Places:
+    """Node ids that elements have, ascending."""
+    highest = max((int(one.max(initial=0)) for one in wanted), default=0)
+    if highest > _DENSE:
+        used = distinct(np.concatenate([distinct(one) for one in wanted]))
+        return used[used > 0]
+    mask = np.zeros(highest + 1, bool)
+    for one in wanted:
+        mask[one] = True
+    mask[0] = False
+    return np.flatnonzero(mask)
+
+
+def placed(ids: Places, wanted: Sequence[Places]) -> tuple[Places, list[Places]]:
+    """Give every node id its place in one table.
+
+    Parameters
+    ----------
+    ids : array of int, shape (n,)
+        Nodes that have coordinates, in the order of these.
+    wanted : sequence of arrays
+        Node ids of elements, 0 for none.
+
+    Returns
+    -------
+    table : array of int
+        Ids by place: ``ids`` first, then those that elements have beyond them.
+    places : list of arrays
+        Of the shapes of ``wanted``.
+    """
+    order = np.argsort(ids, kind="stable")
+    known = ids[order]
+    used = _used(wanted)
+    at = np.minimum(np.searchsorted(known, used), max(known.size - 1, 0))
+    absent = used[known[at] != used] if known.size else used
+    table = np.concatenate([ids, absent])
+    order = np.argsort(table, kind="stable")
+    known = table[order]
+    dense = known.size and int(known[-1]) <= _DENSE
+    if dense:
+        lookup = np.full(int(known[-1]) + 1, NO_NODE, np.int64)
+        lookup[table[::-1]] = np.arange(table.size)[::-1]
+        return table, [lookup[one] for one in wanted]
+    places = [
+        np.where(one > 0, order[np.minimum(np.searchsorted(known, one), known.size - 1)], NO_NODE)
+        if known.size
+        else one
+        for one in wanted
+    ]
+    return table, places

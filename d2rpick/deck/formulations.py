@@ -1,0 +1,80 @@
+"""Formulations of elements by their numbers, and the class by which their cost is known.
+
+Measured classes: QBAT, QEPH and BT shells, beams, solids, springs (weights in `d2rpick.choice.cost`).  A formulation
+that was not measured has the class of the one that does the same work; ``measured`` is False then.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from d2rpick.deck.model import Formulation
+
+BT, QEPH, QBAT, BEAM, SOLID, SPRING = "BT", "QEPH", "QBAT", "beam", "solid", "spring"
+# Integration points in each layer of a shell, by class.
+_IN_PLANE: Final = {BT: 1, QEPH: 1, QBAT: 4}
+
+# Radioss, Ishell of quadrilaterals (Altair's public help for /PROP/TYPE1).
+_ISHELL: Final = {
+    1: Formulation("BT (Ishell 1)", BT), 2: Formulation("BT (Ishell 2)", BT), 3: Formulation("BT (Ishell 3)", BT),
+    4: Formulation("BT (Ishell 4)", BT), 12: Formulation("QBAT", QBAT), 24: Formulation("QEPH", QEPH),
+}  # fmt: skip
+_ISH3N: Final = {
+    0: Formulation("C0 triangle", BT, measured=False), 1: Formulation("C0 triangle", BT, measured=False),
+    2: Formulation("C0 triangle", BT, measured=False), 30: Formulation("DKT18", QBAT, measured=False),
+    31: Formulation("DKT_S3", QEPH, measured=False),
+}  # fmt: skip
+# Solids were measured together: 24, 17 and 1 could not be told apart.
+_ISOLID: Final = {
+    1: "SOLID1",
+    2: "SOLID2",
+    5: "HEPH5",
+    12: "SOLID12",
+    14: "HA8",
+    17: "SOLID17",
+    18: "SOLID18",
+    24: "HEPH",
+}
+_ISOLID_MEASURED: Final = {1, 17, 24}
+
+# LS-DYNA, ELFORM of *SECTION_SHELL: one point, one point with physical stabilisation or warping, four points.
+_ELFORM_SHELL: Final = {
+    1: ("Hughes-Liu", BT), 2: ("Belytschko-Tsay", BT), 3: ("BCIZ triangle", BT), 4: ("C0 triangle", BT),
+    5: ("membrane", BT), 6: ("S/R Hughes-Liu", QBAT), 7: ("S/R co-rotational Hughes-Liu", QBAT),
+    8: ("Belytschko-Leviathan", QEPH), 9: ("membrane", QBAT), 10: ("Belytschko-Wong-Chiang", BT),
+    11: ("co-rotational Hughes-Liu", BT), 16: ("fully integrated", QBAT), 17: ("DKT triangle", QBAT),
+    18: ("fully integrated linear", QBAT), 20: ("fully integrated linear", QBAT), 21: ("fully integrated linear", QBAT),
+    25: ("Belytschko-Tsay with thickness stretch", BT), 26: ("fully integrated with thickness stretch", QBAT),
+    -16: ("fully integrated, more accurate", QBAT),
+}  # fmt: skip
+
+
+def radioss(kind: str, shell: int, triangle: int, solid: int) -> Formulation | None:
+    """How Radioss computes elements of a kind with these flags of their property; None for what is not known."""
+    if kind == "shell":
+        return _layered(_ISHELL.get(shell, Formulation(f"Ishell {shell}", None, measured=False)))
+    if kind == "triangle":
+        return _layered(_ISH3N.get(triangle, Formulation(f"Ish3n {triangle}", None, measured=False)))
+    if kind == "solid":
+        return Formulation(_ISOLID.get(solid, f"Isolid {solid}"), SOLID, measured=solid in _ISOLID_MEASURED)
+    return _plain(kind, measured=True)
+
+
+def ls_dyna(kind: str, elform: int) -> Formulation | None:
+    """How LS-DYNA computes elements of a kind with this ELFORM; None for what is not known."""
+    if kind == "shell":
+        name, cost = _ELFORM_SHELL.get(elform, ("shell", None))
+        return _layered(Formulation(f"{name} (ELFORM {elform})", cost, measured=False))
+    if kind in ("solid", "thick shell"):
+        return Formulation(f"{kind} (ELFORM {elform})", SOLID, measured=False)
+    return _plain(kind, measured=False)
+
+
+def _layered(shell: Formulation) -> Formulation:
+    return shell._replace(in_plane=_IN_PLANE.get(shell.cost or "", 0))
+
+
+def _plain(kind: str, *, measured: bool) -> Formulation | None:
+    alike = {"beam": BEAM, "truss": BEAM, "spring": SPRING, "seatbelt": SPRING}
+    cost = SOLID if kind in ("tetrahedron", "pentahedron", "thick shell") else alike.get(kind)
+    return Formulation(kind, cost, measured and kind in ("beam", "spring")) if cost else None

@@ -1,0 +1,279 @@
+"""Switching windows as solver input: one function per solver, one table of solvers.
+
+LS-DYNA: a pair of *DEFORMABLE_TO_RIGID_AUTOMATIC cards for each window.  Radioss: engine files whose legs end at the
+switching times, with /RBODY/ON and /RBODY/OFF.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from d2rpick.deck.printed_card import (
+    LONGEST,
+    PHYSICS,
+    PrintedCard,
+    Solver,
+    check_ids,
+    check_windows,
+    comments,
+    shortest,
+)
+from d2rpick.errors import DeckError
+from d2rpick.version import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from d2rpick.deck.printed_card import Printing, Times
+
+_FILE: Final = "switches.k"
+
+_SET_HEAD = "$#   swset      code     time1     time2     time3     entno     relsw    paired"
+_COUNT_HEAD = "$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset"
+_OF_LS_DYNA = (
+    "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active",
+    "  (NRBF, NCSF, RWF 0); where they are, delete them (1) and activate again (2).",
+    "Springs and dampers are not switched.",
+)
+_UNCAPPED = (
+    "DTMAX is 0: with nothing deformable left the time step may grow without",
+    "  limit and the second switch come late; set d2rpick card --step-cap.",
+)
+_UNMERGED = ("Merge parts that share nodes (d2rpick card --merge), never loose ones.",)
+
+
+def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+    """Print two unpaired CODE 0 sets for each window, their times in at most 9 characters.
+
+    Raises
+    ------
+    DeckError
+        If windows do not follow each other, as given or as printed, or an id does not fit.
+    """
+    windows, ids = check_windows(windows), check_ids(printing.part)
+    sets = list(_sets(printing.swset, len(windows)))
+    if printing.merge is not None:
+        check_ids([printing.merge], LONGEST)  # stands right of an id, with a blank between them
+    texts = [(shortest(tr), shortest(td)) for tr, td in windows]
+    _check_printed([text for pair in texts for text in pair])
+    notes = tuple(note for times, pair in zip(windows, texts, strict=True) for note in _roundings(times, pair))
+    told = (*notes, *_warnings(ids, printing), *comments(remarks))
+    spans = ", ".join(f"{tr} to {td}" for tr, td in texts)
+    lines = [*comments([f"Rigid from {spans}; written by d2rpick {__version__}"]), *told]
+    lines = [f"$ {line}" for line in lines]
+    for pair, numbers in zip(texts, sets, strict=True):
+        lines += _window(pair, numbers, ids, printing)
+    text = "\n".join(lines) + "\n"
+    return PrintedCard(text, tuple((float(tr), float(td)) for tr, td in texts), {_FILE: text}, notes)
+
+
+def _window(texts: tuple[str, str], sets: tuple[int, int], ids: Sequence[int], printing: Printing) -> Iterator[str]:
+    leads = _leads(ids, printing)
+    yield from _header(sets[0], texts[0], shortest(printing.step_cap or 0.0), (len(ids), 0))
+    yield "$#     pid       lrb     ptype"
+    for part in sorted(ids, key=lambda part: part in leads):  # those that lead first
+        yield f"{part:10d}{leads.get(part, 0):10d}      PART"
+    yield from _header(sets[1], texts[1], "0.0", (0, len(ids)))
+    yield "$#     pid     ptype"
+    for part in ids:
+        yield f"{part:10d}      PART"
+
+
+def _leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
+    """Give the lead of each part that is merged into another."""
+    if printing.merge is not None:
+        return {part: printing.merge for part in ids if part != printing.merge}
+    bodies = [[part for part in body if part in ids] for body in printing.bodies]
+    return {part: body[0] for body in bodies for part in body[1:]}
+
+
+def _header(swset: int, time: str, step_cap: str, counts: tuple[int, int]) -> Iterator[str]:
+    yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"
+    yield _SET_HEAD
+    yield f"{swset:10d}{0:10d}{time:>10s}{'0.0':>10s}{'0.0':>10s}{0:10d}{0:10d}{0:10d}"
+    yield _COUNT_HEAD
+    yield f"{0:10d}{0:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{'0.0':>10s}"
+
+
+def _sets(first: tuple[int, int], count: int) -> Iterator[tuple[int, int]]:
+    """Ids of the switch sets of each window, all different."""
+    if first[0] == first[1]:
+        raise DeckError(f"both switch sets are {first[0]}, two different ids were expected")
+    above = max(first) + 1
+    check_ids([*first, above + 2 * count])
+    yield first
+    yield from ((above + 2 * i, above + 2 * i + 1) for i in range(count - 1))
+
+
+def _check_printed(texts: Sequence[str]) -> None:
+    for one, other in pairwise(texts):
+        if float(one) >= float(other):
+            raise DeckError(
+                f"two switching times are both {one} in {LONGEST} characters, different times were expected"
+            )
+
+
+def _roundings(asked: Times, texts: tuple[str, str]) -> Iterator[str]:
+    for name, value, text in zip(("tr", "td"), asked, texts, strict=True):
+        if float(text) != value:
+            off = f"{float(text) - value:+.1e} off {value!r}"
+            yield f"{name} is printed as {text}, {off}: nearest in {LONGEST} characters."
+
+
+def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
+    yield from (*PHYSICS, *_OF_LS_DYNA)
+    if not printing.step_cap:
+        yield from _UNCAPPED
+    if printing.merge is None and printing.bodies:
+        yield from (
+            f"{len(body)} parts are one rigid body by the deck, led by part {body[0]} (LRB)."
+            for body in printing.bodies
+            if len(body) > 1
+        )
+    elif printing.merge is None and len(ids) > 1:
+        yield from _UNMERGED
+    elif printing.merge is not None and printing.merge not in ids:
+        yield f"Part {printing.merge} is the lead: it must be rigid already."
+
+
+_RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
+_NODES_PER_LINE = 10
+# Of the rigid window, per step: the release is at most a thousandth of it late.  Each window has its own, so that
+# further windows leave the run up to them as it was.
+_CAP_SHARE = 1000
+_MOST_LEGS = 99  # the solver numbers them with two digits where it matters, in the names of time histories
+_OF_RADIOSS = (
+    "Ids are main nodes of /RBODY, not bodies; an unknown one is skipped silently.",
+    "Gravity and damping act on a rigid body only if its main node is in their",
+    "  node groups; no warning is given.",
+    "The energy reported for rigid solids can be wrong until the release.",
+    "The starter looks for /RBODY/OFF in the engine files; keep all of them.",
+    "A body that the first file does not put off is rigid from time 0.",
+    "The starter takes the nodes of an /RBODY from every /RWALL; Ikrem 1 keeps",
+    "  them there while the body is off.",
+    "An initial velocity must move the main node of a body too.",
+    "Repeat your output keywords (/TFILE, /ANIM, ...) in every file.",
+)
+
+
+class EngineFile(NamedTuple):
+    """An engine run: its number, its end, and its largest step where the bodies are rigid in it, else None."""
+
+    number: int
+    stop: float
+    cap: float | None
+
+
+def _radioss(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+    """Print the engine files, a leg up to each switch and one to the end.
+
+    The main nodes are those of /RBODY in the starter file, of bodies without sensor.  Without a cap the step is
+    held below a thousandth of the rigid window while the bodies are rigid.
+
+    Raises
+    ------
+    DeckError
+        If windows do not follow each other, an id does not fit, or the run does not end after the last window.
+    """
+    windows, ids = check_windows(windows), check_ids(printing.node)
+    name = printing.name
+    if not _RUN_NAME.fullmatch(name):
+        raise DeckError(f"the name of the run is {name!r}, letters, digits, '.', '_' and '-' were expected")
+    if printing.end is None or not windows[-1][1] < printing.end < math.inf:
+        found = "the end of the run is not given" if printing.end is None else f"the run ends at {printing.end:g}"
+        raise DeckError(f"{found}, a time after td = {windows[-1][1]:g} was expected")
+    files = {
+        f"{name}_{leg.number:04d}.rad": "\n".join(_engine(leg, name, ids, printing.off)) + "\n"
+        for leg in legs(windows, printing.end, printing.step_cap)
+    }
+    spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
+    head = comments([f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *_OF_RADIOSS, *remarks])
+    text = "".join(f"# {line}\n" for line in head)
+    text += "".join(f"# ---- {file}\n{content}" for file, content in files.items())
+    return PrintedCard(text, windows, files)
+
+
+def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[EngineFile]:
+    """Give the engine runs that the windows ask for; a window from 0 on needs none before it."""
+    caps = [step_cap or float(f"{(td - tr) / _CAP_SHARE:.2g}") for tr, td in windows]
+    switches = zip(windows, caps, strict=True)
+    stops = [(time, cap) for (tr, td), own in switches for time, cap in ((tr, None), (td, own)) if time > 0]
+    if len(stops) >= _MOST_LEGS:
+        raise DeckError(f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected")
+    numbered = enumerate([*stops, (end, None)], start=1)
+    return [EngineFile(number, stop, cap) for number, (stop, cap) in numbered]
+
+
+def off(nodes: Sequence[int]) -> Iterator[str]:
+    """Put rigid bodies off; the starter of OpenRadioss overlooks a second such block right behind the first."""
+    if nodes:
+        yield from ("/RBODY/OFF", *listed(nodes))
+
+
+def listed(ids: Sequence[int]) -> Iterator[str]:
+    """Write numbers in lines."""
+    yield from (" ".join(map(str, ids[i : i + _NODES_PER_LINE])) for i in range(0, len(ids), _NODES_PER_LINE))
+
+
+def _engine(leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int]) -> Iterator[str]:
+    yield f"/RUN/{name}/{leg.number}"
+    yield f"{leg.stop!r:>20}"
+    if leg.cap is not None:
+        yield from ("/RBODY/ON", *listed(ids))
+    yield from off(others if leg.cap is not None else (*ids, *others))
+    if leg.cap is not None:
+        yield from ("# with nothing deformable left the step would grow without limit", "/DTIX")
+        yield f"{leg.cap!r} {leg.cap!r}"
+
+
+SOLVERS: Final[Mapping[str, Solver]] = {
+    "ls-dyna": Solver("LS-DYNA", ("glstat", "matsum", "binout"), "part", ("merge", "swset", "step_cap"), _ls_dyna),
+    "radioss": Solver("Radioss", ("radioss-th",), "node", ("step_cap", "end", "name"), _radioss),
+}
+DEFAULT: Final = "ls-dyna"  # of histories that name no solver
+
+
+def solver_of(history_format: str) -> str:
+    """Name the solver that wrote a history of this format (several are joined by ``+``).
+
+    Examples
+    --------
+    >>> solver_of("radioss-th"), solver_of("glstat + matsum"), solver_of("csv")
+    ('radioss', 'ls-dyna', 'ls-dyna')
+    """
+    formats = set(history_format.split(" + "))
+    return next((name for name, solver in SOLVERS.items() if formats & {*solver.histories}), DEFAULT)
+
+
+def cards(
+    windows: Sequence[Times], printing: Printing, solver: str = DEFAULT, remarks: Sequence[str] = ()
+) -> PrintedCard:
+    """Print the cards of windows.
+
+    Parameters
+    ----------
+    windows : sequence of (float, float)
+        tr and td of each [time of the model], 0 <= tr < td, each after the one before.
+    printing : Printing
+        Whom the card switches, and what else it says.
+    solver : str
+        A key of `SOLVERS`.
+    remarks : sequence of str
+        Further comment lines.
+
+    Raises
+    ------
+    DeckError
+        If windows do not follow each other, or the solver's input cannot say what is asked for.
+
+    Examples
+    --------
+    >>> from d2rpick.deck.printed_card import Printing
+    >>> card = cards([(0.02, 0.09), (0.2, 0.3)], Printing(part=(11,)))
+    >>> card.windows
+    ((0.02, 0.09), (0.2, 0.3))
+    """
+    return SOLVERS[solver].cards(windows, printing, remarks)

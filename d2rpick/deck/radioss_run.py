@@ -1,0 +1,321 @@
+"""A Radioss run: the files that belong together, when which part is rigid over its legs, and what stays rigid.
+
+Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and stay as they
+were in each later one unless it says otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from d2rpick.deck.card import Value
+from d2rpick.deck.radioss_engine import Leg, blocks, card_of, keyword, read_legs
+from d2rpick.deck.radioss_starter import KEPT, Starter, rigid_parts
+from d2rpick.deck.reader import Deck, Unread
+from d2rpick.deck.source import SourceFile
+from d2rpick.deck.switching import Switched, SwitchSet
+from d2rpick.deck.windows import Event, Unit, Window, Windows
+from d2rpick.errors import DeckError, are, in_rows, name_units
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.deck.card import Card, Field
+    from d2rpick.deck.radioss_engine import Leg
+    from d2rpick.deck.radioss_starter import Body
+
+THROUGH_WALL: Final = "body-through-wall"
+AT_REST: Final = "body-without-velocity"
+NOT_FOLLOWED: Final = "deck-not-followed"
+LEFT_RIGID: Final = "body-left-rigid"
+# What ruins a run, in a few words, and the rule that says more.
+RUINS: Final = {
+    THROUGH_WALL: "the deck lets rigid bodies go through a wall (D2R406)",
+    AT_REST: "the deck lets rigid bodies begin at rest (D2R407)",
+    LEFT_RIGID: "the deck keeps parts rigid that deform (D2R408)",
+}
+
+
+class Flaw(NamedTuple):
+    """What is wrong, with a stable ``code``, and where; `NOT_FOLLOWED` tells what was not judged, and why."""
+
+    code: str
+    place: Field
+    message: str
+
+
+_HEAD = 256 * 1024
+_KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
+_STARTER: Final = re.compile(rb"^/BEGIN", re.MULTILINE | re.IGNORECASE)
+_ENGINE: Final = re.compile(rb"^/RUN/", re.MULTILINE | re.IGNORECASE)
+_NUMBERED: Final = re.compile(r"(.+)_(\d{4})\.rad", re.IGNORECASE | re.DOTALL)
+_NAME: Final = re.compile(rb"^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)", re.MULTILINE | re.IGNORECASE)
+_DEEPEST = 60  # includes in includes
+
+
+@dataclass(eq=False)
+class Run:
+    """The starter deck, where it was found, and the legs in the order of their numbers; ``deck`` has the files."""
+
+    deck: Deck
+    starter: Starter | None = None
+    legs: list[Leg] = field(default_factory=list)
+    included: dict[str, SourceFile] = field(default_factory=dict)  # by path: one that is included twice is read once
+
+
+def recognises(head: bytes) -> bool:
+    """Whether a file that begins like this is a starter deck or an engine file."""
+    first = _KEYWORD.search(head)
+    return first is not None and first[0] == b"/" and bool(_STARTER.search(head) or _ENGINE.search(head))
+
+
+def run_files(path: str) -> list[str]:
+    """Files of the run that ``path`` belongs to; none where it is not a file of a Radioss run.
+
+    The starter deck ``NAME_0000.rad`` and the engine files ``NAME_0001.rad`` and so on in its folder belong
+    together; a file of another name goes by the name of the run that it holds.
+    """
+    try:
+        if not os.path.isfile(path):  # noqa: PTH113  start-up
+            return []  # a pipe gives its bytes once
+        with open(path, "rb", buffering=0) as stream:  # noqa: PTH123
+            head = stream.read(_HEAD)
+        if not recognises(head):
+            return []
+        folder = Path(path).parent
+        beside = sorted(os.listdir(folder))  # noqa: PTH208  nothing is asked of each file: there may be many runs
+    except (OSError, ValueError):
+        return []  # said by who reads it
+    name = _run_name(path, head)
+    alike = (one for one in beside if one.startswith(name) and (match := _NUMBERED.fullmatch(one)) and match[1] == name)
+    files = [str(folder / one) for one in alike if (folder / one).is_file()]
+    return files if any(Path(path).samefile(one) for one in files) else [path, *files]
+
+
+def _run_name(path: str, head: bytes) -> str:
+    """Name of a run by that of its file, else by what stands in it."""
+    numbered = _NUMBERED.fullmatch(Path(path).name)
+    if numbered:
+        return numbered[1]
+    found = _NAME.search(head)
+    return (found[1] or found[2] or b"").decode("latin-1").strip() if found else ""
+
+
+def read_run(path: str, content: bytes | None = None) -> Run:
+    """Read a run: of its files, or from ``content``.
+
+    Raises
+    ------
+    DeckError
+        If a file cannot be read, or holds neither a starter deck nor an engine file.
+    """
+    run = Run(Deck(path))
+    files = run_files(path) if content is None else []
+    for name in files or [path]:
+        source = SourceFile(name, content)
+        head = source.read(0, _HEAD)
+        if not recognises(head):
+            raise DeckError(f"{name}: no /BEGIN or /RUN was found, a file of a Radioss run was expected")
+        run.deck.sources.append(source)
+        if _ENGINE.search(head):
+            run.legs += read_legs(source)
+        if _STARTER.search(head):
+            run.starter = run.starter or Starter()
+            _read_starter(source, run, ())
+        else:
+            run.deck.ends += [(block, False) for block in blocks(source) if block.end is None]
+    run.legs.sort(key=lambda leg: leg.number)
+    run.deck.cards += [leg.run for leg in run.legs]
+    run.deck.cards += [card for leg in run.legs for card, _, _ in leg.switched]
+    return run
+
+
+def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
+    if run.starter is None:
+        return
+    run.starter.sources.append(source)
+    for block in blocks(source):
+        words = keyword(block)
+        if block.end is None:
+            run.deck.ends.append((block, not chain))
+        if not words:
+            _include(card_of(block), source, run, chain)
+        elif words[0] in KEPT:
+            card = card_of(block)
+            run.starter.take(card, words)
+            if words[0] == "RBODY":
+                run.deck.cards.append(card)
+
+
+def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
+    asked = card.block.head.split(maxsplit=1)[1:]
+    name = asked[0].strip() if asked else ""
+    path = next(
+        (
+            str(folder / name)
+            for folder in (Path(source.name).parent, Path(run.deck.path).parent)
+            if os.path.isfile(folder / name)  # noqa: PTH113 - Path.is_file raises on names too long
+        ),
+        None,
+    )
+    real = os.path.realpath(path) if path else ""
+    if path is None:
+        run.deck.unread.append(Unread(card.here._replace(text=name), "no such file"))
+    elif real in chain or real == os.path.realpath(source.name) or len(chain) >= _DEEPEST:
+        run.deck.unread.append(Unread(card.here._replace(text=name), "the file includes itself"))
+    elif not os.access(path, os.R_OK):
+        run.deck.unread.append(Unread(card.here._replace(text=name), "no permission to read it"))
+    else:
+        if path not in run.included:
+            run.included[path] = SourceFile(path)
+        run.deck.sources.append(run.included[path])
+        _read_starter(run.included[path], run, (*chain, os.path.realpath(source.name)))
+
+
+@dataclass(frozen=True, eq=False)
+class LegSwitch(SwitchSet):
+    """Bodies switched at the beginning of a leg, at ``at``; ``stop_field`` is where that time is written."""
+
+    at: float = 0.0
+    stop_field: Field | None = None
+
+    @cached_property
+    def time(self) -> float | None:
+        """When it switches [time of the run]."""
+        return self.at
+
+    @property
+    def time_field(self) -> Field:
+        """The end of the leg before, or the keyword in the first leg."""
+        return self.stop_field or self.card.here
+
+
+@dataclass(eq=False)
+class RunWindows:
+    """Windows of a run, the cards that make them, and the parts of the bodies by main node, where they are known."""
+
+    windows: Windows
+    sets: tuple[LegSwitch, ...]
+    parts: dict[int, set[int]] = field(default_factory=dict)
+
+
+def in_order(legs: list[Leg]) -> bool:
+    """Whether the legs are all there, from the first on, and each ends no earlier than the one before."""
+    numbers = [leg.number for leg in legs]
+    stops = [leg.stop for leg in legs]
+    sorted_stops = all(one.value <= other.value for one, other in pairwise(stops))
+    return numbers == list(range(1, len(legs) + 1)) and sorted_stops and not any(stop.problem for stop in stops)
+
+
+def find_run_windows(run: Run) -> RunWindows:
+    """Follow every body that a leg or a sensor switches through the run.
+
+    A body whose parts are not known is one unit, named by its main node.  Legs that are not in order have no windows.
+    """
+    sets = tuple(_switches(run.legs)) if in_order(run.legs) else ()
+    starter = None if run.starter and run.starter.moved else run.starter
+    bodies = {body.node.value: body for body in starter.bodies} if starter else {}
+    switched = {value.value for one in sets for value in _nodes(one) if value.value}
+    sensors = {node for node, body in bodies.items() if body.sensor and node not in switched}
+    groups = {node: bodies[node].group for node in (*switched, *sensors) if node in bodies}
+    parts = rigid_parts(starter, groups) if starter and groups else {}
+    windows: list[Window] = []
+    for node in sorted(switched):
+        if not bodies or (node in bodies and not bodies[node].sensor):
+            for unit in _units(node, parts):
+                windows += _follow(unit, node, sets, run.legs[0])
+    for node in sorted(sensors):
+        windows += _by_sensor(run, bodies[node], parts)
+    windows.sort(key=lambda window: (window.unit, window.tr))
+    events = tuple(event for window in windows for event in (window.opened, window.closed) if event)
+    return RunWindows(Windows(tuple(windows), (), events, frozenset(), frozenset()), sets, parts)
+
+
+def _switches(legs: list[Leg]) -> Iterator[LegSwitch]:
+    before: Leg | None = None
+    for leg in legs:
+        at, place = (before.stop.value, before.stop.field) if before else (0.0, None)
+        for card, rigid, nodes in leg.switched:
+            lines = tuple(Switched(node, False, rigid) for node in nodes)
+            yield LegSwitch(card, "plain", None, lines, nodes, at=at, stop_field=place)
+        before = leg
+
+
+def _nodes(one: LegSwitch) -> Iterator[Value[int]]:
+    return (line.part for line in one.switched if not line.part.problem)
+
+
+def _units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
+    return [Unit(part) for part in sorted(parts.get(node, ()))] or [Unit(node, is_body=True)]
+
+
+def _follow(unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg) -> Iterator[Window]:
+    """Windows of a body: on from the start unless the first leg says otherwise."""
+    start = LegSwitch(first.run, "plain", None, (), ())
+    opened: Event | None = Event(unit, start, Switched(Value(node, first.run.here), False, True))
+    for one in sets:
+        line = next((line for line in one.switched if line.part.value == node), None)
+        if line is None:
+            continue
+        event = Event(unit, one, line)
+        if not line.to_rigid:
+            if opened and one.at > 0:
+                yield Window(unit, opened.by.time or 0.0, one.at, opened, event)
+            opened = None
+        elif opened is None or (opened.by.time == one.at == 0):
+            opened = event
+    if opened:
+        yield Window(unit, opened.by.time or 0.0, None, opened, None)
+
+
+def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]]) -> Iterator[Window]:
+    """Windows of a body with a time sensor: it is rigid while the sensor is not active."""
+    if run.starter is None or body.sensor not in run.starter.timed:
+        return
+    start, stop = run.starter.timed[body.sensor]
+    if math.isnan(start):
+        return
+    for unit in _units(body.node.value, parts):
+        opened, closed = (
+            Event(unit, LegSwitch(body.card, "plain", None, (), (), at=at), Switched(body.node, False, rigid))
+            for at, rigid in ((0.0, True), (start, False))
+        )
+        if start > 0:
+            yield Window(unit, 0.0, start, opened, closed)
+        if stop < math.inf:
+            again = Event(unit, LegSwitch(body.card, "plain", None, (), (), at=stop), Switched(body.node, False, True))
+            yield Window(unit, stop, None, again, None)
+
+
+class LeftRigid(NamedTuple):
+    """Parts that lie whole in such bodies, where to put them off, what is wrong, and how it is mended."""
+
+    parts: tuple[int, ...]
+    place: Field
+    found: str
+    way_out: str
+
+
+def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
+    """Find the bodies that no leg names, of a run with ``windows``, where they hold whole parts."""
+    if run.starter is None or run.starter.moved or not windows:
+        return None
+    named = {node.value for leg in run.legs for _, _, nodes in leg.switched for node in nodes}
+    bodies = [body for body in run.starter.bodies if not body.sensor and body.node.value not in named]
+    parts = rigid_parts(run.starter, {body.node.value: body.group for body in bodies}) if bodies else {}
+    bodies = [body for body in bodies if parts.get(body.node.value)]
+    held = sorted({part for body in bodies for part in parts[body.node.value]})
+    if not held:
+        return None
+    places = [card.here for card, _, _ in run.legs[0].switched]
+    ids, mains = (in_rows(number) for number in ((body.id for body in bodies), (body.node.value for body in bodies)))
+    found = f"no leg switches /RBODY {', '.join(ids)}, so {name_units(held)} {are(held)} rigid from time 0 to the end"
+    way_out = f"name main node{'s' * (len(bodies) > 1)} {', '.join(mains)} in the /RBODY/OFF of every leg"
+    return LeftRigid(tuple(held), places[0] if places else run.legs[0].run.here, found, way_out)

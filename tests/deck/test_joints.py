@@ -1,0 +1,129 @@
+"""What joins parts that share no nodes: in every form that is followed, and what is named because it is not."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.choice.rigid_bodies import bodies_of
+from d2rpick.flight.bodies import RigidBody
+from tests.deck import test_radioss as rad
+from tests.deck.test_ls_dyna import inventory, nodes, row
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from d2rpick.deck.model import Inventory
+
+# Parts 7, 9 and 11, a shell each, without a node in common: 1 to 4, 5 to 8, 9 to 12.
+MESH = (
+    "*KEYWORD\n"
+    + "".join(f"*PART\np{part}\n{part:10d}         1         1\n" for part in (7, 9, 11))
+    + "*NODE\n" + nodes()
+    + "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 3) + row(2, 9, 5, 6, 8, 7) + row(3, 11, 9, 10, 12, 11)
+)  # fmt: skip
+
+
+def wide(*ids: int) -> str:
+    return "".join(f"{one:10d}" for one in ids) + "\n"
+
+
+SET = "*SET_NODE_LIST\n" + wide(5) + wide(4, 5)
+JOINTS = {
+    "spotweld": "*CONSTRAINED_SPOTWELD\n" + wide(4, 5),
+    "spotweld of an id": "*CONSTRAINED_SPOTWELD_ID\n" + wide(99) + wide(4, 5),
+    "rivet": "*CONSTRAINED_RIVET\n" + wide(5, 1),
+    "nodal rigid body": SET + "*CONSTRAINED_NODAL_RIGID_BODY\n" + wide(1, 0, 5),
+    "generalized weld": SET + "*CONSTRAINED_GENERALIZED_WELD_SPOT\n" + wide(5, 0),
+    "extra nodes": "*CONSTRAINED_EXTRA_NODES_NODE\n" + wide(9, 2),
+    "extra nodes of a set": SET + "*CONSTRAINED_EXTRA_NODES_SET\n" + wide(9, 5),
+    "tied contact": "*CONTACT_TIED_SHELL_EDGE_TO_SURFACE\n" + wide(7, 9, 3, 3),
+    "tied contact of an id": "*CONTACT_TIED_NODES_TO_SURFACE_ID\n" + wide(1) + wide(7, 9, 3, 3),
+    "tied contact of nodes": SET + "*CONTACT_TIED_NODES_TO_SURFACE\n" + wide(5, 9, 4, 3),
+}
+
+
+def found(folder: Path, text: str) -> Inventory:
+    return inventory(folder, MESH + text + "*END\n")
+
+
+@pytest.mark.parametrize("form", JOINTS)
+def test_what_joins_two_parts_makes_one_body_of_them(tmp_path: Path, form: str) -> None:
+    read = found(tmp_path, JOINTS[form])
+    kind = form.partition(" of ")[0]
+    assert read.joined == {7: {9: {kind}}, 9: {7: {kind}}}
+    assert read.groups([7, 9, 11]) == ((7, 9), (11,))
+    assert read.neighbours == {7: frozenset(), 9: frozenset(), 11: frozenset()}
+    assert (read.ties, read.complete) == ((), True)
+
+
+def test_without_a_joint_each_is_a_body_and_a_joint_within_a_part_is_none(tmp_path: Path) -> None:
+    for text in ("", "*CONSTRAINED_SPOTWELD\n" + wide(1, 2), "*CONSTRAINED_SPOTWELD\n" + wide(4, 999)):
+        read = found(tmp_path, text)
+        assert read.groups([7, 9, 11]) == ((7,), (9,), (11,))
+        assert {part: dict(others) for part, others in read.joined.items() if others} == {}
+
+
+def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) -> None:
+    read = found(tmp_path, "*CONSTRAINED_SPOTWELD\n" + wide(4, 5) + wide(6, 9))
+    assert read.groups([7, 9, 11]) == ((7, 9, 11),)
+    assert read.groups([7, 11]) == ((7,), (11,))  # what stays deformable joins nothing
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("*CONTACT_TIED_NODES_TO_SURFACE\n" + wide(1, 2, 0, 0), "*CONTACT_TIED_NODES_TO_SURFACE"),
+        ("*CONTACT_SPOTWELD\n" + wide(1, 2, 2, 2), "*CONTACT_SPOTWELD"),
+        ("*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_TIEBREAK\n" + wide(1, 2, 2, 2), "TIEBREAK"),
+        ("*CONTACT_TIED_NODES_TO_SURFACE_MPP\n" + wide(0) + wide(7, 9, 3, 3), "MPP"),
+        ("*CONSTRAINED_NODAL_RIGID_BODY\n" + wide(1, 0, 77), "nodal rigid body"),  # of a set that is not there
+        ("*CONSTRAINED_SPR2\n" + wide(7, 9), "*CONSTRAINED_SPR2"),
+        ("*CONSTRAINED_INTERPOLATION\n" + wide(1, 2, 123456), "*CONSTRAINED_INTERPOLATION"),
+        ("*CONSTRAINED_BEAM_IN_SOLID_ID\n" + wide(1), "*CONSTRAINED_BEAM_IN_SOLID_ID"),
+        ("*CONSTRAINED_LINEAR_GLOBAL\n" + wide(1), "*CONSTRAINED_LINEAR_GLOBAL"),
+        ("*CONSTRAINED_TIE-BREAK\n" + wide(1, 2), "*CONSTRAINED_TIE-BREAK"),
+    ],
+)
+def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(tmp_path: Path, text: str, told: str) -> None:
+    read = found(tmp_path, text)
+    (tie,) = read.ties
+    assert told in tie
+    assert "main.k:" in tie
+    assert bodies_of(read, [7, 9]) == ()
+    assert bodies_of(read, [7]) == (RigidBody((7,)),)
+    assert read.complete  # of its cost all is known
+
+
+RADIOSS = "".join(
+    f"/PART/{n}\np{n}\n{rad.wide(1, 1)}/SHELL/{n}\n{rad.wide(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2, 3)
+)
+
+
+@pytest.mark.parametrize(
+    ("group", "surface", "joined"),
+    [
+        (f"/GRNOD/PART/5\ng\n{rad.wide(1)}", f"/SURF/PART/6\ns\n{rad.wide(2)}", {1: {2}, 2: {1}}),
+        (f"/GRNOD/NODE/5\ng\n{rad.wide(4, 3)}", f"/SURF/PART/EXT/6\ns\n{rad.wide(2)}", {1: {2}, 2: {1}}),
+        (f"/GRNOD/NODE/5\ng\n{rad.wide(4, 3)}", f"/SURF/PART/6\ns\n{rad.wide(2, 3)}", None),
+        (f"/GRNOD/BOX/5\ng\n{rad.wide(4)}", f"/SURF/PART/6\ns\n{rad.wide(2)}", None),
+    ],
+)  # fmt: skip
+def test_tied_interfaces_of_radioss(
+    tmp_path: Path, group: str, surface: str, joined: dict[int, set[int]] | None
+) -> None:
+    tie = f"/INTER/TYPE2/1\ntie\n{rad.wide(5, 6)}"
+    read = rad.inventory(tmp_path, rad.nodes(12) + RADIOSS + rad.PROPS + group + surface + tie)
+    assert len(read.ties) == (0 if joined else 1)
+    assert {part: {*others} for part, others in read.joined.items()} == (joined or {})
+    assert bool(bodies_of(read, [1, 2])) == bool(joined)
+
+
+@pytest.mark.parametrize("keyword", ["RBE2", "RBE3", "RLINK", "MPC"])
+def test_other_ties_of_radioss_leave_the_bodies_open(tmp_path: Path, keyword: str) -> None:
+    tie = f"/{keyword}/1\ntie\n{rad.wide(4, 0, 0, 5)}"
+    read = rad.inventory(tmp_path, rad.nodes(12) + RADIOSS + rad.PROPS + tie)
+    assert [one.split()[0] for one in read.ties] == [f"/{keyword}/1"]
+    assert bodies_of(read, [1, 2]) == ()
+    assert read.complete

@@ -1,0 +1,214 @@
+"""Gravity, supports and imposed motion of decks, and which parts they hold.
+
+The mesh is that of the made car: six parts that share nodes 1 to 12, in three rows along y, and two wheels of nodes 21
+to 26 and 31 to 36.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.choice.surroundings import in_deck
+from d2rpick.deck import read_inventory
+from d2rpick.deck.pieces import supports_of
+from d2rpick.histories.opening import open_run
+from d2rpick.histories.run import Run
+from tests import made_car
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from d2rpick.deck.model import Inventory
+    from d2rpick.histories.surroundings import Surroundings
+
+BODY, WHEEL, OTHER = set(made_car.BODY), {7, 8}, {7, 9}  # both wheels have hubs of one part
+
+
+def row(*numbers: object, width: int = 10) -> str:
+    return "".join(f"{number:>{width}}" for number in numbers) + "\n"
+
+
+def group(number: int, *nodes: int) -> str:
+    return f"/GRNOD/NODE/{number}\nnodes\n{row(*nodes)}"
+
+
+def bcs(code: str, group: int, skew: int = 0) -> str:
+    return f"/BCS/1\nheld\n   {code}{row(skew, group)}"
+
+
+def radioss(folder: Path, more: str) -> Inventory:
+    return read_inventory(made_car.starter(folder, more))
+
+
+def ls_dyna(folder: Path, more: str) -> Inventory:
+    return read_inventory(made_car.keywords(folder, more))
+
+
+def held(inventory: Inventory) -> tuple[set[int], bool]:
+    """Parts that are held, and whether the model is."""
+    by_part, whole = supports_of(inventory)
+    return set(by_part), bool(whole)
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        (group(1, 1) + bcs("111 000", 1), (BODY, True)),
+        (group(1, 1) + bcs("000 000", 1), (set(), False)),
+        (group(1, 1) + bcs("000 111", 1), (BODY, True)),  # shells have rotations
+        (group(1, 22) + bcs("111 111", 1), (WHEEL, True)),
+        (group(1, *range(31, 37)) + bcs("111 111", 1), (OTHER, False)),  # fixed all over: an obstacle
+        (group(1, *range(31, 37)) + bcs("110 111", 1), (set(), False)),  # no motion there, free along z
+        ("/GRNOD/PART/1\nparts\n" + row(9) + bcs("111 000", 1), (OTHER, True)),
+        (group(1, 1) + "/IMPVEL/1\nmoved\n" + row(1, "Y", 0, 0, 1), (BODY, True)),
+        ("/IMPDISP/FGEO/1\nmoved\n" + row(1, 0) + row(1.0, width=20) + row(21, 1.0) + row(22, 1.0), (WHEEL, True)),
+        (group(1, 99) + bcs("111 000", 1) + group(2, 1, 2) + "/RBODY/1\nbody\n" + row(99, 0, 0, 0, "", 0, 2),
+         (BODY, True)),
+    ],
+)  # fmt: skip
+def test_a_support_holds_what_hangs_together_with_its_nodes(
+    tmp_path: Path, more: str, expected: tuple[set[int], bool]
+) -> None:
+    assert held(radioss(tmp_path, more)) == expected
+
+
+@pytest.mark.parametrize(
+    ("nodes", "code", "expected"),
+    [
+        ((1, 2, 3, 4), "010 101", set()),
+        ((1, 2, 3), "010 101", BODY),  # not all nodes of the plane
+        ((5, 6, 7, 8), "010 000", BODY),  # the body lies on both sides
+        ((1, 2, 3, 4), "011 000", BODY),  # they lie at different heights, where gravity pulls
+        ((1, 2, 3, 4), "010 000", set()),
+    ],
+)
+def test_a_symmetry_plane_holds_nothing(tmp_path: Path, nodes: tuple[int, ...], code: str, expected: set[int]) -> None:
+    assert held(radioss(tmp_path, group(1, *nodes) + bcs(code, 1)))[0] == expected
+    assert held(radioss(tmp_path, group(1, *nodes) + bcs(code, 1, skew=3)))[0] == BODY  # its plane is not known
+
+
+def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sensor_is_asked(tmp_path: Path) -> None:
+    for sensor, times in ((0, (0.01, 0.05)), (4, (0.0, inf))):
+        moved = "/IMPVEL/1\nmoved\n" + row(1, "X", 0, sensor, 1) + row(0, 1, 0.01, 0.05, width=20)
+        (one,) = radioss(tmp_path, group(1, 1) + moved).boundary.holds
+        assert (one.start, one.end) == times
+    assert "/IMPVEL/1" in one.name
+    assert "MADE_0000.rad:" in one.name
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ("*BOUNDARY_SPC_NODE\n" + row(1, 0, 1, 1, 1), BODY),
+        ("*BOUNDARY_SPC_NODE\n" + row(1, 0, 0, 0, 0), set()),
+        ("*BOUNDARY_SPC_SET_ID\n" + row(5) + row(4, 0, 1, 1, 1) + "*SET_NODE_LIST\n" + row(4) + row(21, 22), WHEEL),
+        ("*BOUNDARY_SPC_SYMMETRY_PLANE\n" + row(1), set()),
+        ("*CONSTRAINED_GLOBAL\n" + row(7, 7, 2, 0.0, 1.6, 0.0), BODY),
+        ("*CONSTRAINED_GLOBAL\n" + row(2, 0, 2, 0.0, 1.6, 0.0), set()),  # a symmetry plane
+        ("*NODE\n" + f"{99:8d}" + row(0, 0, 0, width=16).rstrip() + row(7, 7, width=8) + "*CONSTRAINED_SPOTWELD\n"
+         + row(99, 1), BODY),
+        ("*PART\ntool\n" + row(10, 1, 2) + "*MAT_RIGID\n" + row(2, 7800.0, 2.1e11, 0.3) + row(1.0, 7, 7)
+         + "*ELEMENT_SHELL\n" + row(99, 10, 1, 2, 6, 5, width=8), BODY | {10}),
+        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n" + row(9, 1, 2, 1, 1.0), OTHER),
+        ("*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + row(1, 9, 2, 1, 1.0) + row(1, 1) + row(21, 1, 2, 1, 1.0), BODY | WHEEL),
+    ],
+)  # fmt: skip
+def test_supports_of_ls_dyna(tmp_path: Path, more: str, expected: set[int]) -> None:
+    assert held(ls_dyna(tmp_path, more))[0] == expected
+
+
+def test_birth_and_death(tmp_path: Path) -> None:
+    motion = "*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + row(1, 1, 2, 1, 1.0, 0, 0.05, 0.01)
+    spc = "*BOUNDARY_SPC_NODE_BIRTH_DEATH\n" + row(1, 0, 1, 1, 1) + row(0.0, 0.02)
+    found = ls_dyna(tmp_path, motion + spc).boundary.holds
+    assert {(one.start, one.end) for one in found} == {(0.01, 0.05), (0.0, 0.02)}
+
+
+def test_what_is_not_followed_is_told(tmp_path: Path) -> None:
+    found = radioss(tmp_path, "/GRNOD/BOX/1\nnodes\n" + row(1) + bcs("111 000", 1)).boundary
+    assert not found.holds
+    assert "/BCS/1" in found.notes[0]
+    found = ls_dyna(tmp_path, "*BOUNDARY_SPC_SET\n" + row(77, 0, 1, 1, 1) + "*LOAD_BODY_RX\n" + row(1, 1.0)).boundary
+    assert [note.split(" ")[0] for note in found.notes] == ["*BOUNDARY_SPC_SET", "*LOAD_BODY_RX"]
+    assert found.gravity is None
+    (tmp_path / "MADE_0001.rad").write_text("/RUN/MADE/1\n0.1\n/BCSR/TRA/X/1\n1\n")
+    found = radioss(tmp_path, group(1, 1) + bcs("111 000", 1)).boundary
+    assert not found.holds
+    assert "/BCSR" in found.notes[0]
+
+
+def grav(function: int, scale: float, *, sensor: int = 0, group: int = 0, axis: str = "Z") -> str:
+    return f"/GRAV/2\nmore\n{row(function, axis, 0, sensor, group or '')[:-1]:80}{scale:20g}\n"
+
+
+def told(inventory: Inventory) -> Surroundings:
+    """What a deck tells of a run of nothing."""
+    return in_deck(Run((), ()), inventory).surroundings
+
+
+RAMP = "/FUNCT/1\nramp\n" + "".join(row(*point, width=20) for point in ((0, 0), (1, 0), (2, 1), (3, 1)))
+
+
+@pytest.mark.parametrize(
+    ("more", "body", "wheel", "whole"),
+    [
+        ("", (9.81,), (9.81,), (9.81,)),
+        (grav(0, 3.0, axis="X"), ((9.81**2 + 9) ** 0.5,), ((9.81**2 + 9) ** 0.5,), ((9.81**2 + 9) ** 0.5,)),
+        (grav(5, 1.0), None, None, None),  # no such function
+    ],
+)
+def test_gravity_by_part(
+    tmp_path: Path, more: str, body: tuple[float, ...], wheel: tuple[float, ...], whole: tuple[float, ...]
+) -> None:
+    found = told(radioss(tmp_path, more)).gravity
+    for part, expected in ((1, body), (8, wheel), (None, whole)):
+        assert found.get(part) == (pytest.approx(expected) if expected else None)
+
+
+@pytest.mark.parametrize(
+    ("card", "expected"),
+    [
+        (RAMP + grav(1, -1.62), (0.0, 1.62)),
+        (grav(0, -1.62, sensor=3), (0.0, 1.62)),
+        (RAMP.replace(row(1, 0, width=20), "").replace(row(3, 1, width=20), "") + grav(1, 1.0), None),
+        ("", (0.0,)),
+    ],
+)
+def test_values_that_gravity_keeps(tmp_path: Path, card: str, expected: tuple[float, ...] | None) -> None:
+    name = made_car.starter(tmp_path, card)
+    text = (tmp_path / "MADE_0000.rad").read_text()
+    (tmp_path / "MADE_0000.rad").write_text(text.partition("/GRAV/1\n")[0] + card + "/END\n")
+    assert told(read_inventory(name)).gravity.get(1) == expected
+
+
+def test_gravity_on_a_group_of_nodes_is_that_of_the_parts_that_lie_in_it(tmp_path: Path) -> None:
+    name = made_car.starter(tmp_path)
+    text = (tmp_path / "MADE_0000.rad").read_text().partition("/GRAV/1\n")[0]
+    (tmp_path / "MADE_0000.rad").write_text(text + group(1, *range(21, 25)) + grav(0, -9.81, group=1) + "/END\n")
+    found = told(read_inventory(name)).gravity
+    assert (found[1], found.get(7)) == ((0.0,), None)  # hubs: some of their nodes
+
+
+@pytest.mark.parametrize(
+    ("cards", "expected"),
+    [
+        ("", (9.81,)),
+        ("*SET_PART_LIST\n" + row(5) + row(1, 2) + "*LOAD_BODY_PARTS\n" + row(5), (0.0,)),
+        ("*LOAD_BODY_VECTOR\n" + row(1, 1.0), None),
+    ],
+)
+def test_body_loads_of_ls_dyna(tmp_path: Path, cards: str, expected: tuple[float, ...] | None) -> None:
+    found = told(ls_dyna(tmp_path, cards)).gravity
+    assert found.get(8) == expected
+    assert (found.get(1) == (9.81,)) is (expected is not None)
+
+
+def test_the_deck_of_another_model_tells_nothing(tmp_path: Path) -> None:
+    history = made_car.t01(tmp_path, 3.0)
+    deck = made_car.starter(tmp_path, group(1, 1) + bcs("111 000", 1))
+    assert in_deck(open_run([history]), read_inventory(deck)).surroundings.supports[1]
+    other = read_inventory("sample_data/rollover_box.k")
+    assert not in_deck(open_run([history]), other).surroundings.supports

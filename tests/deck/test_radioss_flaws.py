@@ -1,0 +1,196 @@
+"""What becomes of the nodes of rigid bodies, held against numbers that OpenRadioss (bd4557ba7) gave for these decks.
+
+The decks are the strip of four shells of `tests.deck.test_openradioss`: nodes 1 to 10, 0.1 apart, and main node 99.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.deck import read_inventory
+from d2rpick.deck.radioss_flaws import flaws_of
+from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw, read_run
+from tests.deck.test_openradioss import MAIN, row, starter
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+WIDE = 20
+OFF, ON = f"/RBODY/OFF\n{MAIN}\n", f"/RBODY/ON\n{MAIN}\n"
+ALL = f"/GRNOD/NODE/7\nall\n{row(*range(1, 11))}{row(MAIN)}"
+SENSOR = f"/SENSOR/TIME/5\nclock\n{row(0.001, 0.002, width=WIDE)}"
+
+
+def flaws(folder: Path, more: str = "", *legs: str, deck: str = "") -> tuple[Flaw, ...]:
+    """Flaws of the strip with more cards in its starter deck; ``legs`` are the lines of each below /RUN."""
+    (folder / "strip_0000.rad").write_text((deck or starter()).replace("/TH/PART/1", f"{more}/TH/PART/1"))
+    for number, text in enumerate(legs or (OFF,), start=1):
+        (folder / f"strip_{number:04d}.rad").write_text(f"/RUN/strip/{number}\n{number / 1000}\n{text}")
+    return flaws_of(read_run(str(folder / "strip_0000.rad")), {MAIN})
+
+
+def codes(found: tuple[Flaw, ...]) -> list[str]:
+    return [flaw.code for flaw in found]
+
+
+def wall(kind: str, reach: float, *points: tuple[float, ...], diameter: float = 0.0, fields: str = "") -> str:
+    sizes = row(reach, 0.0, diameter, 0.0, width=WIDE)[:-1] + row(0)
+    return f"/RWALL/{kind}\nwall\n{fields or row(0, 0, 0, 0)}{sizes}" + "".join(row(*one, width=WIDE) for one in points)
+
+
+@pytest.mark.parametrize(
+    ("text", "taken"),
+    [
+        (wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
+        (wall("PLANE/1", 0.15, (0.35, 0, 0), (0, 0, 0)), 4),
+        (wall("PLANE/1", 0.05, (0, 0, 0), (0, 1, 0), fields=row(0, 0, 0, 2)), 4),
+        (wall("CYL/1", 0.15, (0.2, 0.05, 0), (0.2, 0.05, 1), diameter=0.05), 6),
+        (wall("CYL/1", 0.1, (-0.1, 0, 0), (1, 0, 0), diameter=0.02), 5),
+        (wall("SPHER/1", 0.2, (0, 0, 0), diameter=0.1), 5),
+        (wall("PARAL/1", 0.1, (0.15, 0, -1), (0.15, 1, -1), (0.15, 0, 1)), 2),
+        (wall("PARAL/1", 0.1, (0.15, 0, -1), (0.15, 0, 1), (0.15, 1, -1), fields=row(0, 0, 2, 0)), 4),
+        (wall("PLANE/1", 0.25, (1, 0, 0, 0), (1, 0.05, 0.01), fields=row(MAIN, 0, 0, 0)), 6),
+        (wall("LAGMUL/PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
+        ("/GRNOD/PART/77\nall\n" + row(1) + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=row(0, 0, 77, 0)), 10),
+        (wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0), fields=row(0, 0, 0, 0, 1)), 4),  # Iform is none before 2026
+    ],
+    ids=lambda text: text.split("\n", 1)[0] if isinstance(text, str) else "",
+)
+def test_as_many_nodes_are_taken_from_a_wall_as_the_starter_reports(tmp_path: Path, text: str, taken: int) -> None:
+    (found,) = flaws(tmp_path, text)
+    assert found.code == THROUGH_WALL
+    assert f"takes {taken} of" in found.message
+    assert found.place.file.endswith("strip_0000.rad")
+
+
+GROUND = wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0))
+
+
+def with_ikrem(deck: str, value: int = 1) -> str:
+    return deck.replace(row(1, 0, 0, 0), row(1, value, 0, 0))
+
+
+def test_a_wall_keeps_nodes_by_the_ikrem_of_the_body_and_of_that_with_the_highest_id(tmp_path: Path) -> None:
+    other = "/NODE\n" + row(98)[:-1] + row(0.2, 0.05, 0.05, width=WIDE) + "/RBODY/{}\nother\n" + row(98)
+    assert codes(flaws(tmp_path, GROUND)) == [THROUGH_WALL]
+    assert flaws(tmp_path, GROUND, deck=with_ikrem(starter())) == ()
+    higher, lower = other.format(2), other.format(2)
+    assert codes(flaws(tmp_path, GROUND + higher, deck=with_ikrem(starter()))) == [THROUGH_WALL]
+    deck = with_ikrem(starter()).replace("/RBODY/1", "/RBODY/3")
+    assert flaws(tmp_path, GROUND + lower, deck=deck) == ()
+
+
+def test_a_wall_keeps_the_nodes_of_a_body_with_a_sensor(tmp_path: Path) -> None:
+    deck = starter().replace(row(MAIN, 0, 0, 0)[:-1], row(MAIN, 5, 0, 0)[:-1])
+    assert flaws(tmp_path, SENSOR + GROUND, deck=deck) == ()
+
+
+def test_a_wall_with_the_penalty_formulation_keeps_its_nodes(tmp_path: Path) -> None:
+    deck = starter().replace(row(2022, 0), row(2026, 0))
+    assert flaws(tmp_path, GROUND.replace(row(0, 0, 0, 0), row(0, 0, 0, 0, 1)), deck=deck) == ()
+    assert codes(flaws(tmp_path, GROUND, deck=deck)) == [THROUGH_WALL]
+
+
+def velocity(group: int, kind: str = "TRA") -> str:
+    return f"/INIVEL/{kind}/1\nthrown\n{row(10.0, 0.0, 0.0, width=WIDE)[:-1]}{row(group, 0)}"
+
+
+def spin(group: int) -> str:
+    return f"/INIVEL/AXIS/1\nspin\n{row('Z', 0, group)}{row(10.0, 0.0, 0.0, 0.0, width=WIDE)}"
+
+
+LISTED = "/INIVEL/NODE/1\nlist\n" + "".join(
+    f"{row(node, 0)[:-1]}{row(10.0, 0.0, 0.0, width=WIDE)}\n" for node in range(1, 11)
+)
+MAINS = f"/GRNOD/NODE/98\nmain\n{row(MAIN)}"
+
+
+@pytest.mark.parametrize(
+    ("text", "moves"),  # whether the kinetic energy at the start was above 0 in OpenRadioss
+    [
+        (velocity(1), False), (velocity(7) + ALL, True), (velocity(98) + MAINS, True), (velocity(2), False),
+        (spin(1), False), (spin(7) + ALL, True), (LISTED, False), (velocity(1, "T+G"), False),
+        (velocity(1) + velocity(98) + MAINS, True),
+    ],
+)  # fmt: skip
+def test_a_body_that_the_starter_lets_rest_is_found(tmp_path: Path, text: str, moves: bool) -> None:
+    for legs in ((OFF, ON), (ON, OFF)):
+        assert codes(flaws(tmp_path, text, *legs)) == ([] if moves else [AT_REST])
+
+
+def test_a_velocity_that_comes_later_or_is_none_lets_no_body_rest(tmp_path: Path) -> None:
+    assert flaws(tmp_path, velocity(1) + row(0.0005, width=WIDE)) == ()
+    assert flaws(tmp_path, velocity(1) + row("", "", 5)) == ()
+    assert flaws(tmp_path, velocity(1).replace("10.0", " 0.0")) == ()
+    assert flaws(tmp_path, "/INIVEL/FVM/1\nfluid\n" + row(10.0, 0.0, 0.0, width=WIDE)) == ()
+
+
+def start(*nodes: int, type_: int = 1) -> str:
+    return f"/INIV/TRA/X/{type_}\n10.0\n{' '.join(map(str, nodes))}\n"
+
+
+CAP = "/DTIX\n1e-5 1e-5\n"
+
+
+@pytest.mark.parametrize(
+    ("legs", "moves"),  # as above, in the leg of the /INIV
+    [
+        ((ON + CAP + start(MAIN, MAIN), OFF), True), ((ON + CAP + start(1, 10), OFF), False),
+        ((ON + CAP + start(1, MAIN), OFF), True), ((CAP + start(1, 10), OFF), False),
+        ((OFF, ON + CAP + start(1, 10)), False), ((OFF + start(1, 10), ON), True),
+        ((ON + CAP + start(2, type_=2), OFF), False), ((ON + CAP + start(7, type_=2), OFF), True),
+        ((ON + CAP + start(1, 2, 3, type_=0), OFF), False), ((ON + CAP + start(1, MAIN, type_=0), OFF), True),
+        ((ON + CAP + "/INIV/AXIS/Z/1\n0\n0 0 0 10.0\n1 10\n", OFF), False),
+    ],
+)  # fmt: skip
+def test_a_body_that_an_engine_file_lets_rest_is_found(tmp_path: Path, legs: tuple[str, ...], moves: bool) -> None:
+    assert codes(flaws(tmp_path, ALL, *legs)) == ([] if moves else [AT_REST])
+
+
+def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(tmp_path: Path) -> None:
+    """Of a body that is off its nodes are moved, whatever velocity the starter gave them."""
+    assert flaws(tmp_path, velocity(1), OFF + start(1, 10)) == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "legs"),
+    [
+        ("/GRNOD/BOX/8\nbox\n" + row(1) + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=row(0, 0, 8, 0)), ()),
+        (GROUND.replace(row(0, 0, 0, 0), row(0, 0, 0, 8)), ()),
+        ("/TRANSFORM/TRA/1\n" + GROUND, ()),
+        (wall("CONE/1", 0.1, (0, 0, 0), (1, 0, 0)), ()),
+        (wall("PLANE/1", 0.1, (0, 0, 0), (0, 0, 0)), ()),
+        (wall("PLANE/1", 0.1, (0, 0, 0), (1, 0, 0), fields=row(97, 0, 0, 0)), ()),
+        (velocity(8), ()),
+        ("", (ON + CAP + start(8, type_=2), OFF)),
+        ("//SUBMODEL/1\nmoved\n" + velocity(1), ()),
+        (f"/PART/3\nfluid\n{row(1, 1)}/SPHCEL/3\n{row(1, 1)}/GRNOD/PART/8\nfluid\n{row(3)}{velocity(8)}", ()),
+    ],
+)
+def test_what_cannot_be_resolved_is_said_and_not_judged(tmp_path: Path, text: str, legs: tuple[str, ...]) -> None:
+    assert set(codes(flaws(tmp_path, text, *legs))) == {NOT_FOLLOWED}
+
+
+def test_a_body_whose_nodes_are_not_known_is_said(tmp_path: Path) -> None:
+    deck = starter().replace("/GRNOD/NODE/1\n", "/GRNOD/BOX/1\n")
+    (found,) = flaws(tmp_path, velocity(7) + ALL, deck=deck)
+    assert found.code == NOT_FOLLOWED
+    assert found.message.startswith("the nodes of group 1 of /RBODY 1 are not known")
+
+
+def test_no_body_rests_for_certain_where_an_include_is_missing(tmp_path: Path) -> None:
+    assert flaws(tmp_path, velocity(1) + "#include velocities.inc\n") == ()
+
+
+def test_the_inventory_has_the_flaws_and_what_the_run_keeps_off(tmp_path: Path) -> None:
+    flaws(tmp_path, velocity(1) + GROUND, OFF)
+    found = read_inventory(str(tmp_path / "strip_0000.rad"))
+    assert codes(found.flaws) == [THROUGH_WALL, AT_REST]
+    assert found.kept_off == (MAIN,)
+    flaws(tmp_path, velocity(1), OFF, ON)
+    assert read_inventory(str(tmp_path / "strip_0000.rad")).kept_off == ()
+    for name in ("strip_0001.rad", "strip_0002.rad"):
+        (tmp_path / name).unlink()
+    assert codes(read_inventory(str(tmp_path / "strip_0000.rad")).flaws) == [AT_REST]  # any body may be switched

@@ -1,0 +1,233 @@
+"""Radioss runs: which files belong together, and when which part is rigid."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.deck.radioss_run import find_run_windows, read_run, recognises, run_files
+from d2rpick.errors import DeckError
+from d2rpick.rules import RULES, check_deck
+from tests.computed import stored
+from tests.decks import write
+
+EXAMPLE = RULES["D2R401"].passing[0]
+GROUP = "/GRNOD/PART/7\nbox\n         1\n"
+BODY = "      1808         0         0         0                   0         7\n"
+Spans = list[tuple[int, str, float, float | None]]
+
+
+def place(folder: Path, starter: str = EXAMPLE.deck, legs: tuple[tuple[str, str], ...] | None = None) -> str:
+    """Write a run; ``legs`` are the end of each and its further lines."""
+    if legs is None:
+        return write(folder, starter, EXAMPLE.files, EXAMPLE.name)
+    files = {f"box_{n:04d}.rad": f"/RUN/box/{n}\n{stop}\n{more}" for n, (stop, more) in enumerate(legs, start=1)}
+    return write(folder, starter, files, EXAMPLE.name)
+
+
+def spans(path: str) -> Spans:
+    found = find_run_windows(read_run(path)).windows.windows
+    return [(window.unit.id, window.unit.kind, window.tr, window.td) for window in found]
+
+
+SHELLS = "/SHELL/2\n" + "".join(f"{n:10d}" for n in (2, 3, 4, 5, 6)) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("group", "part"),
+    [
+        (GROUP, 1),
+        ("/GRNOD/GRNOD/7\nbox\n         8\n/GRNOD/PART/8\nbox\n         1\n", 1),
+        ("/GRNOD/SUBSET/7\nbox\n         9\n/SUBSET/9\nall\n         3\n/SUBSET/3\nbox\n", 4),
+        ("/GRNOD/NODE/7\nbox\n# nodes of part 1\n         1         2         3         4         5\n", 1),
+    ],
+)
+def test_the_parts_of_a_body_are_those_that_lie_whole_in_its_group(tmp_path: Path, group: str, part: int) -> None:
+    subset = "/PART/4\nin a subset\n         1         1         3\n"
+    starter = EXAMPLE.deck.replace(GROUP, SHELLS + subset + group)
+    assert spans(place(tmp_path, starter)) == [(part, "part", 0.02, 0.09)]
+
+
+@pytest.mark.parametrize("group", ["/GRNOD/BOX/7\nbox\n         1\n", "/GRNOD/NODE/7\nbox\n         1         2\n", ""])
+def test_a_body_whose_parts_are_not_known_is_named_by_its_main_node(tmp_path: Path, group: str) -> None:
+    starter = EXAMPLE.deck.replace(GROUP, group)
+    assert spans(place(tmp_path, starter)) == [(1808, "main node", 0.02, 0.09)]
+
+
+ON, OFF = "/RBODY/ON\n1808\n", "/RBODY/OFF\n1808\n"
+
+
+@pytest.mark.parametrize(
+    ("legs", "expected"),
+    [
+        ((("0.2", ""),), []),
+        ((("0.2", OFF),), []),
+        ((("0.2", ON),), [(0.0, None)]),
+        ((("0.05", ON), ("0.2", OFF)), [(0.0, 0.05)]),
+        ((("0.05", ""), ("0.2", OFF)), [(0.0, 0.05)]),
+        ((("0.02", OFF), ("0.09", ON), ("0.2", "")), [(0.02, None)]),
+        ((("0.02", OFF), ("0.05", ON), ("0.09", ON), ("0.2", OFF)), [(0.02, 0.09)]),
+        ((("0.02", OFF), ("0.05", ON), ("0.09", OFF), ("0.1", ON), ("0.2", OFF)), [(0.02, 0.05), (0.09, 0.1)]),
+        ((("0.09", OFF), ("0.05", ON), ("0.2", OFF)), []),
+    ],
+)
+def test_windows_follow_the_legs(
+    tmp_path: Path, legs: tuple[tuple[str, str], ...], expected: list[tuple[float, float | None]]
+) -> None:
+    assert spans(place(tmp_path, legs=legs)) == [(1, "part", tr, td) for tr, td in expected]
+
+
+@pytest.mark.parametrize(
+    ("sensor", "expected"),
+    [
+        ("/SENSOR/TIME/5\nlate\n                0.05\n", [(0.0, 0.05)]),
+        ("/SENSOR/TIME/5\nonce\n                0.05                0.09\n", [(0.0, 0.05), (0.09, None)]),
+        ("/SENSOR/DIST/5\nnear\n         1         2\n", []),
+    ],
+)
+def test_a_time_sensor_releases_a_body(tmp_path: Path, sensor: str, expected: list[tuple[float, float | None]]) -> None:
+    starter = EXAMPLE.deck.replace(BODY, BODY.replace("         0", "         5", 1)).replace("/END", f"{sensor}/END")
+    path = place(tmp_path, starter, (("0.2", ""),))
+    assert spans(path) == [(1, "part", tr, td) for tr, td in expected]
+    found = {finding.rule for finding in check_deck(path).findings}
+    assert found == ({"D2R104"} if len(expected) == 2 else set() if expected else {"D2R302"})
+
+
+SOLID = "/PROP/SOLID/1\nsolid\n" + "".join(f"{n:10d}" for n in (1, 0, 0, 0, 0, 0, 0, 0)) + "\n"
+
+
+BRICK = "/BRICK/1\n" + "".join(f"{n:10d}" for n in (9, 1, 2, 3, 4, 5, 6, 7, 8)) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "found"),
+    [
+        (SOLID + BRICK, True),
+        (SOLID.replace("         1", "        12", 1) + BRICK, True),
+        (SOLID.replace("         1", "        17", 1) + BRICK, False),
+        (SOLID.replace("         0\n", "         2\n") + BRICK, False),
+        (SOLID.replace("SOLID", "TYPE6") + BRICK, True),
+        (f"/PROP/SOLID/1\n\n\n{BRICK}", True),  # Isolid 1 is the default
+        (f"/DEF_SOLID\n        24\n/PROP/SOLID/1\nsolid\n\n{BRICK}", False),
+        (f"{SOLID}{BRICK}/DEF_SOLID\n{'':70}         2\n/DEF_SOLID\n         1\n", False),  # the first one counts
+        (SOLID + BRICK.replace("BRICK", "PENTA6"), False),
+        (f"/PROP/TYPE20/1\nthick shell\n\n{BRICK}", False),  # HA8 is its default
+        ("/TETRA4/1\n         9         1         2         3         4\n", True),
+    ],
+)
+def test_stresses_of_solids_without_a_frame_do_not_turn(tmp_path: Path, more: str, found: bool) -> None:
+    path = place(tmp_path, EXAMPLE.deck.replace("/END", f"{more}/END"))
+    assert {finding.rule for finding in check_deck(path).findings} == ({"D2R116"} if found else set())
+    start = place(
+        tmp_path, EXAMPLE.deck.replace("/END", f"{more}/END"), (("0.09", f"{ON}/DTIX\n1e-6 1e-6\n"), ("0.2", OFF))
+    )
+    (tmp_path / "box_0003.rad").unlink()
+    assert check_deck(start).findings == ()  # without stress there is nothing to turn
+
+
+def test_files_of_a_run_are_found_by_name_or_by_what_they_hold(tmp_path: Path) -> None:
+    path = place(tmp_path)
+    files = [str(tmp_path / f"box_000{n}.rad") for n in range(4)]
+    assert run_files(path) == run_files(files[2]) == files
+    other = tmp_path / "starter.rad"
+    other.write_text(EXAMPLE.deck)
+    (tmp_path / "box_0000.rad").unlink()
+    assert run_files(str(other)) == [str(other), *files[1:]]
+    assert run_files(str(tmp_path)) == run_files("absent") == run_files("\0") == []
+
+
+@pytest.mark.parametrize("cut", range(1, 30))
+def test_an_engine_file_that_ends_within_a_line_seems_to_be_cut(tmp_path: Path, cut: int) -> None:
+    path, engine = place(tmp_path), tmp_path / "box_0002.rad"
+    text = engine.read_text()[:-cut]
+    engine.write_text(text)
+    found = [finding.file for finding in check_deck(path).findings if finding.rule == "D2R011"]
+    assert found == ([] if text.endswith("\n") else [str(engine)])
+    engine.write_text(f"{text}\n/END")
+    assert "D2R011" not in {finding.rule for finding in check_deck(path).findings}
+
+
+def test_an_include_that_is_asked_for_twice_is_read_once(tmp_path: Path) -> None:
+    head = EXAMPLE.deck.split("/PART")[0]
+    (tmp_path / "inner.inc").write_text("#\n")
+    _, *inner = read_run(place(tmp_path, f"{head}#include inner.inc\n#include inner.inc\n/END\n")).deck.sources[:3]
+    assert [Path(one.name).name for one in inner] == ["inner.inc", "inner.inc"]
+    assert inner[0] is inner[1]  # both are of one state
+
+
+def test_an_include_of_the_starter_deck_is_read(tmp_path: Path) -> None:
+    head, body, tail = EXAMPLE.deck.partition("/RBODY")
+    path = place(tmp_path, f"{head}#include inner.inc\n/END\n")
+    assert {finding.rule for finding in check_deck(path).findings} == {"D2R003"}
+    (tmp_path / "inner.inc").write_text(body + tail)
+    assert spans(path) == [(1, "part", 0.02, 0.09)]
+    assert check_deck(path).findings == ()
+    (tmp_path / "inner.inc").write_text("#include inner.inc\n")
+    assert {finding.rule for finding in check_deck(path).findings} == {"D2R003"}
+
+
+def test_ids_of_a_submodel_are_not_followed(tmp_path: Path) -> None:
+    path = place(
+        tmp_path, EXAMPLE.deck.replace("/RBODY", "//SUBMODEL/1\nmoved\n      1000\n/RBODY").replace("1808", " 808")
+    )
+    assert spans(path) == [(1808, "main node", 0.02, 0.09)]
+    assert check_deck(path).findings == ()
+
+
+def test_a_run_that_switches_nobody_may_have_any_legs(tmp_path: Path) -> None:
+    files = {"box_0001.rad": "/RUN/box\n1.0\n/VERS/44\n", "box_0003.rad": "/RUN/other/3\n0.5\n/VERS/2022\n"}
+    assert check_deck(write(tmp_path, EXAMPLE.deck, files, EXAMPLE.name)).findings == ()
+
+
+def test_a_comment_silences_a_rule(tmp_path: Path) -> None:
+    legs = (("0.02", ""), ("0.09", f"/DTIX\n1e-6 1e-5\n{ON}"), ("0.2", OFF))
+    assert {one.rule for one in check_deck(place(tmp_path, legs=legs)).findings} == {"D2R403", "D2R404"}
+    legs = (legs[0], ("0.09", f"/DTIX\n1e-6 1e-5\n# d2rpick: ignore D2R403\n{ON}"), legs[2])
+    assert {one.rule for one in check_deck(place(tmp_path, legs=legs)).findings} == {"D2R404"}
+
+
+def test_a_run_cut_anywhere_is_checked_or_refused() -> None:
+    legs = "".join(EXAMPLE.files.values())
+    for text in (EXAMPLE.deck, legs):
+        for cut in range(len(text)):
+            try:
+                checked = check_deck("run.rad", content=text[:cut].encode())
+            except DeckError:
+                continue
+            for window in checked.windows:
+                assert window.tr in {0.0, 0.02}
+
+
+FIELDS = b"".join(b"%20d" % n for n in (1, 2, 3)) + b"\n"
+BEHIND = [
+    *(
+        b"/BEGIN\n",
+        b"/RUN/x/1\n",
+        b"/RBODY/ON\n",
+        b"/PART/\xb2\n",
+        b"/INIV/TRA/X/1\n",
+        b"/INIV\n",
+        b"/INIVEL/TRA/1\nv\n",
+    ),
+    *(b"/INIVEL\n", b"/INIVEL/AXIS/1\nv\n", b"/INIVEL/NODE/1\nv\n", b"/RWALL/CYL/1\nw\n", b"/RWALL\nw\n\n" + FIELDS),
+    b"/NODE\n         1" + FIELDS + b"/RWALL/PLANE/1\nw\n\n" + FIELDS + FIELDS,
+]
+
+
+@given(st.binary(max_size=300), st.sampled_from(BEHIND))
+def test_garbage_behind_a_keyword_is_no_crash(garbage: bytes, keyword: bytes) -> None:
+    legs = b"/RUN/x/1\n 1.0\n/RBODY/OFF\n1808\n"
+    content = b"/BEGIN\n" + EXAMPLE.deck.encode().replace(b"/END\n", b"") + legs + keyword + garbage
+    assert recognises(content)
+    check_deck("run.rad", content=content)
+
+
+@pytest.mark.parametrize(("name", "nodes"), [("CAR_all", [1808]), ("CAR_heavy", range(1808, 1814))])
+def test_legs_that_were_computed(name: str, nodes: list[int]) -> None:
+    checked = check_deck(stored(f"{name}_0001.rad"))
+    assert checked.findings == ()
+    found = [(window.unit.id, window.tr, window.td) for window in checked.windows]
+    assert found == [(node, 0.0496, 0.1464) for node in nodes]

@@ -1,0 +1,148 @@
+"""Where keywords stand: found alike in memory and on a disk, in pieces of any size, by any number of threads."""
+
+from __future__ import annotations
+
+import builtins
+import errno
+import io
+import os
+import re
+import time
+from contextlib import contextmanager
+from threading import Event, current_thread, main_thread
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.deck.source import SourceFile, find_marks
+from d2rpick.deck.stored import Held, OnDisk
+from d2rpick.errors import DeckError
+from d2rpick.file_state import FileState
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from d2rpick.deck.stored import Filling
+
+HEAD = b"-----BEGIN PGP MESSAGE"
+MARK = b"\xef\xbb\xbf"
+FRAGMENTS = [
+    *(b"*", b" *", b"*END", b"*NODE\n", b"\n", b"\r\n", b"\n*", b" " * 20, b" " * 31 + b"*", b" " * 32 + b"*"),
+    *(HEAD, b"\n" + HEAD, HEAD[:9], HEAD[9:], b"G", b"$", MARK, b"1.5", b"-", b"x" * 70),
+]
+FILES = st.lists(st.sampled_from(FRAGMENTS), max_size=40).map(b"".join)
+
+
+def line_by_line(data: bytes) -> Iterator[int]:
+    """Offsets as a look at every line finds them."""
+    start = len(MARK) if data.startswith(MARK) else 0
+    for line in data[start:].splitlines(keepends=True) if b"\r" not in data else re.split(rb"(?<=\n)", data[start:]):
+        if found := re.match(rb" {0,31}\*|" + HEAD, line):
+            yield start + (found.end() - 1 if found[0].endswith(b"*") else 0)
+        start += len(line)
+
+
+def on_disk(file: Path, window: int = 64) -> OnDisk:
+    """A file that stays on its disk, and is read in small pieces."""
+    with file.open("rb", buffering=0) as opened:
+        return OnDisk(str(file), FileState.of(opened), window)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("marks") / "deck.k"
+
+
+@given(FILES, st.integers(1, 90), st.integers(0, 3), st.integers(1, 80))
+def test_pieces_and_threads_find_what_a_look_at_every_line_finds(
+    file: Path, data: bytes, piece: int, helpers: int, window: int
+) -> None:
+    file.write_bytes(data)
+    expected = [*line_by_line(data)]
+    assert [*find_marks(Held(data))] == expected
+    blocks = [(one.start, one.end, one.head, one.line, [*one.lines()]) for one in SourceFile("held", data).blocks()]
+    there = on_disk(file, window)
+    for content in (there, Held(data)):
+        assert [*find_marks(content, piece, alone=0, helpers=helpers)] == expected
+    source = SourceFile(str(file), there, piece)
+    assert [*source.marks] == expected
+    assert [(one.start, one.end, one.head, one.line, [*one.lines()]) for one in source.blocks()] == blocks
+
+
+@given(FILES, st.integers(1, 40), st.integers(0, 90), st.none() | st.integers(0, 120))
+def test_pieces_are_whole_lines(file: Path, data: bytes, size: int, start: int, end: int | None) -> None:
+    file.write_bytes(data)
+    pieces = [*SourceFile(str(file), on_disk(file, 2 * size), size).pieces(start, end)]
+    assert b"".join(pieces) == data[start:end]
+    assert all(piece.endswith(b"\n") for piece in pieces[:-1])
+    assert all(pieces)
+
+
+class Sparing(io.FileIO):
+    """A file that gives three bytes at a time."""
+
+    def readinto(self, room: memoryview, /) -> int:  # type: ignore[override]
+        return super().readinto(room[:3])
+
+
+def test_a_call_of_the_system_that_gives_less_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "deck.k"
+    path.write_bytes(b"0123456789")
+    there = on_disk(path, window=1)
+    monkeypatch.delattr("os.preadv", raising=False)  # not every system has it
+    monkeypatch.setattr(builtins, "open", lambda name, mode, **_: Sparing(name, mode))
+    assert there.read(1, 9) == b"12345678"
+    os.truncate(path, 6)
+    with pytest.raises(DeckError, match="rewritten"):
+        there.read(1, 9)
+
+
+class Failing(Held):
+    """Bytes that a disk gives up to a place."""
+
+    @contextmanager
+    def opened(self) -> Iterator[Filling]:
+        def failing(room: bytearray, begin: int, end: int) -> int:
+            if begin > 300:
+                raise OSError(errno.EIO, "Input/output error")
+            return fill(room, begin, end)
+
+        with super().opened() as fill:
+            yield failing
+
+
+def test_what_goes_wrong_in_a_thread_is_said() -> None:
+    with pytest.raises(OSError, match="Input/output"):
+        find_marks(Failing(b"*NODE\n" * 100), 64, alone=0)
+
+
+class Interrupted(Held):
+    """Bytes of which the main thread reads none: it is interrupted before."""
+
+    def __init__(self, data: bytes) -> None:
+        super().__init__(data)
+        self.interrupted, self.searched = Event(), 0
+
+    @contextmanager
+    def opened(self) -> Iterator[Filling]:
+        def interrupted(room: bytearray, begin: int, end: int) -> int:
+            if current_thread() is main_thread():
+                self.interrupted.set()
+                raise KeyboardInterrupt
+            self.interrupted.wait()
+            time.sleep(0.001)
+            self.searched += 1
+            return fill(room, begin, end)
+
+        with super().opened() as fill:
+            yield interrupted
+
+
+def test_no_thread_goes_on_where_a_search_is_interrupted() -> None:
+    file = Interrupted(b"*NODE\n" * 200)
+    with pytest.raises(KeyboardInterrupt):
+        find_marks(file, 1, alone=0)
+    assert file.searched < 600
