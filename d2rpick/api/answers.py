@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
@@ -271,7 +271,7 @@ def suggest(
     wanted = window if td is None else arguments.number("td", td)
     asked = asked_of(run, parts, flying, deck, weights, choosing)
     core = suggest_of(asked.reference, wanted, asked.settings)
-    core = core._replace(cautions=(*core.cautions, *asked.cautions))
+    core = replace(core, cautions=(*core.cautions, *asked.cautions))
     at = ("--td", repr(wanted)) if isinstance(wanted, float) else ("--td-window", *map(repr, wanted)) if wanted else ()
     return Suggestion(
         run=run,
@@ -339,7 +339,7 @@ def verify(
     if switched is not None:
         core = compare_with(core, asked.reference, asked.reference.like(switched.files, asked.selection))
         times += [text for name in switched.sources for text in ("--switched", name)]
-    core = core._replace(cautions=(*core.cautions, *asked.cautions))
+    core = replace(core, cautions=(*core.cautions, *asked.cautions))
     return Verdict(
         run=run,
         situation=core.situation,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
@@ -143,7 +143,7 @@ def explore(
     count = arguments.whole("steps", steps, 1)
     asked = asked_of(run, parts, flying, deck, weights, choosing)
     core = explore_of(asked.reference, asked.settings, window, td=wanted, steps=count)
-    core = core._replace(cautions=(*core.cautions, *asked.cautions))
+    core = replace(core, cautions=(*core.cautions, *asked.cautions))
     times = [] if wanted is None else ["--td", repr(wanted)]
     times += ["--td-window", *map(repr, window)] if window else []
     return Exploration(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
@@ -146,7 +146,7 @@ def plan(
     earlier = asked.reference.like(before.files, asked.selection) if before is not None else None
     windows = check_windows(pairs) if pairs else ()
     core = plan_of(asked.reference, asked.settings, min_rigid=shortest, done=windows, before=earlier)
-    core = core._replace(cautions=(*core.cautions, *asked.cautions))
+    core = replace(core, cautions=(*core.cautions, *asked.cautions))
     own = [] if shortest is None else ["--min-rigid", repr(shortest)]
     own += ["--done", "-"] if windows else []  # on its standard input, a line for each
     own += [text for name in (before.sources if before else ()) for text in ("--before", name)]

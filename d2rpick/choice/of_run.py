@@ -125,7 +125,7 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference) ->
     RangeError
         If one of the two runs does not go on after td.
     """
-    verdict = verdict._replace(cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)))
+    verdict = replace(verdict, cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)))
     return with_comparison(verdict, _comparison(verdict, reference.run, switched))
 
 
@@ -147,7 +147,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
 
     What comes after td does not matter for the choice.
     """
-    answer = answer._replace(cautions=(*answer.cautions, *cautions_of_engine(run.sources)))
+    answer = replace(answer, cautions=(*answer.cautions, *cautions_of_engine(run.sources)))
     history, td = answer.situation.history, answer.situation.td
     balance = balance_of(run, history.parts, td)
     if balance is None:
@@ -171,7 +171,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
         and answer.situation.in_flight
     ):
         cautions = tuple(one for one in cautions if one.code not in OF_THE_MODEL)
-    return answer._replace(health=health, cautions=answer.cautions + cautions)
+    return replace(answer, health=health, cautions=answer.cautions + cautions)
 
 
 def _comparison(verdict: Verdict, run: Run, switched: Reference) -> Comparison:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -101,7 +101,8 @@ class PartSet:
         return self.apart or (error is not None and limit is not None and error > limit)
 
 
-class Parts(NamedTuple):
+@dataclass(frozen=True)
+class Parts:
     """Answer of ``parts``: every part, sets of them, and what to be aware of.
 
     ``inventory`` is None without a deck.

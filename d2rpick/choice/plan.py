@@ -12,7 +12,7 @@ Each window that locks in energy costs a run of its own, so a short one is left 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -100,7 +100,8 @@ class Planned:
         return float(np.ptp(energy)) > round_off(history)
 
 
-class Plan(NamedTuple):
+@dataclass(frozen=True)
+class Plan:
     """Answer of ``plan``: all flights in the order of time, and what to be aware of.
 
     ``min_rigid``: shorter windows are left out [time].  ``done`` are the windows in which the run was switched.

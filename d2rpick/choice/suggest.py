@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.candidates import find_candidates
@@ -47,7 +48,8 @@ class AcceptableWindow(NamedTuple):
     share: float
 
 
-class Suggestion(NamedTuple):
+@dataclass(frozen=True)
+class Suggestion:
     """Answer of ``suggest``: ranked candidates, the recommended pair, a better one at another td, warnings.
 
     ``windows`` are those of acceptable tr, on basis "energy", ``td_window`` is where td was chosen, if it was;

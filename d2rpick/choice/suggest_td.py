@@ -126,7 +126,7 @@ def suggest_in_window(
         last = _last_at_rest(situation, inside)
         td = last if last > inside[0] and look(last).at_rest else td
     found = suggest_at(look(td))
-    return found._replace(td_window=window, longer=_given_up(longest, found.recommended, inside, look))
+    return replace(found, td_window=window, longer=_given_up(longest, found.recommended, inside, look))
 
 
 def looking(history: History, settings: Settings, fits: Fits | None = None, since: float | None = None) -> Look:

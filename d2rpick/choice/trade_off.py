@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -35,7 +35,8 @@ _MUCH_LESS: Final = 0.5
 _LEAST_KEPT: Final = 0.5
 
 
-class TradeOff(NamedTuple):
+@dataclass(frozen=True)
+class TradeOff:
     """Answer of ``explore``: offers by ascending td in ``td_window``, which keeps the margin before a contact [time].
 
     ``asked`` is that of the td that was asked for; ``recommended`` that of the pair that ``suggest`` chooses there,

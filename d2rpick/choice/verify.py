@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from d2rpick.choice.candidates import Candidate, judge
 from d2rpick.choice.examine import examine
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 
-class Verdict(NamedTuple):
+@dataclass(frozen=True)
+class Verdict:
     """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
 
     ``tr_ok`` and ``td_ok`` are None where the record does not tell.
@@ -99,7 +101,8 @@ def approve(situation: Situation, times: Iterable[float]) -> list[bool]:
 
 def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:
     """Add what a finished switched run shows; a wrong motion of it overrules the verdict."""
-    return verdict._replace(
+    return replace(
+        verdict,
         switched=comparison,
         verified=verdict.verified and not comparison.objections,
         reasons=verdict.reasons + comparison.objections,

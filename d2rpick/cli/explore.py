@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -83,7 +84,7 @@ def command(
         reference = Reference(run, energy_of(run, options, prints=prints))
         settings, unknown = deck_cost.with_cost(settings, reference, model, options["merge"])
     found = explore_of(reference, settings, td_window, td=td, steps=steps)
-    found = found._replace(cautions=(*found.cautions, *unknown))
+    found = replace(found, cautions=(*found.cautions, *unknown))
     output.notes(reference.history.notes, found.cautions)
     if extras.plot:
         from d2rpick.report import figures

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -94,7 +95,7 @@ def command(
         earlier = reference.like(asked._replace(names=before).open(), asked.selection) if before else None
     windows = _windows(done) if done else ()
     plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
-    plan = plan._replace(cautions=(*plan.cautions, *unknown))
+    plan = replace(plan, cautions=(*plan.cautions, *unknown))
     output.notes(reference.history.notes, plan.cautions)
     _beside(plan, reference, options, output)
     checked, passed = _deck(plan, reference, options, every=every) if options["write_deck"] else ("", True)

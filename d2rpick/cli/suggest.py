@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -90,7 +91,7 @@ def command(
         reference = Reference(run, energy_of(run, options, prints=prints))
         settings, unknown = deck_cost.with_cost(settings, reference, model, options["merge"])
     answer = suggest_of(reference, td_window if td is None else td, settings)
-    answer = answer._replace(cautions=(*answer.cautions, *unknown))
+    answer = replace(answer, cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
         from d2rpick.report import figures, figures_choice

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -83,7 +84,7 @@ def command(
     if other and finished:
         with reading(finished.names, quiet=asked.quiet):
             answer = compare_with(answer, reference, reference.like(other, finished.selection))
-    answer = answer._replace(cautions=(*answer.cautions, *unknown))
+    answer = replace(answer, cautions=(*answer.cautions, *unknown))
     output.notes(reference.history.notes, answer.cautions)
     if extras.plot:
         from d2rpick.report import figures, figures_choice
