@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar
 
-from d2rpick.vibration.fits import Fits
+from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.modes import Mode
 from tests import paper
 
 if TYPE_CHECKING:

@@ -176,7 +176,7 @@ def settings(choosing: Choosing, *, with_deck: bool = False) -> Settings:
     ``with_deck``: a deck tells the cost share, unless it is given.
     """
     from d2rpick.choice.settings import Settings
-    from d2rpick.vibration.equivalent import to_mode
+    from d2rpick.vibration.oscillator import to_mode
 
     known = Choosing.__annotations__
     if unknown := [name for name in choosing if name not in known]:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.bodies import Off
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.measures import Measured
-    from d2rpick.vibration.part_shares import PartMatch
+    from d2rpick.vibration.part_signs import PartMatch
 
 
 # Candidates that are looked at together, at most: arrays of more are no faster, and noise makes tens of thousands a td.
@@ -318,7 +318,7 @@ def _remarks(situation: Situation, reach: float, known: Measured | None, parts: 
         reason = situation.vibration.unknown or situation.vibration.undescribed
         yield f"sign, lock-in error and residual unknown: {reason}"
     if known and known.lock_in_error > measures.TOLERATED_GROWTH and parts:
-        from d2rpick.vibration.part_shares import main_contributors  # not above: a table has no parts
+        from d2rpick.vibration.part_signs import main_contributors  # not above: a table has no parts
 
         yield f"mismatch of {main_contributors(parts)}"
     if known and known.residual_high > known.residual + MUCH_HIGHER:

@@ -12,11 +12,10 @@ from d2rpick.choice.situation import Situation
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.histories.samples import window
-from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.identify import Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, doubtful, energy_at
-from d2rpick.vibration.second_mode import resolved
-from d2rpick.vibration.span import Span, described_span, identify_within, span_of
+from d2rpick.vibration.span import Fits, Span, described_span, identify_within, span_of
+from d2rpick.vibration.uncertainty import resolved
 
 if TYPE_CHECKING:
     from d2rpick.choice.settings import Settings

@@ -8,7 +8,7 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.flight.flight import Flight, all_seen
 from d2rpick.flight.window import moments
-from d2rpick.vibration.fits import Fits
+from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History

@@ -13,7 +13,7 @@ import numpy as np
 
 from d2rpick.choice.rigid_parts import rigid_parts, with_energy
 from d2rpick.errors import FormatError, listing
-from d2rpick.flight.energy_alone import round_off
+from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:

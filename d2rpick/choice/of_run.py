@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Track
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
-    from d2rpick.vibration.fits import Fits
+    from d2rpick.vibration.span import Fits
 
 _DEFAULT = Selection()
 

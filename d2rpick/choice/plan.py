@@ -22,9 +22,9 @@ from d2rpick.choice.sound import refuse_unsound
 from d2rpick.choice.suggest_td import bounds, flights_of, last_td
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
 from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
-from d2rpick.flight.energy_alone import round_off
-from d2rpick.vibration.fits import Fits
+from d2rpick.flight.internal_energy import round_off
 from d2rpick.vibration.measures import run_time_share
+from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

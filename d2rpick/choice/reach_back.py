@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.choice.ranking import LIKE_LEVELS
-from d2rpick.flight.energy_alone import round_off
+from d2rpick.flight.internal_energy import round_off
 
 if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick.vibration.equivalent import from_mode
-from d2rpick.vibration.one_mode import Mode
-from d2rpick.vibration.oscillator import State
+from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.oscillator import State, from_mode
 from d2rpick.vibration.replay import Replay
 
 if TYPE_CHECKING:

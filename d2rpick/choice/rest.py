@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.flight.energy_alone import round_off
+from d2rpick.flight.internal_energy import round_off
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD
 
 if TYPE_CHECKING:

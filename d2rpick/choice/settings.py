@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.cost import ByDeck
     from d2rpick.deck.geometry import Placement
     from d2rpick.flight.bodies import RigidBody
-    from d2rpick.vibration.one_mode import Mode
+    from d2rpick.vibration.modes import Mode
 
 # What an argument may be.  A tolerance of 1 accepts a tr that locks in nothing at all.
 _RANGES = (

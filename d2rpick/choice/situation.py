@@ -10,8 +10,8 @@ import numpy as np
 
 from d2rpick.choice.rest import nothing_vibrates
 from d2rpick.histories.digits import sum_as_read
-from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.model import Evidence, describing, model_at
+from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

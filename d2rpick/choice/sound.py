@@ -8,7 +8,7 @@ import numpy as np
 
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import RangeError
-from d2rpick.vibration.one_mode import LARGEST_ENERGY
+from d2rpick.vibration.modes import LARGEST_ENERGY
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -19,7 +19,7 @@ from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
 from d2rpick.errors import RangeError
 from d2rpick.flight.flight import SOURCES, witnesses
 from d2rpick.histories.digits import not_after, sum_as_read
-from d2rpick.vibration.fits import Fits
+from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

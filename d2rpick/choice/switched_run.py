@@ -10,7 +10,7 @@ import numpy as np
 from d2rpick.choice.rigid_parts import FEWEST, kinetic_energies, rigid_parts, with_energy
 from d2rpick.choice.warnings import Caution
 from d2rpick.errors import RangeError, listing
-from d2rpick.flight.energy_alone import round_off
+from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.history import Given
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.sound import refuse_unsound
 from d2rpick.choice.suggest_td import longest_flight, looking, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
-from d2rpick.vibration.fits import Fits
+from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.quality import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.histories.opening import Run, Selection
-    from d2rpick.vibration.one_mode import Mode
+    from d2rpick.vibration.modes import Mode
     from d2rpick.vibration.oscillator import Oscillator
 
 # Kinds of values, under the names by which commands ask for them.
@@ -342,7 +342,7 @@ def settings(options: dict[str, Any]) -> Settings:
 
 
 def _mode_of(oscillator: Oscillator, v0: float) -> Mode:
-    from d2rpick.vibration.equivalent import to_mode  # not above: mostly none is given
+    from d2rpick.vibration.oscillator import to_mode  # not above: mostly none is given
 
     return to_mode(oscillator, v0)
 

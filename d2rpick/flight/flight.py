@@ -9,10 +9,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from d2rpick.flight.energy_alone import landing_after, quiet_time
-from d2rpick.flight.level import moves_as_a_whole, settled_from
-from d2rpick.flight.supports import unheld
-from d2rpick.flight.window import SHORTEST, all_windows, marks
+from d2rpick.flight.internal_energy import landing_after, moves_as_a_whole, quiet_time, settled_from
+from d2rpick.flight.window import SHORTEST, all_windows, marks, unheld
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -276,10 +274,10 @@ def _witnesses(history: History) -> Iterator[Witness]:
     balance = history.balance
     if balance is None:
         return
-    from d2rpick.flight import contact_energy, work
+    from d2rpick.flight import work
 
-    if contact_energy.shows_contacts(balance):
-        plateau = partial(contact_energy.plateau_around, balance)
+    if work.shows_contacts(balance):
+        plateau = partial(work.plateau_around, balance)
         around = plateau if history.momenta else partial(_level_around, history, plateau)
         yield Witness.of("contact-energy", balance.time, partial(_unheld, history, around), decisive=False)
     if work.can_tell(balance):

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.flight.free_fall import Laws
-from d2rpick.flight.supports import unheld
-from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows
+from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows, unheld
 from d2rpick.histories.samples import bent, window
 
 if TYPE_CHECKING:

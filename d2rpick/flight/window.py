@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.histories.history import Samples
     from d2rpick.histories.names import Part
+    from d2rpick.histories.surroundings import Surroundings
+
 
 # Misfit that free flight may leave at first, as a share of the range over the record: contact shows at once.
 TOLERANCE = 1e-3
@@ -277,3 +279,14 @@ def _farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
         if ahead != good and fits(ahead):
             good = ahead
     return good
+
+
+def unheld(
+    surroundings: Surroundings, flight: FreeFlight | None, parts: Sequence[Part] | None, td: float
+) -> FreeFlight | None:
+    """Give what of a flight around ``td`` [time] lies between the times in which parts, or the model, are held."""
+    between = surroundings.free(parts, td)
+    if between is None or flight is None:
+        return None
+    start, end = max(flight.start, between[0]), min(flight.end, between[1])
+    return flight._replace(start=start, end=end, end_seen=flight.end_seen or end < flight.end)

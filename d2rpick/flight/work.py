@@ -1,7 +1,8 @@
-"""Free flight, seen in work and energy: gravity and damping proportional to mass are all that works.
+"""Free flight, seen in the energies of the model: gravity and damping proportional to mass are all that works.
 
 With the resultant F of gravity, the momentum p and the mass m, gravity works by the integral of F p/m; such damping by
--2 alpha times the integral of the kinetic energy, which Radioss counts as external work.
+-2 alpha times the integral of the kinetic energy, which Radioss counts as external work.  While nothing touches, the
+contact energy does not change.
 """
 
 from __future__ import annotations
@@ -11,13 +12,14 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from d2rpick.flight.window import FEWEST, FreeFlight, Remembered, lasting_window
+from d2rpick.flight.window import FEWEST, Constant, FreeFlight, Remembered, lasting_window
 from d2rpick.histories.samples import integral, window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.history import Balance, Samples
+
 
 # States from which a load can be told from gravity and damping: twice the unknowns.
 FEWEST_STATES: Final = 6
@@ -219,3 +221,39 @@ class _Parabola:
         energies = self.energies[states] / scale
         factors, *_ = np.linalg.lstsq(table, energies, rcond=None)
         return float(np.abs(energies - table @ factors).max()) * float(scale)
+
+
+# A contact energy that never exceeds its printed digits by this factor shows no contact at all.
+_VISIBLE = 100
+# One for each record: it is asked about many td.
+_PLATEAUS: Final[WeakKeyDictionary[Balance, Remembered]] = WeakKeyDictionary()
+
+
+def shows_contacts(balance: Balance) -> bool:
+    """Whether the model has contacts that were ever closed, as far as the contact energy tells."""
+    energy = balance.sliding
+    return energy is not None and energy.size >= FEWEST and float(np.ptp(energy)) > _VISIBLE * _noise(balance)
+
+
+def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
+    """Find the window around ``td`` [time] in which the contact energy is constant, or None.
+
+    Where it has been constant since the first state no contact has ended, and a load of another kind may act: such a
+    window counts only where the external work is written too, which shows that load.
+    """
+    time, energy = balance.time, balance.sliding
+    if energy is None or not time[0] <= td <= time[-1]:
+        return None
+    if balance not in _PLATEAUS:
+        _PLATEAUS[balance] = Remembered(Constant(time, energy[:, np.newaxis]))
+    window = lasting_window(_PLATEAUS[balance], td, float(np.ptp(energy)), _noise(balance))
+    if window is None or (window[0] == 0 and balance.external_work is None):
+        return None
+    first, last = window
+    return FreeFlight(float(time[first]), float(time[last]), None, last < time.size - 1)
+
+
+def _noise(balance: Balance) -> float:
+    """What the printed digits leave open [energy]."""
+    assert balance.sliding is not None
+    return balance.precision.quantum(float(np.abs(balance.sliding).max())) / 2

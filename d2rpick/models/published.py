@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.vibration import measures
-from d2rpick.vibration.equivalent import to_mode
-from d2rpick.vibration.oscillator import Oscillator, State
+from d2rpick.vibration.oscillator import Oscillator, State, to_mode
 from d2rpick.vibration.replay import Replay
 
 if TYPE_CHECKING:

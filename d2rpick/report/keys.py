@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.warnings import Caution
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.names import Part
-    from d2rpick.vibration.part_shares import PartMatch
-    from d2rpick.vibration.part_signs import Unsigned
+    from d2rpick.vibration.part_signs import PartMatch, Unsigned
 
 
 def of_warnings(cautions: Iterable[Caution]) -> list[dict[str, Any]]:

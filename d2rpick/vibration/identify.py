@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.vibration.fit_one import COARSE, VIBRATION, WITH_PLASTIC, WITH_PRELOAD, Pencil, fit, hopeless, minimise
-from d2rpick.vibration.one_mode import Mode, energy_and_jacobian
-from d2rpick.vibration.structure import MAX_STRUCTURE, structure_of
+from d2rpick.vibration import fitting
+from d2rpick.vibration.modes import Mode, Modes, energy_and_jacobian, sum_and_jacobian
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.modes import Modes
 
 # Thresholds of acceptance.  White noise may be large; what a true model must not leave over is structure, the
 # part of the misfit that neighbouring samples share.
@@ -32,7 +30,7 @@ _FLOOR: Final = 1e-4  # of the highest vibration energy
 _NO_EFFECT: Final = 1e-100
 
 # Free parameters of the models, simplest first, and the vibration periods it takes to tell them apart.
-_MODELS: Final = ((VIBRATION, 1.25), (WITH_PLASTIC, 1.5), (WITH_PRELOAD, 2.0))
+_MODELS: Final = ((fitting.VIBRATION, 1.25), (fitting.WITH_PLASTIC, 1.5), (fitting.WITH_PRELOAD, 2.0))
 
 
 # Modes of one sum: with more of them almost any record could be described.  Two slowest periods tell their energies
@@ -132,14 +130,14 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False) -> Identifi
     if lacking:
         return _nothing(time, lacking)
     record = _Record.scaled(time, energy)
-    poles = Pencil.of(record.s, record.e).rates()
+    poles = fitting.Pencil.of(record.s, record.e).rates()
     if poles.size == 0:
         return _nothing(time, "the energy does not oscillate: nothing vibrates, or it is overdamped")
-    if quick and hopeless(poles, record.s, record.e, HOPELESS):
+    if quick and fitting.hopeless(poles, record.s, record.e, HOPELESS):
         return _least_wrong([], time)
     refused = []
     for size, least_periods in _MODELS:
-        parameters = fit(poles, record.s, record.e, size, HOPELESS if quick else np.inf)
+        parameters = fitting.fit(poles, record.s, record.e, size, HOPELESS if quick else np.inf)
         if parameters is not None:
             attempt, follows = _judged(_one(parameters, size, record), least_periods, record)
             if follows:  # a richer model would follow as well, and be no more plausible
@@ -166,15 +164,13 @@ def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> 
     >>> found.describes_record, [f"{mode.omega:.6f}" for mode in found.mode.modes]
     (True, ['5.000000', '8.000000'])
     """
-    from d2rpick.vibration.fit_several import fit_several
-
     lacking = _lacking(time, energy)
     if lacking:
         return _nothing(time, lacking)
     record = _Record.scaled(time, energy)
-    refused, pencil = [], Pencil.of(record.s, record.e)
+    refused, pencil = [], fitting.Pencil.of(record.s, record.e)
     for count in _SEVERAL:
-        parameters = fit_several(pencil, record.s, record.e, count, HOPELESS if quick else np.inf)
+        parameters = fitting.fit_several(pencil, record.s, record.e, count, HOPELESS if quick else np.inf)
         if parameters is not None:
             attempt, follows = _judged(_sum(parameters, record), _PERIODS_OF_SEVERAL, record)
             if follows:
@@ -185,13 +181,12 @@ def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> 
 
 def identify_beside(time: Samples, energy: Samples, mode: Mode, rates: Samples) -> Identification:
     """Fit a second mode beside ``mode``, from each of ``rates`` [1/time], and judge the best fit of both."""
-    from d2rpick.vibration.fit_several import linear_fit
-    from d2rpick.vibration.modes import sum_and_jacobian
-
     record = _Record.scaled(time, energy)
     span = record.end - record.start
-    starts = [linear_fit(span * np.array([mode.omega, rate]), span * mode.alpha, record.s, record.e) for rate in rates]
-    ends = [minimise(start, sum_and_jacobian, record.s, record.e) for _, start in starts]
+    starts = [
+        fitting.linear_fit(span * np.array([mode.omega, rate]), span * mode.alpha, record.s, record.e) for rate in rates
+    ]
+    ends = [fitting.minimise(start, sum_and_jacobian, record.s, record.e) for _, start in starts]
     best = _sum(min(ends, key=lambda end: end[1])[0], record)
     return _judged(best, _PERIODS_OF_SEVERAL, record, MIN_SAMPLES_BESIDE)[0]
 
@@ -211,7 +206,7 @@ def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = Fal
     lacking = _lacking(time, energy)
     if lacking:
         return _nothing(time, lacking)
-    few = slice(None, None, -(-time.size // COARSE))
+    few = slice(None, None, -(-time.size // fitting.COARSE))
     if quick and np.var(energy[few] - mode.energy(time[few])) > HOPELESS * np.var(energy[few]):
         return _least_wrong([], time)
     record = _Record.scaled(time, energy)
@@ -219,7 +214,7 @@ def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = Fal
     cosine = mode.deformation(start) - mode.preload
     sine = (mode.velocity(start) + mode.alpha / 2 * cosine) / mode.omega
     parameters = np.array([mode.omega, mode.alpha, cosine, sine, mode.energy_plastic, mode.preload])
-    held, follows = _judged(_one(parameters / record.units, WITH_PRELOAD, record), 0.0, record)
+    held, follows = _judged(_one(parameters / record.units, fitting.WITH_PRELOAD, record), 0.0, record)
     reason = None if follows else held.reason
     return held._replace(mode=mode, describes_record=follows, reason=reason, covariance=np.zeros((6, 6)))
 
@@ -275,8 +270,6 @@ def _one(parameters: Samples, size: int, record: _Record) -> _Attempt:
 
 def _sum(parameters: Samples, record: _Record) -> _Attempt:
     """Fit of several modes."""
-    from d2rpick.vibration.modes import Modes, sum_and_jacobian
-
     fitted, jacobian = sum_and_jacobian(parameters, record.s)
     rate, root = record.units[1], record.units[2]
     count = parameters.size // 3
@@ -291,10 +284,10 @@ def _judged(
     """Return a fit with its verdict, and whether it follows the samples; ``density`` is the least per period."""
     s, e = record.s, record.e
     rest = e - attempt.energy
-    rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), structure_of(rest)
+    rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), fitting.structure_of(rest)
     vibration = attempt.scaled.vibration_energy(s)
     # where noise exceeds the vibration, a rest says nothing about a further mode
-    local_structure = structure_of(rest / np.maximum(vibration, max(rms, _FLOOR * np.max(vibration))))
+    local_structure = fitting.structure_of(rest / np.maximum(vibration, max(rms, _FLOOR * np.max(vibration))))
     loose = _loose(attempt.name, rms / spread, structure / spread, local_structure)
     found_density = samples_per_period(s, attempt.scaled)
     reason = loose or _implausible(attempt.scaled, found_density, density, least_periods, record.end - record.start)
@@ -317,10 +310,10 @@ def _loose(name: str, misfit: float, structure: float, local_structure: float) -
     """Say how the fit fails to follow the samples."""
     if misfit > MAX_MISFIT:
         return f"{name} misses the energy by {misfit:.0%} of its standard deviation, more than {MAX_MISFIT:.0%}"
-    if structure > MAX_STRUCTURE:
+    if structure > fitting.MAX_STRUCTURE:
         return (
             f"{name} deviates systematically by {structure:.2g} of the standard deviation of the energy, "
-            f"more than {MAX_STRUCTURE}"
+            f"more than {fitting.MAX_STRUCTURE}"
         )
     if local_structure > MAX_LOCAL_STRUCTURE:
         return (

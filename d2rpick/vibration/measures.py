@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.one_mode import Mode
+    from d2rpick.vibration.modes import Mode
 
 
 class Deformation(Protocol):

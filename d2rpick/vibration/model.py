@@ -22,11 +22,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.measures import Measured
-    from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.modes import Mode, Modes
     from d2rpick.vibration.moments import Moment, Moments
-    from d2rpick.vibration.one_mode import Mode
-    from d2rpick.vibration.part_shares import PartMatch
-    from d2rpick.vibration.part_signs import SignedParts, Unsigned
+    from d2rpick.vibration.part_signs import PartMatch, SignedParts, Unsigned
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 

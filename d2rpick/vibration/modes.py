@@ -1,4 +1,4 @@
-"""Modes: an internal energy that several vibration modes store and give back, each on its own."""
+"""Closed forms of an internal energy that one vibration mode, or several, each on its own, store and give back."""
 
 from __future__ import annotations
 
@@ -7,13 +7,244 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.vibration.one_mode import Mode, energy_and_jacobian
 from d2rpick.vibration.roots import narrow
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from d2rpick.histories.history import Samples
+
+
+# Beyond, squares of energies are no numbers any more; no unit system comes near.
+LARGEST_ENERGY = 1e150
+# Halving alone would need no more to reach rounding.
+_STEPS = 64
+_EPS = float(np.finfo(np.float64).eps)
+# Of the amplitude: below, a deformation is zero but for rounding.
+_ZERO = 1e-9
+
+
+@dataclass(frozen=True)
+class Mode:
+    r"""One under-damped vibration and the internal energy it makes.
+
+    .. math::
+        E(t) = E_{pl} + q(t)^2, \quad
+        q(t) = q_0 + e^{-\alpha s/2} (a \cos\omega s + b \sin\omega s), \quad s = t - t_0
+
+    q is the deformation in units of the square root of energy: with spring k and deformation r = y - z of
+    the floating oscillator, q = sqrt(k/2) r, so that q**2 is the elastic energy.  The sign of q as a whole is
+    not observable in E; only products of two values of q have a meaning.
+
+    Parameters
+    ----------
+    omega : float
+        Damped angular rate of the deformation, positive [1/time]; the energy repeats at twice that rate.
+        omega_2 of eq. (4).
+    alpha : float
+        Mass-proportional damping [1/time].
+    cosine, sine : float
+        a and b [sqrt(energy)].
+    origin : float
+        t_0 [time].
+    energy_plastic : float
+        Part of the energy that does not come back [energy].
+    preload : float
+        q_0, deformation about which the mode vibrates [sqrt(energy)].
+
+    Notes
+    -----
+    "Analysis of switched-rigid floating oscillator" (Shock and Vibration), eqs. (1), (4), (7).
+
+    Examples
+    --------
+    >>> mode = Mode(omega=np.pi, alpha=0.0, cosine=0.0, sine=2.0, origin=0.0)
+    >>> float(mode.energy(0.5)), mode.peaks(0.0, 2.0)
+    (4.0, (0.5, 1.5))
+    >>> mode.crossings(2.0 * np.sin(np.pi / 4), 0.0, 2.0)
+    (0.25, 0.75)
+    """
+
+    omega: float
+    alpha: float
+    cosine: float
+    sine: float
+    origin: float
+    energy_plastic: float = 0.0
+    preload: float = 0.0
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """The modes behind the energy: this one."""
+        return (self,)
+
+    @property
+    def fastest(self) -> float:
+        """Rate of the fastest mode, the only one [1/time]."""
+        return self.omega
+
+    @property
+    def apart(self) -> float:
+        """Least difference of the rates of two modes: there is no other [1/time]."""
+        return float("inf")
+
+    @property
+    def omega_0(self) -> float:
+        """Undamped angular rate, omega_0**2 = omega**2 + alpha**2 / 4 [1/time]."""
+        return float(np.hypot(self.omega, self.alpha / 2))
+
+    def deformation(self, t: Samples | float) -> Samples:
+        """Signed deformation q(t) [sqrt(energy)]."""
+        return self.preload + self._swing(t, self.cosine, self.sine)
+
+    def velocity(self, t: Samples | float) -> Samples:
+        """dq/dt [sqrt(energy)/time]."""
+        return self._swing(t, *self._velocity_parts)
+
+    def amplitudes(self, t: Samples | float) -> Samples:
+        """Signed deformations of all modes, of the shape of ``t`` with an axis of length one before it."""
+        return self.deformation(t)[np.newaxis]
+
+    def elastic_energy(self, t: Samples | float) -> Samples:
+        """q(t)**2, the energy that springs back [energy]."""
+        return self.deformation(t) ** 2
+
+    def energy(self, t: Samples | float) -> Samples:
+        """E(t), plastic and elastic [energy]."""
+        return self.energy_plastic + self.elastic_energy(t)
+
+    def kinetic_energy(self, t: Samples | float) -> Samples:
+        """Kinetic energy of the vibration, T = (dq/dt)**2 / omega_0**2 [energy].
+
+        From T = mu r'**2 / 2 with omega_0**2 = k / mu and q**2 = k r**2 / 2.
+        """
+        return (self.velocity(t) / self.omega_0) ** 2
+
+    def vibration_energy(self, t: Samples | float) -> Samples:
+        """Energy of the vibration about the preload, V = (q - q_0)**2 + T; dV/dt = -2 alpha T [energy]."""
+        decay, cos, sin = self._waves(t)
+        cosine, sine = self._velocity_parts
+        swing, velocity = decay * (self.cosine * cos + self.sine * sin), decay * (cosine * cos + sine * sin)
+        return swing**2 + (velocity / self.omega_0) ** 2
+
+    def energy_slopes(self, t: Samples | float) -> tuple[Samples, Samples]:
+        """E' [energy/time] and E'' [energy/time^2], from q'' = -alpha q' - omega_0**2 (q - q_0)."""
+        q, velocity = self.deformation(t), self.velocity(t)
+        acceleration = -self.alpha * velocity - self.omega_0**2 * (q - self.preload)
+        return 2 * q * velocity, 2 * (velocity**2 + q * acceleration)
+
+    def energy_gradient(self, t: Samples, size: int) -> Samples:
+        """Derivatives of E(t) by the first ``size`` parameters in the order of the class, less origin, (size, n)."""
+        own = np.array([self.omega, self.alpha, self.cosine, self.sine, self.energy_plastic, self.preload])
+        return energy_and_jacobian(own, t - self.origin, size)[1]
+
+    def standstill_after(self, t: Samples | float) -> Samples:
+        """Find the first time at or after ``t`` where the deformation stands still; the next is half a period on."""
+        cosine, sine = self._velocity_parts
+        phase = np.arctan2(-cosine, sine)  # cosine cos x + sine sin x = 0 at x = phase + n pi
+        turns = np.ceil((self.omega * (np.asarray(t) - self.origin) - phase) / np.pi)
+        return np.asarray(self.origin + (phase + np.pi * turns) / self.omega)
+
+    def extrema(self, start: float, end: float) -> tuple[float, ...]:
+        """Find the times in (start, end), ascending, where the deformation stands still (q' = 0) [time]."""
+        if not start < end:  # nor need ``start`` be a time whose phase is a number
+            return ()
+        first = float(self.standstill_after(start))
+        times = first + np.pi / self.omega * np.arange(max(0.0, np.ceil((end - first) * self.omega / np.pi)))
+        return tuple(times[(times > start) & (times < end)].tolist())
+
+    def peaks(self, start: float, end: float) -> tuple[float, ...]:
+        """Find the times in (start, end), ascending, of the local maxima of the energy [time].
+
+        Where q' = 0, q'' = -omega_0**2 (q - q_0), so E'' = 2 q q'' < 0 asks for q (q - q_0) > 0.
+        """
+        times = np.array(self.extrema(start, end))
+        q = self.deformation(times)
+        return tuple(times[q * (q - self.preload) > 0].tolist())
+
+    def crossings(self, level_q: float, start: float, end: float) -> tuple[float, ...]:
+        """Find the times in (start, end), ascending, where q passes ``level_q``, to rounding [time].
+
+        An extremum that only touches the level (to rounding) is no crossing, nor are ``start`` and ``end``.
+        """
+        return tuple(self._passages(np.array([level_q]), start, np.array([end]))[1].tolist())
+
+    def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
+        """Find the times in (start, td), ascending, where the energy passes its level at ``td`` [time]."""
+        return tuple(self.all_level_crossings(np.array([td]), start)[0].tolist())
+
+    def all_level_crossings(self, td: Samples, start: float) -> list[Samples]:
+        """Find the same for each ``td`` of shape (n,), all at once."""
+        level = self.deformation(td)
+        # a level of zero is met once by each passage, whatever rounding makes of its sign
+        zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
+        level = np.where(zero, 0.0, level)
+        ends = np.append(td, np.where(zero, start, td))
+        place, times = self._passages(np.append(level, -level), start, ends)
+        place %= td.size
+        order = np.lexsort((times, place))
+        return np.split(times[order], np.searchsorted(place[order], np.arange(1, td.size)))
+
+    def _passages(self, levels: Samples, start: float, ends: Samples) -> tuple[NDArray[np.intp], Samples]:
+        """Find the times in (start, end) where q passes a level, for each level and its end, both of shape (n,).
+
+        Places of the levels and times, ascending in both.
+        """
+        inner = np.array(self.extrema(start, float(ends.max(initial=start))))
+        rows = np.broadcast_to(inner, (ends.size, inner.size))
+        edges = np.column_stack([np.full(ends.size, start), np.minimum(rows, ends[:, np.newaxis]), ends])
+        above = self.deformation(edges) - levels[:, np.newaxis]
+        scale = np.abs(levels)[:, np.newaxis] + abs(self.preload) + np.sqrt(self.vibration_energy(edges))
+        above[np.abs(above) <= 8 * _EPS * scale] = 0.0
+        place, cell = np.nonzero(above[:, :-1] * above[:, 1:] < 0)  # between neighbouring extrema q is monotone
+        side, wanted = np.sign(above[place, cell]), levels[place]
+        found = narrow(
+            lambda t: side * (self.deformation(t) - wanted), edges[place, cell], edges[place, cell + 1],
+            slope=lambda t: side * self.velocity(t), steps=_STEPS,
+        )  # fmt: skip
+        return place, found.at
+
+    @property
+    def _velocity_parts(self) -> tuple[float, float]:
+        half = self.alpha / 2
+        return self.omega * self.sine - half * self.cosine, -self.omega * self.cosine - half * self.sine
+
+    def _swing(self, t: Samples | float, cosine: float, sine: float) -> Samples:
+        """exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)) with s = t - origin."""
+        decay, cos, sin = self._waves(t)
+        return decay * (cosine * cos + sine * sin)
+
+    def _waves(self, t: Samples | float) -> tuple[Samples, Samples, Samples]:
+        """exp(-alpha s/2), cos(omega s) and sin(omega s)."""
+        s = np.asarray(t, dtype=np.float64) - self.origin
+        angle = self.omega * s
+        return np.exp(-self.alpha / 2 * s), np.cos(angle), np.sin(angle)
+
+
+def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Samples, Samples]:
+    """Return E(s), shape (n,), and its derivatives by the first ``size`` parameters, shape (size, n).
+
+    The parameters are omega, alpha, cosine, sine, energy_plastic, preload of a `Mode` with its origin at s = 0.
+    """
+    omega, alpha, cosine, sine, plastic, preload = parameters.tolist()
+    angle, decay = omega * s, np.exp(-alpha / 2 * s)
+    cos, sin = decay * np.cos(angle), decay * np.sin(angle)
+    swing = cosine * cos + sine * sin
+    q = preload + swing
+    twice = q + q
+    jacobian = np.empty((size, s.size))  # written in place: this is where identification spends its time
+    by_rate = np.multiply(twice, s, out=jacobian[0])
+    np.multiply(by_rate, swing, out=jacobian[1])
+    jacobian[1] *= -0.5
+    by_rate *= sine * cos - cosine * sin
+    np.multiply(twice, cos, out=jacobian[2])
+    np.multiply(twice, sin, out=jacobian[3])
+    jacobian[4:5] = 1.0
+    jacobian[5:] = twice
+    return plastic + q * q, jacobian
+
 
 # Points per period of the fastest mode on which sign changes are looked for: an extremum of the energy lasts a quarter
 # of that period at least, but for shallow ones that are no use as switch times.
@@ -37,7 +268,6 @@ class Modes:
 
     Examples
     --------
-    >>> from d2rpick.vibration.one_mode import Mode
     >>> two = Modes((Mode(np.pi, 0.0, 1.0, 0.0, 0.0), Mode(2 * np.pi, 0.0, 1.0, 0.0, 0.0)))
     >>> float(two.energy(1.0)), float(two.vibration_energy(0.3))
     (2.0, 2.0)

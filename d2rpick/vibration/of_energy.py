@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from d2rpick.histories.history import History, Samples
-    from d2rpick.vibration.part_shares import PartMatch
-    from d2rpick.vibration.part_signs import SignedParts, Unsigned
+    from d2rpick.vibration.part_signs import PartMatch, SignedParts, Unsigned
 
 # Parts that a warning names of those that share a reason; the JSON document has all.
 _NAMED = 5

@@ -9,12 +9,11 @@ import numpy as np
 
 from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration import measures
-from d2rpick.vibration.equivalent import replayed_residual
+from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import Moment
 from d2rpick.vibration.of_energy import sampled_before
-from d2rpick.vibration.one_mode import Mode
-from d2rpick.vibration.second_mode import residual_bound
-from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
+from d2rpick.vibration.oscillator import replayed_residual
+from d2rpick.vibration.uncertainty import fitted_reach, residual_bound, sampled_reach
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.moments import Moments
-    from d2rpick.vibration.part_shares import PartMatch
+    from d2rpick.vibration.part_signs import PartMatch
     from d2rpick.vibration.span import Span
 
 # Of the fastest mode: what a parabola through three of them misses of a minimum is of the order of 1e-4 of a period.

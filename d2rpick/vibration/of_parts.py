@@ -11,15 +11,14 @@ from d2rpick.vibration import measures
 from d2rpick.vibration.lock_in_profile import Profile
 from d2rpick.vibration.moments import Moment
 from d2rpick.vibration.of_modes import OfModes
-from d2rpick.vibration.part_shares import PartMatch, contributions
+from d2rpick.vibration.part_signs import PartMatch, contributions
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.measures import Measured
-    from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.modes import Mode, Modes
     from d2rpick.vibration.moments import Moments
     from d2rpick.vibration.of_energy import OfEnergy
-    from d2rpick.vibration.one_mode import Mode
     from d2rpick.vibration.part_signs import SignedParts, Unsigned
     from d2rpick.vibration.swings import Swings
 

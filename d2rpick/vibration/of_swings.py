@@ -9,7 +9,7 @@ from d2rpick.vibration.of_parts import OfParts
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.measures import Measured
-    from d2rpick.vibration.part_shares import PartMatch
+    from d2rpick.vibration.part_signs import PartMatch
 
 
 class OfSwings(OfParts):

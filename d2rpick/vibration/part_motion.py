@@ -1,28 +1,34 @@
 """How one part vibrates: the deformation that its zeros give, where waves confirm it, else modes of its own.
 
+The root of a part's energy is proportional to its deformation but for the sign, and the sign turns where the energy
+passes through zero.  In a record no energy is zero exactly.  But the deformation is smooth: through a zero the root
+bends sharply unless the sign is turned there, at any other minimum it bends sharply if it is.
+
 Zeros alone prove no sign.  Where a part bends in two planes its energy is the sum of two squares, hardly ever zero, and
 the root of it with signs from its minima jumps or bends as no sum of a few waves does.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
 from d2rpick.vibration.identify import identify, identify_several
-from d2rpick.vibration.second_mode import hidden_share, resolved
+from d2rpick.vibration.uncertainty import hidden_share, resolved
 from d2rpick.vibration.waves import fit_waves
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.identify import Identification
-    from d2rpick.vibration.modes import Modes
-    from d2rpick.vibration.one_mode import Mode
-    from d2rpick.vibration.part_zeros import Zeros
+    from d2rpick.vibration.modes import Mode, Modes
     from d2rpick.vibration.waves import Waves
+
 
 # Of the energy, what waves may leave of a deformation: a sign that is wrong at one of thirty minima leaves ten times as
 # much, noise of half a per cent of the highest energy a tenth.
@@ -122,3 +128,92 @@ def _longest(true: NDArray[np.bool_]) -> slice:
         return slice(0, 0)
     best = int(np.argmax(ends - starts))
     return slice(int(starts[best]), int(ends[best]))
+
+
+Places: TypeAlias = "NDArray[np.intp]"
+
+# One way must be this many times smoother than the other to be believed.  At 24 samples per period of a chain of two
+# springs the least clear of 35 minima has 2.5, the usual ones have 5 to 60.
+_SMOOTHER = 2.0
+# Every other sample is left out again and again while minima are unclear: in fine output a zero drowns in the error
+# of the solver, 1e-5 of the highest energy, and the root is round there.  But minima stay this many samples apart.
+_LEAST_APART = 8
+# Samples of parts that are looked at together: what is made of them stays in the cache.
+_TOGETHER = 1 << 14
+# Signs of five samples about a minimum where the deformation turns nowhere, just before the minimum, just after it.
+_TURNS = np.array([[1, 1, 1, 1, 1], [-1, -1, 1, 1, 1], [-1, -1, -1, 1, 1]])
+
+
+class Zeros(NamedTuple):
+    """Times at which a deformation passes zero, at which it may or may not, and, near the ends, cannot be seen to."""
+
+    sure: Samples
+    doubtful: Samples
+    unseen: Samples
+
+
+def all_zeros(time: Samples, roots: Samples) -> Iterator[Zeros]:
+    """Find the zeros of each row of ``roots``, shape (k, n)."""
+    rows = max(1, _TOGETHER // time.size)
+    for first in range(0, len(roots), rows):
+        yield from _zeros(time, roots[first : first + rows])
+
+
+def _zeros(time: Samples, roots: Samples) -> list[Zeros]:
+    """Find the zeros of each row from every sample, or every other, and so on: what leaves the fewest doubts."""
+    best, stride = _zeros_of(time, roots, _minima(roots)), 2
+    unsure = _unsure(best, range(len(best)))
+    while unsure.size:
+        coarse = roots[unsure, ::stride]
+        minima = _minima(coarse)
+        apart = coarse.shape[1] >= _LEAST_APART * np.maximum(1, np.count_nonzero(minima, axis=1))
+        rows = unsure[apart].tolist()
+        for row, coarser in zip(rows, _zeros_of(time[::stride], coarse[apart], minima[apart]), strict=True):
+            best[row] = min(best[row], coarser, key=lambda found: found.doubtful.size)
+        unsure, stride = _unsure(best, rows), 2 * stride
+    return best
+
+
+def _unsure(zeros: Sequence[Zeros], rows: Iterable[int]) -> Places:
+    return np.array([row for row in rows if zeros[row].doubtful.size], dtype=np.intp)
+
+
+def _zeros_of(time: Samples, roots: Samples, minima: NDArray[np.bool_]) -> list[Zeros]:
+    """Zeros of each row from just these samples, which have these minima."""
+    row, at = np.nonzero(minima)
+    # two samples to either side tell how the root bends; of a minimum nearer to an end nothing is known
+    early, late = at < 2, at >= time.size - 2
+    own, middle = row[~early & ~late], at[~early & ~late]
+    around = middle[:, np.newaxis] + np.arange(-2, 3)
+    plain, before, after = _bends(time[around], roots[own[:, np.newaxis], around] * _TURNS[:, np.newaxis])
+    turned = np.minimum(before, after)
+    zero = plain > _SMOOTHER * turned
+    doubt = ~zero & (turned <= _SMOOTHER * plain)
+    left = np.where(before < after, middle - 1, middle)[zero]
+    low, high = roots[own[zero], left], roots[own[zero], left + 1]
+    share = np.divide(low, low + high, out=np.full(left.shape, 0.5), where=low + high > 0)
+    sure = time[left] + share * (time[left + 1] - time[left])
+    # a zero beside a minimum near an end may lie one sample further inwards
+    ends, unseen = np.append(row[early], row[late]), np.append(time[at[early] + 1], time[at[late] - 1])
+    order = np.argsort(ends, kind="stable")
+    tables = (sure, own[zero]), (time[middle[doubt]], own[doubt]), (unseen[order], ends[order])
+    parted = (_by_row(times, owners, len(roots)) for times, owners in tables)
+    return [Zeros(*one) for one in zip(*parted, strict=True)]
+
+
+def _by_row(values: Samples, row: Places, rows: int) -> list[Samples]:
+    """Values of each row, of which some may have none; they stand in the order of the rows."""
+    edges = np.searchsorted(row, np.arange(rows + 1)).tolist()
+    return [values[first:last] for first, last in pairwise(edges)]
+
+
+def _minima(values: Samples) -> NDArray[np.bool_]:
+    """Where in each row local minima are, of a flat one the first; an end below its neighbour counts."""
+    around = np.pad(values, ((0, 0), (1, 1)), constant_values=np.inf)
+    return np.asarray((values < around[:, :-2]) & (values <= around[:, 2:]))
+
+
+def _bends(times: Samples, values: Samples) -> Samples:
+    """Largest second difference of the slopes in each row of five samples, of any number of tables of such rows."""
+    slopes = (values[..., 1:] - values[..., :-1]) / (times[:, 1:] - times[:, :-1])
+    return np.asarray(np.abs(slopes[..., 1:] - slopes[..., :-1]).max(axis=-1, initial=0.0))

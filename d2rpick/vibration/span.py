@@ -1,17 +1,17 @@
-"""Where one oscillator describes the record: the window around td, found by growing and fitting anew."""
+"""Where one oscillator describes the record: the window around td, found by growing and fitting anew, once each."""
 
 from __future__ import annotations
 
 from functools import partial
 from math import ceil, log
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from d2rpick.vibration.identify import identify
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Hashable, Iterator
     from typing import Protocol
 
     from d2rpick.histories.history import History, Samples
@@ -192,3 +192,29 @@ def _cleared(
     if not core.describes_record or core.rms > _MUCH_BETTER * fit.rms:
         return span, fit
     return span_of(history, (inner.start + inner.end) / 2, core, bounds) or span, core
+
+
+_Found = TypeVar("_Found")
+
+
+class Fits:
+    """Fits to windows of one record by one set of rules, and what else is looked for in them, each made once."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[Hashable, ...], Any] = {}
+
+    def remembered(self, name: str, fitter: Fitter) -> Fitter:
+        """Give a fitter that does as ``fitter``, which has this name, and fits no window twice."""
+
+        def fit(time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
+            window = (*time[:1].tolist(), *time[-1:].tolist())  # of one record, so the ends tell the samples
+            return self.once((name, quick, *window), lambda: fitter(time, energy, quick=quick))
+
+        return fit
+
+    def once(self, key: tuple[Hashable, ...], make: Callable[[], _Found]) -> _Found:
+        """Make what is not known yet by this key."""
+        if key not in self._found:
+            self._found[key] = make()
+        found: _Found = self._found[key]
+        return found

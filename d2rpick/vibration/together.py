@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.vibration import measures
+from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.of_modes import OfModes, measured, spread
-from d2rpick.vibration.one_mode import Mode
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

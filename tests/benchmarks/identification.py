@@ -16,9 +16,9 @@ from scipy.optimize import least_squares
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
-from d2rpick.vibration.equivalent import replayed_residual
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Modes
+from d2rpick.vibration.oscillator import replayed_residual
 from tests.records import ENERGY, MODE, TIME, printed, vibration
 
 if TYPE_CHECKING:

@@ -16,8 +16,7 @@ from d2rpick.choice.suggest import Suggestion, suggest
 from d2rpick.choice.verify import verify, verify_at
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
-from d2rpick.vibration.modes import Modes
-from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.modes import Mode, Modes
 from tests import chain
 from tests.command import ROLLOVER
 from tests.paper import OMEGA_2

@@ -12,8 +12,8 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.errors import RangeError
-from d2rpick.vibration.equivalent import to_mode
-from d2rpick.vibration.fits import Fits
+from d2rpick.vibration.oscillator import to_mode
+from d2rpick.vibration.span import Fits
 from tests import chain, paper
 from tests.energies import codes, of
 

@@ -19,7 +19,7 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
 from d2rpick.histories.opening import Selection
-from d2rpick.vibration.fits import Fits
+from d2rpick.vibration.span import Fits
 from tests import paper
 from tests.computed import stored
 from tests.energies import codes, rollover

@@ -10,8 +10,8 @@ from d2rpick.choice.of_run import read
 from d2rpick.choice.settings import Settings
 from d2rpick.flight.bodies import RigidBody
 from d2rpick.histories.opening import Selection
-from d2rpick.vibration.fits import Fits
 from d2rpick.vibration.moments import Moments
+from d2rpick.vibration.span import Fits
 from tests import chain, paper
 from tests.energies import rollover
 

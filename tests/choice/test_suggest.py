@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.vibration.equivalent import to_mode
+from d2rpick.vibration.oscillator import to_mode
 from tests import paper
 from tests.energies import codes, of, rollover, vibration
 

@@ -20,7 +20,7 @@ from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.choice.trade_off import explore_of
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
-from d2rpick.vibration.fits import Fits
+from d2rpick.vibration.span import Fits
 from tests.command import ROOT
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from d2rpick.choice.flights import find_flights
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
-from d2rpick.flight.energy_alone import quiet_time
 from d2rpick.flight.flight import seen_flight
+from d2rpick.flight.internal_energy import quiet_time
 from d2rpick.histories.digits import window_as_read
 from d2rpick.histories.history import Balance, Given, History, Momenta
 from d2rpick.histories.names import Selection

@@ -12,10 +12,10 @@ from scipy.integrate import solve_ivp
 from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.flight.energy_alone import end_of_load
 from d2rpick.flight.flight import Flight
+from d2rpick.flight.internal_energy import end_of_load
 from d2rpick.histories.history import History
-from d2rpick.vibration.equivalent import to_mode
+from d2rpick.vibration.oscillator import to_mode
 from d2rpick.vibration.span import Span, described_span
 from tests import paper
 from tests.command import ROLLOVER

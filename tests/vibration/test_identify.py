@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from d2rpick.vibration.identify import Identification, _covariance, identify
-from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.modes import Mode
 from tests.command import ROLLOVER
 from tests.computed import columns, stored
 from tests.records import ENERGY, MODE, TIME, noisy, printed, vibration

@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.vibration import measures
-from d2rpick.vibration.equivalent import from_mode, replayed_residual, to_mode
-from d2rpick.vibration.one_mode import Mode
+from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.oscillator import from_mode, replayed_residual, to_mode
 from d2rpick.vibration.replay import Replay
 from tests import paper
 

@@ -1,24 +1,136 @@
-"""Several modes: their energies add up, they are found from the sum, and refused where there are more of them."""
+"""The closed form of a single-mode energy record."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
 from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
-from d2rpick.vibration.equivalent import replayed_residual
 from d2rpick.vibration.identify import identify, identify_several
 from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual
-from d2rpick.vibration.modes import Modes, sum_and_jacobian
-from d2rpick.vibration.one_mode import Mode
-from tests import chain
+from d2rpick.vibration.modes import Mode, Modes, sum_and_jacobian
+from d2rpick.vibration.oscillator import replayed_residual
+from tests import chain, paper
 from tests.command import ROLLOVER
 from tests.computed import columns
-from tests.records import noisy, printed
+from tests.records import MODE, noisy, printed
+
+MODES = st.builds(
+    Mode,
+    omega=st.floats(0.5, 50),
+    alpha=st.floats(0, 5),
+    cosine=st.floats(0.1, 2),
+    sine=st.floats(-2, 2),
+    origin=st.floats(-1, 1),
+    energy_plastic=st.floats(0, 3),
+    preload=st.floats(-3, 3),
+)
+T = np.linspace(-0.5, 2.0, 101)
+
+
+def test_energies_of_the_paper_at_64_ms() -> None:
+    assert float(MODE.energy(paper.TD)) == pytest.approx(paper.ENERGY_TD, rel=1e-11)
+    assert float(MODE.kinetic_energy(paper.TD)) == pytest.approx(paper.KINETIC_TD, rel=1e-11)
+    share = float(MODE.kinetic_energy(paper.TD) / MODE.vibration_energy(paper.TD))
+    assert share == pytest.approx(paper.KINETIC_SHARE, rel=1e-11)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_crossings_of_the_paper_with_their_signs(sign: int) -> None:
+    expected = np.array([time for time, same in paper.CROSSINGS if same == (sign > 0)])
+    crossings = np.array(MODE.crossings(sign * float(MODE.deformation(paper.TD)), 0.0, paper.TD))
+    np.testing.assert_allclose(crossings * 1e3, expected, rtol=1e-11)
+
+
+def test_peaks_of_the_paper() -> None:
+    times, energies = np.array(paper.PEAKS).T
+    peaks = np.array(MODE.peaks(0.0, 0.09))
+    np.testing.assert_allclose(peaks * 1e3, times, rtol=1e-11)
+    np.testing.assert_allclose(MODE.energy(peaks), energies, rtol=1e-11)
+
+
+def test_the_level_of_a_peak_is_crossed_before_it_but_not_at_it() -> None:
+    peak = MODE.peaks(0.0, 0.09)[5]
+    crossings = MODE.crossings(float(MODE.deformation(peak)), 0.0, 0.09)
+    assert crossings[0] == pytest.approx(paper.BETTER_TR, rel=1e-11)
+    assert max(crossings) < peak - 1e-3
+
+
+@given(MODES)
+def test_velocity_is_the_slope_of_the_deformation(mode: Mode) -> None:
+    h = 1e-5 / (mode.omega + mode.alpha)
+    slope = (mode.deformation(T + h) - mode.deformation(T - h)) / (2 * h)
+    np.testing.assert_allclose(slope, mode.velocity(T), atol=1e-7 * np.max(np.abs(mode.velocity(T))))
+
+
+@given(MODES)
+def test_energy_is_plastic_and_elastic_and_its_slope_2_q_velocity(mode: Mode) -> None:
+    np.testing.assert_array_equal(mode.energy(T), mode.energy_plastic + mode.deformation(T) ** 2)
+    h = 1e-5 / (mode.omega + mode.alpha)
+    slope = (mode.energy(T + h) - mode.energy(T - h)) / (2 * h)
+    expected = 2 * mode.deformation(T) * mode.velocity(T)
+    np.testing.assert_allclose(slope, expected, atol=1e-6 * (mode.omega + mode.alpha) * np.max(mode.energy(T)))
+
+
+@given(MODES)
+def test_damping_takes_twice_alpha_times_the_kinetic_energy(mode: Mode) -> None:
+    h = 1e-5 / (mode.omega + mode.alpha)
+    slope = (mode.vibration_energy(T + h) - mode.vibration_energy(T - h)) / (2 * h)
+    scale = (mode.omega + mode.alpha) * np.max(mode.vibration_energy(T))
+    np.testing.assert_allclose(slope, -2 * mode.alpha * mode.kinetic_energy(T), atol=1e-6 * scale)
+
+
+@given(MODES)
+def test_at_extrema_the_deformation_stands_still_and_between_them_it_does_not(mode: Mode) -> None:
+    extrema = np.array(mode.extrema(-0.5, 2.0))
+    assert abs(extrema.size - 2.5 * mode.omega / np.pi) <= 1.0
+    scale = np.max(np.abs(mode.velocity(T)))
+    np.testing.assert_allclose(mode.velocity(extrema), 0.0, atol=1e-12 * scale * mode.omega)
+    middles = (extrema[1:] + extrema[:-1]) / 2
+    assert np.all(mode.velocity(middles[1:]) * mode.velocity(middles[:-1]) < 0)
+
+
+@given(MODES)
+def test_peaks_are_higher_than_their_neighbourhood(mode: Mode) -> None:
+    peaks = np.array(mode.peaks(-0.5, 2.0))
+    h = 1e-3 / mode.omega
+    # a peak next to zero lies between two zeros that may be as near
+    high = peaks[mode.elastic_energy(peaks) > 1e-4 * np.max(mode.elastic_energy(T))]
+    for side in (-h, h):
+        assert np.all(mode.energy(high) > mode.energy(high + side))
+
+
+@given(MODES, st.floats(-0.999, 0.999))  # a level that is touched is met by rounding or not
+def test_crossings_are_all_sign_changes_on_a_fine_grid(mode: Mode, share: float) -> None:
+    level = mode.preload + share * mode.cosine
+    fine = np.linspace(-0.5, 2.0, 20001)
+    above = mode.deformation(fine) > level
+    crossings = mode.crossings(level, -0.5, 2.0)
+    np.testing.assert_allclose(
+        mode.deformation(np.array(crossings)), level, atol=1e-13 * (10 + abs(level)) * (1 + mode.omega)
+    )
+    # what the grid shows was found; two crossings inside one of its cells only show in pairs
+    assert len(crossings) >= np.count_nonzero(above[1:] != above[:-1])
+    assert (len(crossings) - np.count_nonzero(above[1:] != above[:-1])) % 2 == 0
+
+
+def test_an_extremum_that_touches_the_level_is_no_crossing() -> None:
+    mode = Mode(omega=np.pi, alpha=0.0, cosine=0.0, sine=2.0, origin=0.0)
+    assert mode.crossings(2.0, 0.0, 10.0) == ()
+    assert mode.crossings(2.1, 0.0, 10.0) == ()
+
+
+def test_both_ends_are_outside() -> None:
+    mode = Mode(omega=np.pi, alpha=0.0, cosine=0.0, sine=2.0, origin=0.0)
+    assert mode.crossings(0.0, 0.0, 2.0) == (1.0,)
+    assert mode.extrema(0.5, 2.5) == (1.5,)
+
 
 TIME = np.linspace(0, 6, 1200)
 

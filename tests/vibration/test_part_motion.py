@@ -11,9 +11,8 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.vibration.measures import kinetic_share, lock_in_error
-from d2rpick.vibration.part_motion import by_own_modes, followed
+from d2rpick.vibration.part_motion import all_zeros, by_own_modes, followed
 from d2rpick.vibration.part_signs import read_parts
-from d2rpick.vibration.part_zeros import all_zeros
 from d2rpick.vibration.waves import Waves
 from tests.benchmarks.promise_parts import Motion, history
 from tests.records import noisy

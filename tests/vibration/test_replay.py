@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.errors import RangeError
-from d2rpick.vibration.equivalent import from_mode, to_mode
-from d2rpick.vibration.one_mode import Mode
-from d2rpick.vibration.oscillator import Oscillator, State
+from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.oscillator import Oscillator, State, from_mode, to_mode
 from d2rpick.vibration.replay import Replay, trajectory
 from tests import paper
 

@@ -1,21 +1,24 @@
-"""Fit the energy of one vibration mode to samples by least squares, without being given a first guess.
+"""Fit the energy of one to three vibration modes to samples by least squares, without being given a first guess.
 
 Everything here is scaled: s in [0, 1] over the record, energies in units of the record's range.  A parameter
 vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
 
-    E(s) = energy_plastic + q**2,  q = preload + exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)).
+    E(s) = energy_plastic + q**2,  q = preload + exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)),
+
+or that of `Modes.of`: alpha and, for each mode, omega, cosine and sine.  What a fit leaves over may be white noise;
+structure that neighbouring samples share must be small.
 """
 
 from __future__ import annotations
 
 from functools import partial
+from itertools import combinations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.histories.samples import integral
-from d2rpick.vibration.one_mode import energy_and_jacobian
-from d2rpick.vibration.structure import surely_structured
+from d2rpick.vibration.modes import energy_and_jacobian, sum_and_jacobian
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -26,6 +29,7 @@ if TYPE_CHECKING:
 
     # Energies (n,) at n times and their derivatives (p, n) by the first p parameters.
     Model = Callable[[Samples, Samples], tuple[Samples, Samples]]
+
 
 VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6  # free parameters of the three models
 
@@ -259,3 +263,74 @@ def _of_block(parameters: Samples, model: Model, s: Samples, e: Samples) -> tupl
     energy, jacobian = model(parameters, s)
     rest = e - energy
     return float(rest @ rest), jacobian @ jacobian.T, jacobian @ rest
+
+
+# Least difference of two rates over the record to start from [rad]: below a quarter of a beat two modes act as one.
+_LEAST_APART: Final = np.pi / 4
+# Of the variance: rates that leave more of it unexplained are none of the record's, and refining them is no use.
+_HOPELESS: Final = 0.5
+
+
+def fit_several(pencil: Pencil, s: Samples, e: Samples, count: int, worst: float = np.inf) -> Samples | None:
+    """Return the least-squares parameters of ``count`` modes; None where E, of this ``pencil``, shows fewer rates.
+
+    Each mode makes exp(-alpha s) times a constant and a vibration at twice its rate, so the constants add up and
+    3 count exponentials leave room for what is none.  For known rates E is linear in the rest, which ranks the
+    rates and gives the parameters.  None also where a few of the samples refuse the fit, as for one mode.
+    """
+    return best_of_starts(partial(_starts_of_several, pencil, count), sum_and_jacobian, s, e, worst)
+
+
+def _starts_of_several(pencil: Pencil, count: int, s: Samples, e: Samples) -> list[Samples]:
+    """Return the best parameter vectors to start from, for a few of the samples."""
+    poles = pencil.rates((3 * count,))
+    hopeless = _HOPELESS * float(np.sum((e - np.mean(e)) ** 2))
+    omega, alpha = poles.imag / 2, np.maximum(-poles.real, -1.0)  # growth is refused anyway
+    found = []
+    for chosen in combinations(range(poles.size), count):
+        members = list(chosen)
+        if np.diff(np.sort(omega[members])).min() >= _LEAST_APART:
+            found.append(linear_fit(omega[members], float(np.median(alpha[members])), s, e))
+    return [start for misfit, start in sorted(found, key=lambda one: one[0])[:STARTS] if misfit < hopeless]
+
+
+def linear_fit(omega: Samples, alpha: float, s: Samples, e: Samples) -> tuple[float, Samples]:
+    """Fit the amplitudes for known rates; return the sum of squares and the parameters."""
+    angle = 2 * omega[:, np.newaxis] * s
+    basis = np.exp(-alpha * s) * np.concatenate([np.ones((1, s.size)), np.cos(angle), np.sin(angle)])
+    linear = np.linalg.lstsq(basis.T, e, rcond=None)[0]
+    misfit = float(np.sum((e - linear @ basis) ** 2))
+    cosine, sine = np.split(linear[1:], 2)
+    phasor = np.sqrt(2 * (cosine + 1j * sine))  # (cosine + i sine)**2 / 2 of each mode
+    table = np.stack([omega, phasor.real, phasor.imag], axis=1)
+    return misfit, np.array([alpha, *table.ravel()])
+
+
+MAX_STRUCTURE: Final = 0.02  # of std(E): thirty times what one real solver leaves with one mode
+
+# Of the covariance of white noise's neighbours: what exceeds three standard deviations is taken for structure; six
+# are beyond all doubt.
+_DEVIATIONS: Final = 3.0
+_BEYOND_DOUBT: Final = 6.0
+# Samples that are farther apart may share more of a slow structure than neighbours, at most twice its variance.
+_BEYOND_STRUCTURE: Final = 2.0
+
+
+def structure_of(rest: Samples, deviations: float = _DEVIATIONS) -> float:
+    """Root of the covariance of neighbours in ``rest`` beyond so many standard deviations of white noise's.
+
+    The larger of lags 1 and 2: a vibration sampled four times per period shows at the second only.
+    """
+    excess = 0.0
+    for lag in (1, 2):
+        products = rest[:-lag] * rest[lag:]
+        excess = max(excess, abs(float(np.sum(products))) - deviations * float(np.linalg.norm(products)))
+    return float(np.sqrt(excess / rest.size))
+
+
+def surely_structured(rest: Samples, spread: float) -> bool:
+    """Whether what is left on some of the samples, evenly chosen, shows that all of them leave too much structure.
+
+    ``spread`` is the standard deviation of the energy there.
+    """
+    return structure_of(rest, _BEYOND_DOUBT) > _BEYOND_STRUCTURE * MAX_STRUCTURE * spread

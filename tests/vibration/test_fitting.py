@@ -5,10 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.vibration.fit_one import VIBRATION, Pencil, fails, fit, hopeless
+from d2rpick.vibration.fitting import (
+    MAX_STRUCTURE,
+    VIBRATION,
+    Pencil,
+    fails,
+    fit,
+    hopeless,
+    structure_of,
+    surely_structured,
+)
 from d2rpick.vibration.identify import HOPELESS, identify, identify_several
-from d2rpick.vibration.one_mode import energy_and_jacobian
-from d2rpick.vibration.structure import MAX_STRUCTURE, structure_of, surely_structured
+from d2rpick.vibration.modes import energy_and_jacobian
 
 S = np.linspace(0.0, 1.0, 20_000)
 

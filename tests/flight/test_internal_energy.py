@@ -11,7 +11,7 @@ from d2rpick.choice.examine import examine
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.flight.level import moves_as_a_whole, settled_from
+from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around
 from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Precision
 from d2rpick.histories.names import Part
@@ -20,6 +20,7 @@ from tests.records import printed
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
+
 
 PLAIN = Settings(replay=False)
 TIME = np.linspace(0.0, 1.0, 1001)
