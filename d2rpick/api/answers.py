@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.health import Health
     from d2rpick.choice.judged_card import SolverInput
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.ranking import Quality
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.suggest import Pair
     from d2rpick.choice.trade_off import TradeOff

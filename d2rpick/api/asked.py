@@ -67,7 +67,7 @@ def asked_of(
     if model is None:
         return Asked(Reference.of(run.files, chosen), chosen, settings, (), options)
     from d2rpick.choice.by_deck import selected, with_deck
-    from d2rpick.choice.surroundings import in_deck
+    from d2rpick.choice.deck_of_run import in_deck
 
     files = in_deck(run.files, model.inventory)
     selection = selected(files, chosen, settings, model)

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from d2rpick.choice.calibrate import Calibration as Core
-    from d2rpick.choice.calibrate import Observation
+    from d2rpick.choice.calibration import Calibration as Core
+    from d2rpick.choice.calibration import Observation
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.warnings import Caution
 
@@ -93,8 +93,8 @@ def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
     >>> round(found.weights.element_share, 2)
     0.65
     """
-    from d2rpick.choice.calibrate import calibrate as fitted
-    from d2rpick.choice.observed_cost import observations_of_runs
+    from d2rpick.choice.calibration import calibrate as fitted
+    from d2rpick.choice.calibration import observations_of_runs
 
     names = arguments.paths("runs", runs)
     observations, cautions = observations_of_runs(names)

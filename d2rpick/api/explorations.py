@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
-    from d2rpick.choice.offer import Offer
-    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.trade_off import Offer, TradeOff
     from d2rpick.choice.warnings import Caution
 
 

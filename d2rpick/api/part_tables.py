@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
-    from d2rpick.choice.part_sets import Parts as Core
-    from d2rpick.choice.part_sets import PartSet
-    from d2rpick.choice.part_verdicts import PartRow
+    from d2rpick.choice.sets_of_parts import Parts as Core
+    from d2rpick.choice.sets_of_parts import PartSet
+    from d2rpick.choice.switchable_parts import PartRow
     from d2rpick.choice.warnings import Caution
 
 
@@ -120,7 +120,7 @@ def parts(
     >>> [row.title for row in d2.parts(d2.read("sample_data/rollover_box.matsum")).rows]
     ['box', 'step']
     """
-    from d2rpick.choice.part_sets import given_parts, parts_of
+    from d2rpick.choice.sets_of_parts import given_parts, parts_of
 
     check_run(run)
     settings = arguments.settings(choosing, with_deck=True)

@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.cost import ByDeck, CostModel, Weights
-from d2rpick.choice.deck_doubts import (
+from d2rpick.choice.deck_of_run import (
+    bodies_of,
     doubts_of,
     doubts_of_bodies,
     doubts_of_cost,
@@ -14,8 +15,7 @@ from d2rpick.choice.deck_doubts import (
     left_rigid_in,
     of_another_model,
 )
-from d2rpick.choice.part_sets import recommended_parts, with_cost_of
-from d2rpick.choice.rigid_bodies import bodies_of
+from d2rpick.choice.sets_of_parts import recommended_parts, with_cost_of
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck import read_inventory
 from d2rpick.deck.geometry import Placement

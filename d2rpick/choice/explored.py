@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.choice.suggest_td import bounds
+from d2rpick.choice.flights import bounds
 from d2rpick.choice.trade_off import TradeOff, explore_of
 from d2rpick.errors import RangeError
 

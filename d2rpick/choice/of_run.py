@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from d2rpick.choice.examine import examine
-from d2rpick.choice.sound import refuse_unsound
+from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_health, refuse_unsound
+from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import Suggestion, suggest_at
 from d2rpick.choice.verify import Verdict, verify, verify_at, with_comparison
 from d2rpick.choice.warnings import cautions_of_engine
@@ -152,8 +152,6 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
     balance = balance_of(run, history.parts, td)
     if balance is None:
         return answer
-    from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_health  # not above: plain tables do without it
-
     if isinstance(answer, Verdict):
         start: float | None = answer.candidate.tr
     else:
@@ -175,8 +173,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
 
 
 def _comparison(verdict: Verdict, run: Run, switched: Reference) -> Comparison:
-    from d2rpick.choice.comparison import compare_runs
-    from d2rpick.choice.judged_parts import judged_parts
+    from d2rpick.choice.comparison import compare_runs, judged_parts
 
     situation = verdict.situation
     flight, parts = situation.flight, situation.history.parts

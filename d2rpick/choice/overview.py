@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice.health import Health, assess, cautions_of_health
+from d2rpick.choice.flights import bounds, flights_of
+from d2rpick.choice.health import Health, assess, cautions_of_health, refuse_unsound, unsound
 from d2rpick.choice.settings import Settings
-from d2rpick.choice.sound import refuse_unsound, unsound
-from d2rpick.choice.suggest_td import bounds, flights_of
 from d2rpick.choice.warnings import cautions_of_engine
 from d2rpick.errors import FormatError, RangeError
 from d2rpick.flight.flying_parts import with_parts_by_number
@@ -25,8 +24,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.warnings import Caution
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import History
-    from d2rpick.histories.names import Part
-    from d2rpick.histories.opening import Run, Selection
+    from d2rpick.histories.names import Part, Selection
+    from d2rpick.histories.run import Run
 
 
 # Cards that write the momenta of parts.
@@ -132,8 +131,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
 
 def _in_deck(run: Run, deck: str) -> tuple[Run, tuple[Caution, ...]]:
     """Let a deck tell what acts on a run; DeckError where it cannot be read."""
-    from d2rpick.choice.deck_doubts import doubts_of_solver, of_another_model  # not above: few name a deck
-    from d2rpick.choice.surroundings import in_deck
+    from d2rpick.choice.deck_of_run import doubts_of_solver, in_deck, of_another_model  # not above: few name a deck
     from d2rpick.deck import read_inventory
 
     inventory = read_inventory(deck)

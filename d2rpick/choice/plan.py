@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice.margin import Margin, margin_before_contact
+from d2rpick.choice.flights import Margin, bounds, flights_of, last_td, margin_before_contact
+from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import Reference, suggest_of
-from d2rpick.choice.sound import refuse_unsound
-from d2rpick.choice.suggest_td import bounds, flights_of, last_td
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
 from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
 from d2rpick.flight.internal_energy import round_off
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.ranking import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.switched_run import Times

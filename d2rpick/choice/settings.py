@@ -28,7 +28,7 @@ class Settings:
     """What the analyst asks for; times in the unit of the history.
 
     ``after``: the load ends here (None: found from the record).  ``margin``: kept clear after the load and before
-    the next contact (None: nothing, but where td is chosen what `d2rpick.choice.margin` derives before the contact).
+    the next contact (None: nothing, but where td is chosen what `d2rpick.choice.flights` derives before the contact).
     ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
     given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by

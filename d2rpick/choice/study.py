@@ -9,8 +9,7 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows, clear_of_td
-from d2rpick.choice.error_profile import error_profile
+from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows, clear_of_td, error_profile
 from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.study_rows import (
     FAILED,

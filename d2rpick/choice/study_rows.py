@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.acceptable_windows import common_windows, coverage
-from d2rpick.choice.error_profile import error_at
+from d2rpick.choice.acceptable_windows import common_windows, coverage, error_at
 from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.errors import listing
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.examine import examine
-from d2rpick.choice.ranking import EQUALLY_GOOD, over_limits, rank, recommend
+from d2rpick.choice.ranking import EQUALLY_GOOD, over_limits, quality_of, rank, recommend
+from d2rpick.choice.situation import examine
 from d2rpick.choice.verify import verify_at
 from d2rpick.choice.warnings import Caution, cautions_of, out_of_place
 from d2rpick.errors import RangeError
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate, Candidates
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.health import Health
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.ranking import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
@@ -88,11 +88,7 @@ class Suggestion:
     def quality(self) -> Quality | None:
         """How good the recommended pair is; None without one."""
         best = self.chosen
-        if best is None:
-            return None
-        from d2rpick.choice.quality import quality_of  # not above: a bare value does without it
-
-        return quality_of(self.situation, best, self.expected)
+        return quality_of(self.situation, best, self.expected) if best else None
 
     @property
     def clearly_better(self) -> Pair | None:

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.choice.candidates import candidates_of
-from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import mean_in_flight, shortfall
-from d2rpick.choice.flights import find_flights
-from d2rpick.choice.margin import margin_before_contact
-from d2rpick.choice.ranking import like_quality, rank, recommend
-from d2rpick.choice.reach_back import longest_rigid_times
+from d2rpick.choice.flights import longest_flight, margin_before_contact
+from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, rank, recommend
+from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
-from d2rpick.errors import RangeError
-from d2rpick.flight.flight import SOURCES, witnesses
+from d2rpick.flight.flight import SOURCES
+from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import not_after, sum_as_read
 from d2rpick.vibration.span import Fits
 
@@ -27,11 +25,51 @@ if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
-    from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History
+    from d2rpick.histories.history import History, Samples
 
     Look = Callable[[float], Situation]
     Choice = tuple[Situation, Candidate]
+
+# Level error that rounding leaves of a crossing at most, of a level above this share of the highest energy.
+_ROUNDING: Final = 1e-3
+
+
+def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
+    """Upper bounds for the rigid time of the tr that is recommended at each of many td, of their shape (n,) [time].
+
+    Where the level is all that decides, that tr does not lie before the energy first comes near the level at td: by
+    the tolerance, or by what counts as like levels where it passes the level itself and turns twice before td.  Where
+    a model of the vibration decides at some td, or the level is round-off, the start of the flight is the bound.  Zero
+    where that start is not known.
+    """
+    start, history = situation.earliest_tr, situation.history
+    if start is None:
+        return np.zeros(times.shape)
+    start = max(start, float(history.time[0]))
+    if situation.evidence.has_model or start >= history.time[-1]:
+        return np.maximum(times - start, 0.0)
+    later = history.time > start
+    time = np.append(start, history.time[later])
+    energy = np.append(history.energy_at(start), history.energy[later])
+    level, tolerance = history.energies_at(times), situation.settings.tolerance
+    passed = time[np.minimum(_reached(energy, level, np.full(times.shape, -_ROUNDING)), time.size - 1)]
+    turns = np.searchsorted(history.turns, times) - np.searchsorted(history.turns, passed, side="right")
+    passes = (turns >= 2) & (level > _ROUNDING * np.abs(history.energy).max())
+    near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + _ROUNDING
+    entered = time[np.maximum(_reached(energy, level, near) - 1, 0)]  # or since, but after the state before
+    return np.asarray(np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0))
+
+
+def _reached(energy: Samples, level: Samples, near: Samples) -> Samples:
+    """Index of the first state by which the energy has been in the band about each level; their number where none is.
+
+    The band holds the level errors up to ``near``; of a negative one both sides of the level have been met.
+    """
+    low, high = (np.maximum(level, 0.0) * np.maximum(1 + sign * near, 0.0) ** 2 for sign in (-1, 1))
+    lowest, highest = np.minimum.accumulate(energy), np.maximum.accumulate(energy)
+    fallen = energy.size - np.searchsorted(lowest[::-1], high, side="right")
+    return np.asarray(np.maximum(fallen, np.searchsorted(highest, low, side="left")))
+
 
 # Peaks of a window that are tried: the highest, since the higher a peak of several modes, the less energy is kinetic,
 # and the last, since the later td the more is saved.
@@ -53,53 +91,6 @@ def suggest_in_longest_flight(history: History, settings: Settings) -> Suggestio
     """
     fits = Fits()
     return suggest_in_window(history, longest_flight(history, settings, fits), settings, fits)
-
-
-def longest_flight(
-    history: History, settings: Settings, fits: Fits | None = None, *, otherwise: tuple[float, float] | None = None
-) -> tuple[float, float]:
-    """Give the longest flight as a window for td within the record [time].
-
-    The energy alone may show no end of the flight to the td in it: then the margin is kept from the one that was found.
-    ``otherwise`` is given where nothing shows a flight; without it that is a RangeError.
-    """
-    flights = flights_of(history, settings, fits)
-    if not flights and otherwise:
-        return otherwise
-    if not flights:
-        held = history.surroundings.held(history.parts, float(history.time[-1]))
-        found = held or "nothing in the record shows a flight, in which td could be chosen"
-        cure = "give `td`, and the end of the load as `after` where it is known"
-        cure = "only what nothing holds can be switched" if held else cure
-        raise RangeError(f"{', '.join(history.source)}: {found}; {cure}")
-    windows = [(bounds(history, flight), flight) for flight in flights]
-    (start, end), longest = max(windows, key=lambda one: one[0][1] - one[0][0])
-    latest = last_td(end, margin_before_contact(history, longest, settings.margin).time)
-    return start, latest if longest.source == "energy" and latest > start else end
-
-
-def last_td(end: float, margin: float) -> float:
-    """Give the last td, as it is read, that keeps a margin from the end of a flight [time]."""
-    return not_after(sum_as_read(end, -margin)) if margin else end
-
-
-def flights_of(history: History, settings: Settings, fits: Fits | None = None) -> tuple[Flight, ...]:
-    """Find all flights; where the energy is all there is, one oscillator for the whole record, else none is sought."""
-    if any(True for _ in witnesses(history)) or not settings.replay:
-        return find_flights(history, settings, fits)
-    first = float(history.time[0]) if settings.after is None else settings.after
-    middle = examine(history, (first + float(history.time[-1])) / 2, settings, fits)
-    start, end = bounds(history, middle.flight)
-    if middle.evidence.span and start < end and not middle.flight.refusal:
-        # it ends with the oscillator, also where its start is given
-        return (middle.flight,)
-    return find_flights(history, replace(settings, replay=False))
-
-
-def bounds(history: History, flight: Flight) -> tuple[float, float]:
-    """Give a flight as a window within the record [time]."""
-    first, last = float(history.time[0]), float(history.time[-1])
-    return first if flight.start is None else flight.start, last if flight.end is None else flight.end
 
 
 def suggest_in_window(

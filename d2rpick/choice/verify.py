@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.candidates import Candidate, judge
-from d2rpick.choice.examine import examine
-from d2rpick.choice.ranking import keeps, kept, over_limits
+from d2rpick.choice.ranking import keeps, kept, over_limits, quality_of
+from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of, out_of_place
 from d2rpick.errors import RangeError
 from d2rpick.vibration.moments import Moment
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.health import Health
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.ranking import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
@@ -52,8 +52,7 @@ class Verdict:
         """How good the pair is; None where it does not verify."""
         if not self.verified:
             return None
-        from d2rpick.choice.expectation import expectation  # not above: a verdict in a study does without them
-        from d2rpick.choice.quality import quality_of
+        from d2rpick.choice.expectation import expectation  # not above: an oscillator does without it
 
         return quality_of(self.situation, self.candidate, expectation(self.situation, self.candidate.energy))
 

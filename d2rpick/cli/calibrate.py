@@ -36,8 +36,7 @@ def command(
     with /MON/ON), d3hsp or glstat of LS-DYNA.  Give runs with and without switching of the same model: what they do
     not tell apart keeps the ratio that was measured.  A run that is named twice counts once.
     """
-    from d2rpick.choice.calibrate import calibrate
-    from d2rpick.choice.observed_cost import observations_of_runs
+    from d2rpick.choice.calibration import calibrate, observations_of_runs
 
     output = Output.of(options)
     observations, cautions = observations_of_runs(folders)

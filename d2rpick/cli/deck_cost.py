@@ -77,7 +77,7 @@ def with_deck(
     if model is None:
         return run, options
     from d2rpick.choice.by_deck import selected
-    from d2rpick.choice.surroundings import in_deck
+    from d2rpick.choice.deck_of_run import in_deck
     from d2rpick.histories.names import Selection
 
     run = in_deck(run, model.inventory)

@@ -14,7 +14,7 @@ from d2rpick.cli.typed import JUDGING, dashed, judging
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.ranking import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.histories.opening import Run, Selection
     from d2rpick.vibration.modes import Mode
@@ -351,7 +351,7 @@ def falls_short(quality: Quality | None, wanted: str | None) -> bool:
     """Whether a pair is worse than --min-quality asks for."""
     if wanted is None or quality is None:
         return False
-    from d2rpick.choice.quality import GRADES
+    from d2rpick.choice.ranking import GRADES
 
     return GRADES.index(quality.grade) < GRADES.index(wanted)
 

@@ -55,7 +55,7 @@ def command(
     Each part with its elements, material, mass and energy, and a verdict with its reasons; then sets of parts with the
     run time that they save, and the one to take.  A set that --part names is compared too.
     """
-    from d2rpick.choice.part_sets import given_parts, parts_of
+    from d2rpick.choice.sets_of_parts import given_parts, parts_of
 
     times = _times(tr, td)
     asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)

@@ -34,7 +34,7 @@ def check_usage(deck: str | None, folder: str | None) -> None:
 
 def check_model(run: Run, model: CostModel | None, options: dict[str, Any]) -> None:
     """Raise DeckError where the deck that is to be copied is not that of the run."""
-    from d2rpick.choice.deck_doubts import of_another_model
+    from d2rpick.choice.deck_of_run import of_another_model
 
     foreign = of_another_model(run, model.inventory) if model and options["write_deck"] else None
     if foreign:

@@ -13,7 +13,7 @@ from d2rpick.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.calibrate import Calibration, Observation
+    from d2rpick.choice.calibration import Calibration, Observation
 
 SCHEMA = "d2rpick/calibrate/1"
 HEAD = ("formulation", "weight", "measured with OpenRadioss", "by")

@@ -24,10 +24,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.offer import Offer
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.suggest import AcceptableWindow
-    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.trade_off import Offer, TradeOff
     from d2rpick.choice.view import View
     from d2rpick.histories.history import Samples
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.health import Health
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.ranking import Quality
     from d2rpick.choice.suggest import Pair
     from d2rpick.choice.verify import Verdict
     from d2rpick.choice.warnings import Caution

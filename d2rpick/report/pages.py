@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.comparison import Comparison
-    from d2rpick.choice.part_sets import Parts, PartSet
     from d2rpick.choice.plan import Plan, Planned
+    from d2rpick.choice.sets_of_parts import Parts, PartSet
     from d2rpick.choice.study import Study
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.trade_off import TradeOff

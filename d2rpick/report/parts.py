@@ -12,9 +12,9 @@ from d2rpick.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.part_facts import InFlight
-    from d2rpick.choice.part_sets import Parts, PartSet
-    from d2rpick.choice.part_verdicts import PartRow
+    from d2rpick.choice.part_evidence import InFlight
+    from d2rpick.choice.sets_of_parts import Parts, PartSet
+    from d2rpick.choice.switchable_parts import PartRow
 
 SCHEMA = "d2rpick/parts/1"
 HEAD = (

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.ranking import Quality
     from d2rpick.choice.suggest import AcceptableWindow, Pair, Suggestion
 
 SCHEMA = "d2rpick/suggest/1"

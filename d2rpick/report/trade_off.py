@@ -12,8 +12,7 @@ from d2rpick.report.situation import frame, mechanics, read_line
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.offer import Offer
-    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.trade_off import Offer, TradeOff
 
 SCHEMA = "d2rpick/explore/1"
 HEAD = ("", "td", "peak", "tr", "error", "level error", "K", "rigid", "of record", "run time", "tolerance", "quality")

@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.choice.examine import examine
+from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.choice.of_run import Reference, verify_of
+from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import find_better_pair, suggest_at
-from d2rpick.choice.surroundings import in_deck
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, Caution, end_of_flight, end_of_load
 from d2rpick.deck import read_inventory
 from d2rpick.errors import DeckError, FormatError, name_units

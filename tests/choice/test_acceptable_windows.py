@@ -9,8 +9,15 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows, clear_of_td, common_windows, coverage
-from d2rpick.choice.error_profile import error_at, error_profile
+from d2rpick.choice.acceptable_windows import (
+    acceptable_windows,
+    alike_windows,
+    clear_of_td,
+    common_windows,
+    coverage,
+    error_at,
+    error_profile,
+)
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import Suggestion, suggest
 from d2rpick.choice.verify import verify, verify_at

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.choice.calibrate import Observation, calibrate
+from d2rpick.choice.calibration import Observation, calibrate, observations_of, observations_of_runs
 from d2rpick.choice.cost import MEASURED
-from d2rpick.choice.observed_cost import observations_of, observations_of_runs
 from d2rpick.errors import ConfigurationError, DeckError, FormatError
 from tests.deck.test_radioss import BEGIN, PROPS, nodes, wide
 

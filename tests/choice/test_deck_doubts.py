@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.choice.deck_doubts import doubts_of_solver
+from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.deck import read_inventory
 from d2rpick.rules import RULES, check_deck
 from tests.command import ENERGY, OSCILLATOR, answer, run

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.acceptable_windows import acceptable_windows
-from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import MOST_KEPT, expectation, most_energy
-from d2rpick.choice.offer import offers_of
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest_at
+from d2rpick.choice.trade_off import offers_of
 from d2rpick.choice.verify import approve, verify_at
 from d2rpick.histories.history import History
 from d2rpick.report.suggestion import as_table

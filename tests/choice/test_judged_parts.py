@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from d2rpick.choice.comparison import rigid_parts
 from d2rpick.choice.of_run import Reference, compare_with, read, verify_of
-from d2rpick.choice.rigid_parts import rigid_parts
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.switched_run import switched_history
 from d2rpick.histories.opening import Selection, open_run

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.cost import CostModel, Weights
-from d2rpick.choice.part_facts import InFlight, PartFacts, facts_of
-from d2rpick.choice.part_sets import Parts, parts_of, recommended_parts
-from d2rpick.choice.part_steps import Steps
-from d2rpick.choice.part_verdicts import PartRow, landing_alone, rows_of
+from d2rpick.choice.part_evidence import InFlight, PartFacts, Steps, facts_of
+from d2rpick.choice.sets_of_parts import Parts, parts_of, recommended_parts
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.switchable_parts import PartRow, landing_alone, rows_of
 from d2rpick.deck import read_inventory
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import open_run

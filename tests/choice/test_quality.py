@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.choice.of_run import read
-from d2rpick.choice.quality import GRADES, Quality, quality_of, states_per_period
+from d2rpick.choice.ranking import GRADES, Quality, quality_of, states_per_period
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import read
 from d2rpick.choice.ranking import EQUALLY_GOOD, keeps, kept, order, rank, recommend
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
 from d2rpick.histories.opening import Selection

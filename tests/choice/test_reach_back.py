@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.examine import examine
 from d2rpick.choice.ranking import rank, recommend
-from d2rpick.choice.reach_back import longest_rigid_times
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import examine
+from d2rpick.choice.suggest_td import longest_rigid_times
 from tests import paper
 from tests.energies import of
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import read
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.flight.bodies import RigidBody
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.moments import Moments

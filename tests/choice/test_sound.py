@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from d2rpick.choice.sound import unsound
+from d2rpick.choice.health import unsound
 from d2rpick.histories.history import Balance, Given, History
 from tests.command import answer, codes, run
 

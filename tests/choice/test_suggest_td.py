@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from d2rpick.choice.examine import examine
 from d2rpick.choice.expectation import expectation, shortfall
 from d2rpick.choice.of_run import read
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.errors import RangeError

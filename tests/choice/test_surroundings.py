@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import d2rpick as d2
-from d2rpick.choice.examine import examine
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.errors import D2RPickError
 from d2rpick.flight.momentum import flight_around

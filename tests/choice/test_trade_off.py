@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.examine import examine
 from d2rpick.choice.of_run import Reference, read
 from d2rpick.choice.ranking import rank, recommend
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.choice.trade_off import explore_of
 from d2rpick.histories.history import History
@@ -24,8 +24,7 @@ from d2rpick.vibration.span import Fits
 from tests.command import ROOT
 
 if TYPE_CHECKING:
-    from d2rpick.choice.offer import Offer
-    from d2rpick.choice.trade_off import TradeOff
+    from d2rpick.choice.trade_off import Offer, TradeOff
     from d2rpick.histories.run import Run
 
 SAMPLES = {

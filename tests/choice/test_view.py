@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.examine import examine
 from d2rpick.choice.replayed import replayed_motion
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.choice.view import view
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import History

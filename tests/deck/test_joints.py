@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.choice.rigid_bodies import bodies_of
+from d2rpick.choice.deck_of_run import bodies_of
 from d2rpick.flight.bodies import RigidBody
 from tests.deck import test_radioss as rad
 from tests.deck.test_ls_dyna import inventory, nodes, row

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.choice.surroundings import in_deck
+from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.deck import read_inventory
 from d2rpick.deck.pieces import supports_of
 from d2rpick.histories.opening import open_run

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.choice.rigid_bodies import bodies_of
+from d2rpick.choice.deck_of_run import bodies_of
 from d2rpick.deck import read_inventory
 from d2rpick.deck.pieces import pieces_of
 from d2rpick.flight.bodies import RigidBody

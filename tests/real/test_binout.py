@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.choice.part_sets import parts_of
+from d2rpick.choice.sets_of_parts import parts_of
 from d2rpick.choice.settings import Settings
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection, open_run

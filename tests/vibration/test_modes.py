@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
-from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, identify_several

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.choice.examine import examine
 from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, identify_several, judge_given
 from d2rpick.vibration.modes import Mode

@@ -1,25 +1,48 @@
-"""What may be wrong with what a deck says: of another model, not followed as a whole, weights taken over.
+"""What the deck of a run tells about it, which rigid bodies its parts become, and what may be wrong with what it says.
 
 The deck of another model tells numbers of parts that have nothing to do with the run: nothing of it is used.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.rigid_bodies import bodies_of
+import numpy as np
+
 from d2rpick.choice.warnings import Caution
-from d2rpick.deck.pieces import pieces_of
+from d2rpick.deck.pieces import pieces_of, supports_of
 from d2rpick.deck.radioss_run import LEFT_RIGID
 from d2rpick.errors import FormatError, are, name_units
+from d2rpick.flight.bodies import RigidBody
+from d2rpick.histories.surroundings import Support, Surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from d2rpick.choice.cost import CostModel
-    from d2rpick.deck.model import Inventory
+    from d2rpick.deck.model import Gravity, Hold, Inventory
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
+
+
+def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, ...]:
+    """Give the rigid bodies that these parts become; none where elements, or ties between bodies, are not known.
+
+    A part in pieces that nothing joins is one body all the same in LS-DYNA, which switches parts; in Radioss, where a
+    body is a set of nodes, each piece may have a body of its own.
+    """
+    if not inventory.complete or not inventory.counts.keys() >= set(parts):
+        return ()
+    bodies = inventory.bodies(parts)
+    if len(bodies) > 1 and inventory.ties:
+        return ()
+    return tuple(RigidBody(body, _whole(inventory, body)) for body in bodies)
+
+
+def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
+    alone = len(body) == 1 and inventory.solver == "radioss"
+    return alone or frozenset(body) in inventory.ready or pieces_of(inventory, body) == 1
 
 
 def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
@@ -117,3 +140,60 @@ def _differ(one: str, other: str) -> bool:
     first, second = (" ".join(title.split()).casefold() for title in plain)
     shorter = min(len(first), len(second))
     return first[:shorter] != second[:shorter]
+
+
+def in_deck(run: Run, inventory: Inventory | None) -> Run:
+    """Give a run with what its deck tells; as it is without one, or with that of another model."""
+    if inventory is None or of_another_model(run, inventory):
+        return run
+    return run.within(_surroundings(inventory))
+
+
+def _surroundings(inventory: Inventory) -> Surroundings:
+    by_part, whole = supports_of(inventory)
+    supports: dict[int | None, tuple[Support, ...]] = {part: _supports(holds) for part, holds in by_part.items()}
+    supports[None] = _supports(whole)
+    gravity: dict[int | None, tuple[float, ...]] = dict(_gravity(inventory))
+    on_free = {gravity.get(part) for part in inventory.nodes_by_part.keys() - by_part.keys()}
+    if len(on_free) == 1 and (common := on_free.pop()) is not None:
+        gravity[None] = common
+    return Surroundings(gravity, supports, partial(_bodies, inventory))
+
+
+def _bodies(inventory: Inventory) -> tuple[tuple[int, ...], ...]:
+    """Parts that hang together; none where some may be missing, or ties that are not followed may join them."""
+    known = inventory.complete and not inventory.ties
+    return inventory.bodies(inventory.nodes_by_part.keys()) if known else ()
+
+
+def _supports(holds: tuple[Hold, ...]) -> tuple[Support, ...]:
+    return tuple(dict.fromkeys(Support(one.name, one.start, one.end) for one in holds))
+
+
+def _gravity(inventory: Inventory) -> Iterator[tuple[int, tuple[float, ...]]]:
+    """Accelerations that gravity may have for each part of which they are known."""
+    loads = inventory.boundary.gravity
+    for part, nodes in inventory.nodes_by_part.items() if loads is not None else ():
+        acting = [(one, _acts(one, part, nodes)) for one in loads or ()]
+        if all(acts is not None for _, acts in acting):
+            together = _together([one for one, acts in acting if acts])
+            if together is not None:
+                yield part, together
+
+
+def _acts(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
+    """Whether gravity acts on a part with these nodes; None where on some of them."""
+    if load.nodes is None or part in load.parts:
+        return True
+    inside = np.isin(nodes, load.nodes)
+    return bool(inside.any()) if inside.all() or not inside.any() else None
+
+
+def _together(loads: list[Gravity]) -> tuple[float, ...] | None:
+    """Sizes of several loads together; None where their sum is not known."""
+    if len(loads) < 2:
+        return tuple(sorted({abs(value) for one in loads for value in one.values} or {0.0}))
+    if any(one.axis is None or len(one.values) > 1 for one in loads):
+        return None
+    along = [sum(one.values[0] for one in loads if one.axis == axis) for axis in range(3)]
+    return (float(np.linalg.norm(along)),)

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.choice.cost import CostModel
-    from d2rpick.choice.part_facts import InFlight, PartFacts, RunFacts
-    from d2rpick.choice.part_steps import Steps
+    from d2rpick.choice.part_evidence import InFlight, PartFacts, RunFacts, Steps
     from d2rpick.deck.model import Inventory, PartData
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"

@@ -10,20 +10,19 @@ import numpy as np
 
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share
-from d2rpick.choice.deck_doubts import (
+from d2rpick.choice.deck_of_run import (
+    bodies_of,
     doubts_of,
     doubts_of_bodies,
     doubts_of_cost,
     doubts_of_solver,
+    in_deck,
     left_rigid_in,
     of_another_model,
 )
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
-from d2rpick.choice.part_facts import facts_of
-from d2rpick.choice.part_steps import steps_of
-from d2rpick.choice.part_verdicts import rows_of
-from d2rpick.choice.rigid_bodies import bodies_of
-from d2rpick.choice.surroundings import in_deck
+from d2rpick.choice.part_evidence import facts_of, steps_of
+from d2rpick.choice.switchable_parts import rows_of
 from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.deck.geometry import Placement
 from d2rpick.errors import FormatError, RangeError, are, name_units
@@ -36,11 +35,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.cost import Weights
-    from d2rpick.choice.part_facts import RunFacts
-    from d2rpick.choice.part_steps import Steps
-    from d2rpick.choice.part_verdicts import PartRow
+    from d2rpick.choice.part_evidence import RunFacts, Steps
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
+    from d2rpick.choice.switchable_parts import PartRow
     from d2rpick.choice.switched_run import Times
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Part
