@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 _TRIES: Final = 5  # looks at a file that changes all the time
 _TICK: Final = 50_000_000  # [ns] above the resolution of most files' times: later changes show in them
-COARSE: Final = 2_000_000_000  # [ns] the resolution of the others, which give whole seconds
+_COARSE: Final = 2_000_000_000  # [ns] the resolution of the others, which give whole seconds
 _SLOWEST: Final = 5  # [ns] for a byte that is written: the times of a file are those when its last write began
-PAUSE: Final = 0.05  # [s] for a write that may be under way: until it ends, half of it stands in the file
+_PAUSE: Final = 0.05  # [s] for a write that may be under way: until it ends, half of it stands in the file
 
 
 class FileState(NamedTuple):
@@ -32,7 +32,12 @@ class FileState(NamedTuple):
     @classmethod
     def of(cls, file: FileIO) -> FileState:
         """Look at a file as it is now."""
-        found, now = os.fstat(file.fileno()), time.time_ns()
+        return cls.told(os.fstat(file.fileno()))
+
+    @classmethod
+    def told(cls, found: os.stat_result) -> FileState:
+        """Take from what the system tells just now."""
+        now = time.time_ns()
         # Of the two times the modification can be set, to one in the future too, which would never be past.
         latest = max(found.st_ctime_ns, found.st_mtime_ns if found.st_mtime_ns <= now else 0)
         settled = now - latest > _TICK + _slowness(latest, found.st_size)
@@ -42,15 +47,14 @@ class FileState(NamedTuple):
         """Whether this is the same file, and nothing that shows has changed."""
         return self[:-1] == other[:-1]
 
+    def continues(self, earlier: FileState) -> bool:
+        """Whether this is the earlier one, or has grown since; a new file may take an old one's number."""
+        return self.is_as(earlier) or (self[:2] == earlier[:2] and self.size > earlier.size)
+
 
 def _slowness(changed: int, size: int) -> int:
     """How much longer than usual a write may last, or a change not show in the times [ns]."""
-    return _SLOWEST * size + (0 if changed % 1_000_000_000 else COARSE)
-
-
-def pause(more: int = 0) -> None:
-    """Wait for the end of a write that may be under way, and so much longer [ns]."""
-    time.sleep(PAUSE + more * 1e-9)
+    return _SLOWEST * size + (0 if changed % 1_000_000_000 else _COARSE)
 
 
 def is_endless(file: FileIO) -> bool:
@@ -63,14 +67,18 @@ def is_regular(file: FileIO) -> bool:
     return stat.S_ISREG(os.fstat(file.fileno()).st_mode)
 
 
-def settled_state(file: FileIO) -> FileState | None:
-    """State of a file when no write is under way and a later one will show; None where it changes all the time."""
+def settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
+    """State of a file when no write is under way and a later one will show; None where it changes all the time.
+
+    Of one that ``may_grow`` the bytes up to the size of this state are at rest: what is appended does not touch them.
+    """
     for _ in range(_TRIES):
         found = FileState.of(file)
         if found.settled:
             return found
-        pause(_slowness(found.changed, found.size))
-        if FileState.of(file).is_as(found):
+        time.sleep(_PAUSE + _slowness(found.changed, 0 if may_grow else found.size) * 1e-9)
+        now = FileState.of(file)
+        if now.is_as(found) or (may_grow and now.continues(found)):
             return found
     return None
 
@@ -101,17 +109,3 @@ def write_whole(path: Path, content: bytes) -> None:
     except BaseException:
         scratch.unlink(missing_ok=True)
         raise
-
-
-def snapshot(file: FileIO) -> bytes | None:
-    """Bytes that a file held at one moment, or its first ones then; None where it changes all the time."""
-    for _ in range(_TRIES):
-        file.seek(0)
-        before, data = FileState.of(file), file.read()
-        if before.settled and before == FileState.of(file):
-            return data
-        pause()
-        file.seek(0)
-        if file.read(len(data)) == data:
-            return data
-    return None

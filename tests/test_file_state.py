@@ -21,20 +21,21 @@ MEGABYTE = 10**6
 
 
 @pytest.mark.parametrize(
-    ("ago", "size", "pause"),
+    ("ago", "size", "pause", "may_grow"),
     [
-        (HOUR, 0, None),
-        (MOMENT, 0, 0.05),
-        (-HOUR, 0, 0.05),  # the clock of a server is ahead
-        (200 * MOMENT, MEGABYTE, None),
-        (200 * MOMENT, 100 * MEGABYTE, 0.55),  # the write of so much may have begun then
-        (WHOLE, 0, 2.05),  # times in whole seconds
-        (WHOLE + 10**9, 0, 2.05),
-        (WHOLE + 3 * 10**9, 0, None),
+        *((HOUR, 0, None, may_grow) for may_grow in (False, True)),
+        *((MOMENT, 0, 0.05, may_grow) for may_grow in (False, True)),
+        (-HOUR, 0, 0.05, True),  # the clock of a server is ahead
+        (200 * MOMENT, MEGABYTE, None, False),
+        (200 * MOMENT, 100 * MEGABYTE, 0.55, False),  # the write of so much may have begun then
+        (200 * MOMENT, 100 * MEGABYTE, 0.05, True),  # but little at a time is appended
+        *((WHOLE, 0, 2.05, may_grow) for may_grow in (False, True)),  # times in whole seconds
+        (WHOLE + 10**9, 0, 2.05, True),
+        (WHOLE + 3 * 10**9, 0, None, True),
     ],
 )
 def test_a_file_is_waited_for_as_long_as_it_may_change_unseen(
-    ago: int, size: int, pause: float | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ago: int, size: int, pause: float | None, may_grow: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pauses: list[float] = []
     times = dict.fromkeys(("st_mtime_ns", "st_ctime_ns"), NOW - ago)
@@ -43,7 +44,7 @@ def test_a_file_is_waited_for_as_long_as_it_may_change_unseen(
     (tmp_path / "deck.k").touch()
     with (tmp_path / "deck.k").open("rb", buffering=0) as file, monkeypatch.context() as made_up:
         made_up.setattr(os, "fstat", lambda _: SimpleNamespace(st_dev=1, st_ino=2, st_size=size, **times))
-        found = settled_state(file)
+        found = settled_state(file, may_grow=may_grow)
     assert found
     assert found.size == size
     assert pauses == ([] if pause is None else [pytest.approx(pause)])

@@ -1,22 +1,21 @@
 """The bytes of one file as they were when it was opened, whatever becomes of the file meanwhile.
 
 A running solver appends to its files, and one that is started again cuts them and writes them anew.  Bytes behind the
-size seen at opening do not count; a file that was cut or written anew while it was read is an error.  Files are not
-mapped into memory: where a mapped page is cut off, the system ends the process.
+size seen at opening do not count.  A file that was cut or written anew while it was read is an error: its size and
+times then and afterwards show that.  Files are not mapped into memory: where a mapped page is cut off, the system ends
+the process.
 """
 
 from __future__ import annotations
 
 import os
-import time
-from functools import cache
 from io import FileIO
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.errors import ChangedError, FormatError
-from d2rpick.file_state import COARSE, FileState, is_endless, is_regular, pause, snapshot
+from d2rpick.file_state import FileState, is_endless, is_regular, settled_state
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,8 +24,7 @@ if TYPE_CHECKING:
     Addresses = NDArray[np.int64]
 
 _HELD: Final = 1 << 24  # a file up to this size is held in memory
-_WORDS: Final = 1 << 13  # summed up at a time: their weights stay in the cache
-_MIX: Final = 0x9E3779B97F4A7C15
+_END: Final = 1 << 12  # bytes at both ends of what counts, by which a file that has grown is known again
 
 
 class Portions(NamedTuple):
@@ -83,9 +81,6 @@ def content_of(data: bytes | Content) -> Content:
 class OnDisk(Content):
     """Bytes of a file that are read when they are asked for.
 
-    What was read is remembered by sums: where the file has changed since or a moment before, all of it is read again
-    after a pause and compared, so that no numbers of two different states of the file come together.
-
     Parameters
     ----------
     name : str
@@ -93,22 +88,25 @@ class OnDisk(Content):
     file : int
         Its descriptor, which is closed with this object.
     portions : Portions
+
+    Raises
+    ------
+    FormatError
+        If it changes all the time.
     """
 
     def __init__(self, name: str, file: int, portions: Portions = _PORTIONS) -> None:
-        from array import array  # not above: most files are small
-        from threading import Lock, local
+        from threading import Lock, local  # not above: most files are small
 
         self._name, self._number = name, file
         self._block, self._gap, self._window = portions
         self._file = FileIO(file, closefd=False)
-        self._seen = FileState.of(self._file)
-        self._size = self._seen.size
-        self._views = array("Q")  # begin, end and sum of what was looked at
-        self._fields: list[tuple[Addresses, int, int]] = []  # addresses, width and sum of what was taken
         self._lock, self._own = Lock(), local()  # of each thread: its buffer and its window
-        self._digest = ""
-        self._awaited: tuple[int, ...] = ()  # times of the file for which a pause was made
+        state = settled_state(self._file, may_grow=True)
+        if state is None:
+            raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+        self._state, self._size = state, state.size
+        self._digest, self._ends = "", self._read_ends()
 
     def __del__(self) -> None:
         os.close(self._number)
@@ -122,7 +120,6 @@ class OnDisk(Content):
             data = self._file.readall()[: self._size]
         if len(data) < self._size:
             raise self._shortened()
-        self._views.extend((0, self._size, _sum(np.frombuffer(data, np.uint8))))
         self.check()
         return data
 
@@ -155,13 +152,9 @@ class OnDisk(Content):
 
     def view(self, begin: int, end: int) -> Bytes:
         """Bytes from one address to another, shape (end - begin,); valid up to the next call in this thread."""
-        data = self._near(begin, end)
-        self._views.extend((begin, end, _sum(data)))
+        data = self._room(end - begin)
+        self._fill(data.data, begin)
         return data
-
-    def glance(self, begin: int, end: int) -> bytes:
-        """Bytes from one address to another, of which nothing is remembered: for what will be read again."""
-        return self._near(begin, min(end, self._size)).tobytes()
 
     def fields(self, addresses: Addresses, width: int) -> Bytes:
         """Bytes at many addresses, ``width`` of each, shape (n, width); to be trusted after a `check`."""
@@ -170,14 +163,7 @@ class OnDisk(Content):
             found = np.empty((addresses.size, width), np.uint8)
             found[order] = self.fields(addresses[order], width)
             return found
-        found = self._in_order(addresses, width)
-        self._fields.append((addresses, width, _sum(found.ravel())))
-        return found
-
-    def _near(self, begin: int, end: int) -> Bytes:
-        data = self._room(end - begin)
-        self._fill(data.data, begin)
-        return data
+        return self._in_order(addresses, width)
 
     def _room(self, size: int) -> Bytes:
         """Room for so many bytes, that of few used again and again: fresh memory costs more than reading."""
@@ -197,7 +183,7 @@ class OnDisk(Content):
         several = ends - firsts > 1
         for first, end in zip(firsts[several].tolist(), ends[several].tolist(), strict=True):
             low = int(addresses[first])
-            near = self._near(low, int(addresses[end - 1]) + width)
+            near = self.view(low, int(addresses[end - 1]) + width)
             found[first:end] = _gathered(near, addresses[first:end] - low, width)
         alone, room = firsts[~several], found.reshape(-1).data
         for place, address in zip((alone * width).tolist(), addresses[alone].tolist(), strict=True):
@@ -212,7 +198,7 @@ class OnDisk(Content):
             digest = hashlib.sha256()
             for begin in range(0, self._size, self._block):
                 digest.update(self.view(begin, min(begin + self._block, self._size)).data)
-            self.check(at_rest_for=COARSE)
+            self.check()
             self._digest = digest.hexdigest()
         return self._digest
 
@@ -233,31 +219,23 @@ class OnDisk(Content):
             "is a solver writing it anew? Read it again when it has"
         )
 
-    def check(self, at_rest_for: int = 0) -> None:
-        """Make sure that what was read so far is all of one state of the file; ChangedError where it is not.
-
-        ``at_rest_for``: read it again if the last change is more recent, whether or not one was seen [ns].
-        """
+    def check(self) -> None:
+        """Make sure that what was read so far is all of one state of the file; ChangedError where it is not."""
         now = FileState.of(self._file)
-        if now == self._seen and now.settled and time.time_ns() - now.changed >= at_rest_for:
+        if now.is_as(self._state):
             return
-        if not now.settled and now[:-1] != self._awaited:  # else a pause was made since the last write began
-            pause()
-            self._awaited = now[:-1]
-            now = FileState.of(self._file)
-        if now.size < self._size or not self._is_as_before():
+        if now.size < self._size:
+            raise self._shortened()
+        untouched = now.size > self._size or now.modified == self._state.modified  # it has grown, or got another name
+        if not untouched or self._read_ends() != self._ends:
             raise ChangedError(
                 f"{self._name}: the file was rewritten while it was read; read it again when it is complete"
             )
-        self._seen = now
 
-    def _is_as_before(self) -> bool:
-        """Whether everything that was read is still the same."""
-        known_views = self._views[:]  # another thread may look at more meanwhile
-        views = zip(*(known_views[part::3] for part in range(3)), strict=True)
-        return all(_sum(self._near(begin, end)) == known for begin, end, known in views) and all(
-            _sum(self._in_order(addresses, width).ravel()) == known for addresses, width, known in self._fields
-        )
+    def _read_ends(self) -> tuple[bytes, bytes]:
+        """First and last bytes of what counts."""
+        length = min(_END, self._size)
+        return self.view(0, length).tobytes(), self.view(self._size - length, self._size).tobytes()
 
 
 def stored(name: str) -> bytes | OnDisk:
@@ -273,31 +251,8 @@ def stored(name: str) -> bytes | OnDisk:
             raise FormatError(f"{name}: this is a device; a file, a pipe or a terminal was expected")
         if not is_regular(file):
             return file.read()
-        if os.fstat(file.fileno()).st_size > _HELD:
-            return OnDisk(name, os.dup(file.fileno()))
-        data = snapshot(file)
-    if data is None:
-        raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
-    return data
-
-
-def _sum(data: Bytes) -> int:
-    """Sum of the 64-bit words, each by a weight of its place: words that change places change the sum."""
-    end, whole = data.size - data.size % 8, data.size - data.size % (8 * _WORDS)
-    rows, rest = data[:whole].view(np.uint64).reshape(-1, _WORDS), data[whole:end].view(np.uint64)
-    total, weights = data.size, _weights()
-    for one in (*np.einsum("ij,j->i", rows, weights).tolist(), int(rest @ weights[: rest.size])):
-        total = (total * _MIX + one) % 2**64
-    return (total * _MIX + int.from_bytes(data[end:].tobytes())) % 2**64
-
-
-@cache
-def _weights() -> NDArray[np.uint64]:
-    """Odd numbers without a pattern (splitmix64), shape (_WORDS,)."""
-    weights = np.arange(1, _WORDS + 1, dtype=np.uint64) * np.uint64(_MIX)
-    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB), (31, 1)):
-        weights = (weights ^ weights >> np.uint64(shift)) * np.uint64(factor)
-    return weights | np.uint64(1)
+        on_disk = OnDisk(name, os.dup(file.fileno()))
+    return bytes(on_disk) if len(on_disk) <= _HELD else on_disk
 
 
 def _gathered(data: Bytes, addresses: Addresses, width: int) -> Bytes:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.bounds import bound, unpacked_beyond
 from d2rpick.errors import FormatError, listing
+from d2rpick.file_state import FileState
 from d2rpick.histories.content import stored
 from d2rpick.histories.names import in_seconds, near_miss
 
@@ -76,10 +77,11 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If one cannot be read, or one of several was replaced or cut meanwhile: they may be of two runs.
     """
     files = expand(names)
-    before = {name: _Stamp.of(name) for name in files}
+    before = {name: _state(name) for name in files}
     sources = [open_source(name) for name in files]
-    for name, stamp in before.items():
-        if len(files) > 1 and not _Stamp.of(name).continues(stamp):
+    for name, state in before.items():
+        now = _state(name)
+        if len(files) > 1 and not (now.continues(state) if now and state else now is state):
             raise FormatError(
                 f"{name}: this file was replaced or written anew while the others of its run were opened; read them "
                 "again when they are complete"
@@ -87,25 +89,13 @@ def open_files(names: Sequence[str]) -> list[Source]:
     return sources
 
 
-class _Stamp(NamedTuple):
-    """What a file is, how big, and when it was changed last; nothing of what is no file."""
-
-    file: tuple[int, int] = (0, 0)
-    size: int = 0
-    changed: int = 0
-
-    @classmethod
-    def of(cls, name: str) -> _Stamp:
-        try:
-            found = os.stat(name)  # noqa: PTH116  start-up
-        except (OSError, ValueError):
-            return cls()
-        regular = stat.S_ISREG(found.st_mode) and name != STDIN
-        return cls((found.st_dev, found.st_ino), found.st_size, found.st_ctime_ns) if regular else cls()
-
-    def continues(self, earlier: _Stamp) -> bool:
-        """Whether it is the earlier one, or that with something appended; a new file may take an old one's number."""
-        return self == earlier or (self.file == earlier.file and self.size > earlier.size)
+def _state(name: str) -> FileState | None:
+    """State of a file; None of what is none."""
+    try:
+        found = os.stat(name)  # noqa: PTH116  start-up
+    except (OSError, ValueError):
+        return None
+    return FileState.told(found) if stat.S_ISREG(found.st_mode) and name != STDIN else None
 
 
 def open_source(name: str) -> Source:

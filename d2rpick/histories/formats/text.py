@@ -128,7 +128,7 @@ def _plain(source: Source, piece: int) -> tuple[Content, str]:
     """Text with line feeds alone and no mark before it, and its encoding."""
     data = source.data
     if not isinstance(data, bytes):
-        pieces = (data.glance(at, at + piece) for at in range(0, len(data), piece))
+        pieces = (data[at : at + piece] for at in range(0, len(data), piece))
         if all(one.isascii() and b"\r" not in one and b"\0" not in one for one in pieces):
             return data, "latin-1"  # of which ASCII is a part
     data = bytes(data)
