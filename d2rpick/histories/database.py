@@ -24,74 +24,121 @@ if TYPE_CHECKING:
 
 # A restart steps back once; times that do so in more than this share of their states are none.
 _MOST_BACK: Final = 0.1
+# Significant digits by bytes per number: 24 bits hold 7 digits; 17 digits restore every double.
+DIGITS: Final = {4: 7, 8: 17}
 
 
-class Database(Protocol):
-    """The states of one leg of a run, in the run's own units.
+class Database:
+    """The states of one leg of a run, in the run's own units: a reader sets what its files have, the rest is refused.
 
     Times are those of the file: they may repeat or step back where a restart wrote a state again.  Columns that
     are not there, or not in every state, raise FormatError.
+
+    Attributes
+    ----------
+    source : str
+        Name of the file or files, for messages.
+    format : str
+        Name of the format, as in the list of readers.
+    version, title : str
+        Solver and release, as far as the file names them; title of the run.
+    complete : bool
+        Whether the file ends behind a whole state and none is missing before.
+    notes : tuple of str
+        What a user should know about what was read.
+    channels : tuple of str
+        Names of the columns of the whole model; time is none of them.
+    parts : tuple of Part
+        Parts that have histories of their own, in the order of the file.
+    time_unit : str
+        Unit of the times, empty where the file does not name it; no solver writes one.
+    digits : int
+        Significant decimal digits of all numbers.
+    no_channels, no_parts : str
+        What to say where somebody asks for them and there are none.
     """
 
-    @property
-    def source(self) -> str:
-        """Name of the file or files, for messages."""
+    source: str
+    format: str
+    version = title = time_unit = ""
+    complete = True
+    notes: tuple[str, ...] = ()
+    channels: tuple[str, ...] = ()
+    parts: tuple[Part, ...] = ()
+    digits = DIGITS[8]
+    no_channels = ""
+    no_parts = "a table has no parts; choose its columns with `energy`, or give the matsum, binout or T01 of the run"
 
-    @property
-    def format(self) -> str:
-        """Name of the format, as in the list of readers."""
-
-    @property
-    def version(self) -> str:
-        """Solver and release, as far as the file names them."""
-
-    @property
-    def title(self) -> str:
-        """Title of the run."""
-
-    @property
-    def complete(self) -> bool:
-        """Whether the file ends behind a whole state and none is missing before."""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a user should know about what was read."""
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of the columns of the whole model; time is none of them."""
-
-    @property
-    def parts(self) -> tuple[Part, ...]:
-        """Parts that have histories of their own, in the order of the file."""
-
-    @property
+    @cached_property
     def time(self) -> Samples:
         """Times of the columns of the whole model, shape (n,) [time]."""
+        raise FormatError(f"{self.source}: {self.no_channels}")
 
-    @property
+    @cached_property
     def part_time(self) -> Samples:
         """Times of the parts' columns, shape (m,) [time]."""
+        raise FormatError(f"{self.source}: {self.no_parts}")
 
-    @property
-    def time_unit(self) -> str:
-        """Unit of the times, empty where the file does not name it."""
+    def channel(self, name: str) -> Samples:  # noqa: ARG002  as of those that have some
+        """One column of the whole model, shape (n,)."""
+        raise FormatError(f"{self.source}: {self.no_channels}")
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:  # noqa: ARG002  as of those that have some
+        """One quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
+        raise FormatError(f"{self.source}: {self.no_parts}")
 
     @property
     def energy_channel(self) -> str | None:
         """Name of the internal energy of the whole model; None where there is none."""
+        return next((name for name in ("internal energy", "internal_energy") if name in self.channels), None)
 
     def find(self, wanted: str) -> str:
-        """Name of the column that the user means, by name or, in tables, by number."""
+        """Name of the column that the user means, by name or, in tables, by number; FormatError with what there is."""
+        return resolve(wanted, self.channels, self.source)
+
+    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  all are written alike
+        """How finely the times and these channels were written; of no channels: those of the parts."""
+        return Precision(self.digits), Precision(self.digits)
+
+
+class Branched(Database):
+    """A database that has the whole model in one branch, as of a glstat, and the parts in another, as of a matsum."""
+
+    def branch(self, name: str) -> Branch:
+        """Give the branch ``glstat`` or ``matsum``; FormatError where it is not there."""
+        raise NotImplementedError
+
+    @cached_property
+    def time(self) -> Samples:
+        """Times of the columns of the whole model, shape (n,) [time]."""
+        return self.branch("glstat").time
+
+    @cached_property
+    def part_time(self) -> Samples:
+        """Times of the parts' columns, shape (m,) [time]."""
+        return self.branch("matsum").time
 
     def channel(self, name: str) -> Samples:
         """One column of the whole model, shape (n,)."""
+        return self.branch("glstat").channel(name)
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """One quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
+        """One quantity of some parts, shape (m, len(ids))."""
+        return self.branch("matsum").part_channel(quantity, ids)
 
-    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
-        """How finely the times and these channels were written; of no channels: those of the parts."""
+
+class Branch(Protocol):
+    """Columns with times of their own."""
+
+    @property
+    def time(self) -> Samples:
+        """Times of the columns, shape (n,) [time]."""
+
+    def channel(self, name: str) -> Samples:
+        """One column, shape (n,)."""
+
+    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
+        """One quantity of some parts, shape (n, len(ids))."""
 
 
 # An interval so many times the median one is no output interval.
@@ -108,47 +155,26 @@ class Legs:
     def __init__(
         self, legs: Sequence[Database], cut: Sequence[str] = (), named: Sequence[tuple[str, str]] = ()
     ) -> None:
-        self._cut = tuple(cut)  # files whose packed data ends early
-        self._named = tuple(named)  # quantities whose channels have unusual names
+        self._cut = cut  # files whose packed data ends early
+        self._named = named  # quantities whose channels have unusual names
         several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
         self._files = sorted(legs, key=_start) if several else [*legs]
         self._legs = [leg for leg in self._files if not several or _start(leg) > -np.inf] or self._files
         self._energies: tuple[tuple[int, ...], Samples] | None = None  # of the parts that were asked for last
-
-    @property
-    def source(self) -> str:
-        """Names of the files."""
-        return ", ".join(leg.source for leg in self._files)
-
-    @property
-    def format(self) -> str:
-        """Name of the format."""
-        return self._legs[0].format
-
-    @property
-    def version(self) -> str:
-        """Solver of the first leg."""
-        return self._legs[0].version
-
-    @property
-    def title(self) -> str:
-        """Title of the first leg."""
-        return self._legs[0].title
-
-    @property
-    def time_unit(self) -> str:
-        """Unit of the times."""
-        return self._legs[0].time_unit
+        self.source = ", ".join(leg.source for leg in self._files)
+        first = self._legs[0]
+        self.format, self.version, self.title, self.time_unit = (
+            first.format,
+            first.version,
+            first.title,
+            first.time_unit,
+        )
+        self.complete = all(leg.complete for leg in self._files) and not cut
 
     @property
     def energy_channel(self) -> str | None:
         """Internal energy of the whole model."""
         return self._legs[0].energy_channel
-
-    @property
-    def complete(self) -> bool:
-        """Whether all legs are."""
-        return all(leg.complete for leg in self._files) and not self._cut
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
@@ -275,7 +301,7 @@ def _together(columns: Sequence[Samples]) -> Samples:
     return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
-def _times(database: Database) -> list[Samples]:
+def _times(database: Database | Legs) -> list[Samples]:
     """Times of the whole model and of the parts, as far as there are any."""
     return [*([database.time] if database.channels else []), *([database.part_time] if database.parts else [])]
 
@@ -296,29 +322,3 @@ def _holes(time: Samples) -> tuple[str, ...]:
         return ()
     holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2])
     return tuple(f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a leg missing?" for i in holes[:3])
-
-
-# Significant digits by bytes per number: 24 bits hold 7 digits; 17 digits restore every double.
-DIGITS: Final = {4: 7, 8: 17}
-
-
-class SolverFile:
-    """What the databases of solvers have in common."""
-
-    source: str
-    channels: tuple[str, ...]
-    digits: int  # significant decimal digits of the values
-    time_unit = ""  # no solver writes one
-
-    @property
-    def energy_channel(self) -> str | None:
-        """Internal energy of the whole model, as this format calls it."""
-        return next((name for name in ("internal energy", "internal_energy") if name in self.channels), None)
-
-    def find(self, wanted: str) -> str:
-        """Name of the channel that is meant; FormatError with what there is."""
-        return resolve(wanted, self.channels, self.source)
-
-    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  as a Database
-        """All columns are written alike."""
-        return Precision(self.digits), Precision(self.digits)

@@ -256,6 +256,11 @@ class Branch:
                 return plain_text(file.raw(start, layout.variables[name]))
         return ""
 
+    @property
+    def time(self) -> Samples:
+        """Times of the states, shape (n,) [time]."""
+        return self.channel("time")
+
     def channel(self, name: str) -> Samples:
         """One variable of one value per state, shape (n,)."""
         column = np.empty(self._states.numbers.size)

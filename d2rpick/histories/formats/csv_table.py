@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.errors import FormatError, listing
+from d2rpick.histories.database import Database
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, split
-from d2rpick.histories.formats.printed import not_a_restart
+from d2rpick.histories.formats.printed import of_one_run
 from d2rpick.histories.formats.table_values import checked_values, line_of, plain_values
 from d2rpick.histories.formats.text import UTF16, Text
 from d2rpick.histories.names import (
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.formats.layout import Layout
     from d2rpick.histories.history import Precision, Samples
-    from d2rpick.histories.names import Part, Selection
+    from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
 
@@ -132,15 +133,13 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | C
     return [find_curves(text, selection) or Table(text, selection) for text in map(Text, sources)]
 
 
-class Table:
+class Table(Database):
     """One table; a `Database` without parts.
 
     FormatError when it is no table, or a column that was selected is not there.
     """
 
     format = "csv"
-    version = title = ""
-    parts: tuple[Part, ...] = ()
 
     def __init__(self, text: Text, selection: Selection) -> None:
         self.source, self._text = text.name, text
@@ -148,11 +147,11 @@ class Table:
         self._own_times = own_times(layout)
         self._time, notes = time_column(text.name, layout, selection.time, selection.energy)
         self._columns = labelled(layout, self._time)
+        self.channels, self.time_unit = tuple(self._columns), layout.unit(self._time)
         self._begin = text.place(layout.start)
         self._needed = self._asked(selection)
         self._read: dict[int, Samples] = {}
         self._plain = True  # until a line shows otherwise
-        self.complete = True
         if not is_skipped(text.unended):
             self.complete = _is_whole(text.unended, self._sample(), layout, self._needed)
             if self.complete:
@@ -160,16 +159,6 @@ class Table:
             else:
                 notes.append("the last line has no line end and may be cut; it was left out")
         self.notes = tuple(notes)
-
-    @cached_property
-    def channels(self) -> tuple[str, ...]:
-        """Names of all columns but the time, as far as they are sure."""
-        return tuple(self._columns)
-
-    @property
-    def time_unit(self) -> str:
-        """Unit that the name of the time column, or the row below it, gives."""
-        return self._layout.unit(self._time)
 
     @property
     def energy_channel(self) -> str:
@@ -189,20 +178,8 @@ class Table:
     @cached_property
     def time(self) -> Samples:
         """Times as they stand in the file, shape (n,) [time]; FormatError where they are not those of one run."""
-        time = self._values(self._time)
-        state = not_a_restart(time)
-        if state is None:
-            return time
-        line = line_of(self._text, self._begin, self._layout, self._time, state)
-        raise FormatError(
-            f"{self.source}:{line}: time steps back from {time[state - 1]:g} to {time[state]:g}, increasing times or "
-            "one restart were expected; sort the rows, or put each curve into its own file"
-        )
-
-    @property
-    def part_time(self) -> Samples:
-        """Refused: a table has no parts."""
-        raise self._no_parts()
+        place = partial(line_of, self._text, self._begin, self._layout, self._time)
+        return of_one_run(self._values(self._time), lambda state: f"{self.source}:{place(state)}")
 
     def channel(self, name: str) -> Samples:
         """One column, shape (n,); FormatError with the line of a value that is no number."""
@@ -216,10 +193,6 @@ class Table:
         if not np.array_equal(curve[:, 0], self.time):
             raise FormatError(f"{self.source}: {name!r} has other times than the first curve that is asked for")
         return np.ascontiguousarray(curve[:, 1])
-
-    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:  # noqa: ARG002  as a Database
-        """Refused: a table has no parts."""
-        raise self._no_parts()
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """How finely the times and these columns were printed."""
@@ -262,12 +235,6 @@ class Table:
             values = checked_values(self._text, self._begin, self._layout, (self._time, column))
             self._read |= {self._time: values[:, 0].copy(), column: values[:, 1].copy()}
         return self._read[column]
-
-    def _no_parts(self) -> FormatError:
-        return FormatError(
-            f"{self.source}: a table has no parts; choose its columns with `energy`, "
-            "or give the matsum, binout or T01 of the run"
-        )
 
 
 def _kept(values: Samples) -> Samples:

@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.errors import FormatError, listing
+from d2rpick.histories.database import Database
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.layout import as_number
-from d2rpick.histories.formats.printed import not_a_restart
+from d2rpick.histories.formats.printed import of_one_run
 from d2rpick.histories.names import internal_energies, is_time, refuse_other_quantity, resolve, unit_of
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.formats.text import Text
     from d2rpick.histories.history import Precision, Samples
-    from d2rpick.histories.names import Part, Selection
+    from d2rpick.histories.names import Selection
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"  # compiled where it is needed
@@ -105,15 +106,13 @@ class _Found:
         self.stops = ""
 
 
-class Curves:
+class Curves(Database):
     """Curves of one text; a `Database` without parts, whose times are those of the curves that are asked for."""
 
     format = "csv"
-    version = ""
-    parts: tuple[Part, ...] = ()
 
     def __init__(self, found: _Found, selection: Selection) -> None:
-        self.source, self.title = found.source, ""
+        self.source = found.source
         self.time_unit = unit_of(found.x_label)
         self._curves = _uniquely_named(found.curves)
         self.channels = tuple(self._curves)
@@ -155,19 +154,8 @@ class Curves:
     def time(self) -> Samples:
         """Times of the curve that is asked for first, shape (n,) [time]."""
         name = self.find(self._asked[0]) if self._asked else self.energy_channel
-        time = self._numbers(name, "times")
-        state = not_a_restart(time)
-        if state is not None:
-            raise FormatError(
-                f"{self.source}:{self._curves[name].lines[state]}: time steps back from {time[state - 1]:g} to "
-                f"{time[state]:g} in {name!r}, increasing times or one restart were expected; sort the pairs"
-            )
-        return time
-
-    @property
-    def part_time(self) -> Samples:
-        """Refused: curves are no parts."""
-        raise self._no_parts()
+        lines = self._curves[name].lines
+        return of_one_run(self._numbers(name, "times"), lambda state: f"{self.source}:{lines[state]}, {name!r}")
 
     def channel(self, name: str) -> Samples:
         """Values of one curve, shape (n,); FormatError when its times are not those of the run."""
@@ -176,10 +164,6 @@ class Curves:
         if not np.array_equal(self._numbers(name, "times"), self.time):
             raise FormatError(f"{self.source}: {name!r} has other times than the first curve that is asked for")
         return self._numbers(name, "values")
-
-    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:  # noqa: ARG002  as a Database
-        """Refused: curves are no parts."""
-        raise self._no_parts()
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """How finely the times and these curves were printed."""
@@ -202,12 +186,6 @@ class Curves:
 
     def _menu(self) -> str:
         return listing([f"{number} {name!r}" for number, name in enumerate(self.channels, 1)])
-
-    def _no_parts(self) -> FormatError:
-        return FormatError(
-            f"{self.source}: curves are not parts; choose them with `energy`, "
-            "or give the matsum, binout or T01 of the run"
-        )
 
 
 def _curveplot(found: _Found) -> bool:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from typing import TYPE_CHECKING, Final, NoReturn
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.database import SolverFile
+from d2rpick.histories.database import Database
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
 from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, head, overlong, release, written_head
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.content import Content
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.names import Part, Selection
+    from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
 _TIME: Final = "time"
@@ -53,16 +53,15 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
     return [Glstat(source.data, source.name, selection.energy or (_ENERGY,)) for source in sources]
 
 
-class Glstat(SolverFile):
+class Glstat(Database):
     """One glstat file; a ``Database`` without parts.
 
     A last state in which the file stops counts if it has the lines that are ``needed``.  FormatError if there is
     neither a head nor a state, or a time that is no number.
     """
 
-    format: Final = "glstat"
-    parts: tuple[Part, ...] = ()
-    digits = 6
+    format, digits = "glstat", 6
+    no_parts = "a glstat has no parts; add the matsum of the run"
 
     def __init__(
         self, data: bytes | Content, source: str, needed: Sequence[str] = (), portions: Portions = PORTIONS
@@ -89,20 +88,11 @@ class Glstat(SolverFile):
         self._columns = self._read(names)
         self.time = self._columns[_TIME]
 
-    @property
-    def part_time(self) -> Samples:
-        """Refused: a glstat knows the model as a whole only."""
-        raise self._no_parts()
-
     def channel(self, name: str) -> Samples:
         """Values of the line ``name``, shape (n,); FormatError unless every state has a number in one such line."""
         if name not in self._columns:
             self._columns[name] = self._blocks.numbers([name])[:, 0]
         return self._columns[name]
-
-    def part_channel(self, quantity: str, ids: Sequence[int]) -> NoReturn:  # noqa: ARG002  as a Database
-        """Refused: a glstat knows the model as a whole only."""
-        raise self._no_parts()
 
     def _read(self, names: list[str]) -> dict[str, Samples]:
         """Columns read in one pass; where one cannot be, the time alone, and why is said when it is asked for."""
@@ -111,9 +101,6 @@ class Glstat(SolverFile):
         except FormatError:
             names, columns = [_TIME], self._blocks.numbers([_TIME])
         return dict(zip(names, columns.T, strict=True))
-
-    def _no_parts(self) -> FormatError:
-        return FormatError(f"{self.source}: a glstat has no parts; add the matsum of the run")
 
     def _names(self) -> tuple[str, ...]:
         layouts = {(run.example, run.stride) for run in self._blocks}

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 import numpy as np
 
 from d2rpick.errors import FormatError, listing, printable
-from d2rpick.histories.database import DIGITS, SolverFile
+from d2rpick.histories.database import DIGITS, Branched, Database
 from d2rpick.histories.formats.hdf5_columns import Column, check_data, check_file, columns_of, finite
-from d2rpick.histories.formats.printed import not_a_restart
+from d2rpick.histories.formats.printed import of_one_run
 from d2rpick.histories.history import Precision
 from d2rpick.histories.names import Part, near_miss, refuse_other_quantity
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     import h5py
 
-    from d2rpick.histories.database import Database
     from d2rpick.histories.history import Samples
     from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
@@ -69,14 +68,10 @@ def _branches(file: BinaryIO, source: str) -> dict[str, PartGroup]:
         }
 
 
-class Columns(SolverFile):
+class Columns(Database):
     """The columns of an HDF5 file of any layout, by their paths; a `Database` without parts."""
 
-    format: Final = "hdf5"
-    version = title = ""
-    complete = True
-    notes: tuple[str, ...] = ()
-    parts: tuple[Part, ...] = ()
+    format = "hdf5"
 
     def __init__(self, file: BinaryIO, source: str, selection: Selection) -> None:
         self._file, self.source = file, source
@@ -98,19 +93,8 @@ class Columns(SolverFile):
     @cached_property
     def time(self) -> Samples:
         """Values of the time column, shape (n,) [time]; FormatError where they are not those of one run."""
-        time = self._load(self._time_column)
-        state = not_a_restart(time)
-        if state is None:
-            return time
-        raise FormatError(
-            f"{self.source}: {self._time_column.path} steps back from {time[state - 1]:g} to {time[state]:g} at value "
-            f"{state + 1}, increasing times or one restart were expected; sort the columns, or copy the file again"
-        )
-
-    @property
-    def part_time(self) -> Samples:
-        """Refused: columns are no parts."""
-        raise self._no_parts()
+        path = self._time_column.path
+        return of_one_run(self._load(self._time_column), lambda state: f"{self.source}: {path}, value {state + 1}")
 
     def channel(self, name: str) -> Samples:
         """Values of one column, shape (n,); FormatError when it is not as long as the time."""
@@ -121,10 +105,6 @@ class Columns(SolverFile):
                 f"{self._time_column.size}; choose columns of one length"
             )
         return self._load(column)
-
-    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:  # noqa: ARG002  as a Database
-        """Refused: columns are no parts."""
-        raise self._no_parts()
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """Digits that the stored types hold."""
@@ -143,49 +123,24 @@ class Columns(SolverFile):
         with _opened(self._file, self.source) as opened:
             return column.load(opened, self.source)
 
-    def _no_parts(self) -> FormatError:
-        return FormatError(f"{self.source}: its columns are not parts; choose them with `energy`")
 
-
-class SavedBinout(SolverFile):
+class SavedBinout(Branched):
     """A binout that lasso-python saved: channels of its glstat branch, parts of its matsum branch."""
 
-    format: Final = "hdf5"
-    complete = True
-    notes: tuple[str, ...] = ()
-    digits = DIGITS[8]
+    format = "hdf5"
 
     def __init__(self, source: str, branches: dict[str, PartGroup]) -> None:
-        self.source = source
-        self._glstat, self._matsum = (branches.get(name) for name in _BRANCHES)
-        first = self._glstat or self._matsum
-        assert first is not None  # there is a branch, or this is no saved binout
+        self.source, self._branches = source, branches
+        first = next(iter(branches.values()))
         self.title, self.version = first.title, first.version
-        self.channels = self._glstat.channels if self._glstat else ()
-        self.parts = self._matsum.parts if self._matsum else ()
+        self.channels = branches["glstat"].channels if "glstat" in branches else ()
+        self.parts = branches["matsum"].parts if "matsum" in branches else ()
 
-    @property
-    def time(self) -> Samples:
-        """Times of the glstat branch, shape (n,)."""
-        return self._branch(self._glstat, "glstat").time
-
-    @property
-    def part_time(self) -> Samples:
-        """Times of the matsum branch, shape (m,)."""
-        return self._branch(self._matsum, "matsum").time
-
-    def channel(self, name: str) -> Samples:
-        """One column of the whole model, shape (n,)."""
-        return self._branch(self._glstat, "glstat").channel(name)
-
-    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """One quantity of some parts, shape (m, len(ids))."""
-        return self._branch(self._matsum, "matsum").part_channel(quantity, ids)
-
-    def _branch(self, branch: PartGroup | None, name: str) -> PartGroup:
-        if branch is None:
+    def branch(self, name: str) -> PartGroup:
+        """Give a branch; FormatError where it was not saved."""
+        if name not in self._branches:
             raise FormatError(f"{self.source}: no {name} in this saved binout; name the run's own files")
-        return branch
+        return self._branches[name]
 
 
 class PartGroup:

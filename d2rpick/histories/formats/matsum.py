@@ -11,12 +11,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from functools import partial
-from typing import TYPE_CHECKING, Final, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.database import SolverFile
+from d2rpick.histories.database import Database
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
 from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, head, overlong, release, written_head
 from d2rpick.histories.names import Part
@@ -74,15 +74,14 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
     return [Matsum(source.data, source.name) for source in sources]
 
 
-class Matsum(SolverFile):
+class Matsum(Database):
     """One matsum file; a ``Database`` without channels of the whole model.
 
     FormatError if it has neither a head nor a state, or a time that is no number.
     """
 
-    format: Final = "matsum"
-    channels: tuple[str, ...] = ()
-    digits = 5
+    format, digits = "matsum", 5
+    no_channels = "a matsum has parts only; choose with `parts` or add the glstat of the run"
 
     def __init__(self, data: bytes | Content, source: str, portions: Portions = PORTIONS) -> None:
         self.title, self.version, begin = head(data)
@@ -109,15 +108,6 @@ class Matsum(SolverFile):
         self.parts = tuple(Part(id_, self._legend.get(id_, "")) for id_ in present if id_ > _LUMPED)
         self.notes = self._blocks.notes + self._remarks(present)
 
-    @property
-    def time(self) -> Samples:
-        """Refused: a matsum knows the parts only."""
-        raise self._no_channels()
-
-    def channel(self, name: str) -> NoReturn:  # noqa: ARG002  as a Database
-        """Refused: a matsum knows the parts only."""
-        raise self._no_channels()
-
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
         """Values of one of ``QUANTITIES`` for the parts ``ids``, shape (n, len(ids)).
 
@@ -142,9 +132,6 @@ class Matsum(SolverFile):
             values = self._blocks.numbers(names, anchors=[(id_, _MAT) for id_, _ in names])
             self._ahead = {(one, *ids): values[:, place :: len(together)] for place, one in enumerate(together)}
         return self._ahead.pop(wanted)
-
-    def _no_channels(self) -> FormatError:
-        return FormatError(f"{self.source}: a matsum has parts only; choose with `parts` or add the glstat of the run")
 
     def _present(self) -> Counter[int]:
         """In how many states each part is, in the order in which the parts appear."""

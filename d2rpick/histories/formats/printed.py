@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.errors import FormatError
 from d2rpick.histories.history import EXACT, Precision
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -122,7 +123,18 @@ def _exponent_width(exponent: str | None) -> int:
 _ALIKE = 2.0
 
 
-def not_a_restart(time: Samples) -> int | None:
+def of_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
+    """Give times (n,) back; FormatError, with the place of the state, where they are not those of one run."""
+    state = _not_a_restart(time)
+    if state is None:
+        return time
+    raise FormatError(
+        f"{place(state)}: time steps back from {time[state - 1]:g} to {time[state]:g}, increasing times or one restart "
+        "were expected; sort the rows, or put each curve into its own file"
+    )
+
+
+def _not_a_restart(time: Samples) -> int | None:
     """Find the first state at which times (n,) step back as those of one run do not; None where they never do.
 
     One step back is a restart: it does not go back to the start, and the interval behind it, as the median of all
@@ -130,7 +142,7 @@ def not_a_restart(time: Samples) -> int | None:
 
     Examples
     --------
-    >>> not_a_restart(np.array([0.0, 1.0, 2.0, 3.0, 1.5, 2.5])), not_a_restart(np.array([0.0, 1.0, 0.0, 1.0]))
+    >>> _not_a_restart(np.array([0.0, 1.0, 2.0, 3.0, 1.5, 2.5])), _not_a_restart(np.array([0.0, 1.0, 0.0, 1.0]))
     (None, 2)
     """
     back = np.flatnonzero(np.diff(time) < 0) + 1

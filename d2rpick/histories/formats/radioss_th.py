@@ -17,7 +17,7 @@ import numpy as np
 
 from d2rpick.errors import FormatError, listing
 from d2rpick.histories.content import Content, content_of
-from d2rpick.histories.database import SolverFile
+from d2rpick.histories.database import Database
 from d2rpick.histories.formats.radioss_records import INT, RUN, WIDTH, integers, is_binary, is_text, records_of
 from d2rpick.histories.names import Part, plain_text
 
@@ -76,7 +76,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
     return [TimeHistory(source.data, source.name) for source in sources]
 
 
-class TimeHistory(SolverFile):
+class TimeHistory(Database):
     """One time history file, read as a `Database`; parts and the whole model share their times.
 
     Parameters
@@ -98,32 +98,14 @@ class TimeHistory(SolverFile):
         self._data = content_of(content)
         self.source = source
         self._records = records_of(self._data, source)
-        self._head = _HeadRecords(self._records, len(self._data), source).head()
+        self._head = head = _HeadRecords(self._records, len(self._data), source).head()
+        self.title, self.version, self.channels = head.title, head.version, head.globals
+        known = {id_ for id_, _ in head.columns}
+        self.parts = tuple(part for part in head.parts if part.id in known)  # those of a card /TH/PART
         *self._begins, self._stride = accumulate(map(self._records.size, self._head.counts), initial=0)
         self._states, stop = self._whole_states()
         self.complete = not stop
         self.notes = (*stop, *self._silent_parts())
-
-    @property
-    def version(self) -> str:
-        """Date of the run, program and platform."""
-        return self._head.version
-
-    @property
-    def title(self) -> str:
-        """Title of the run."""
-        return self._head.title
-
-    @property
-    def channels(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Global variables."""
-        return self._head.globals
-
-    @cached_property
-    def parts(self) -> tuple[Part, ...]:
-        """Parts with variables of their own (card /TH/PART)."""
-        known = {id_ for id_, _ in self._head.columns}
-        return tuple(part for part in self._head.parts if part.id in known)
 
     @cached_property
     def digits(self) -> int:  # type: ignore[override]
@@ -137,11 +119,11 @@ class TimeHistory(SolverFile):
 
     def channel(self, name: str) -> Samples:
         """One global variable, shape (n,)."""
-        if name not in self._head.globals:
-            raise FormatError(f"{self.source}: no global {name}, there are {listing(self._head.globals, most=30)}")
-        return self._columns(1, [self._head.globals.index(name)])[:, 0]
+        if name not in self.channels:
+            raise FormatError(f"{self.source}: no global {name}, there are {listing(self.channels, most=30)}")
+        return self._columns(1, [self.channels.index(name)])[:, 0]
 
-    @property
+    @cached_property
     def part_time(self) -> Samples:
         """Return the times of all states, shape (n,) [time]."""
         return self.time
@@ -154,7 +136,7 @@ class TimeHistory(SolverFile):
         FormatError
             If a part is not in the file, or without this variable.
         """
-        record = 1 + bool(self._head.globals)
+        record = 1 + bool(self.channels)
         return self._columns(record, [self._place(id_, quantity) for id_ in ids])
 
     def _place(self, id_: int, quantity: str) -> int:

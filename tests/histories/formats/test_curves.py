@@ -179,7 +179,7 @@ def test_pairs_below_their_count_are_a_curve() -> None:
             "Curveplot\nt\nTime\nEnergy Ratio\nC\nEnergy Ratio #pts=2\n0 1\n1 1\nendcurve\n",
             "'Energy Ratio', by its name",
         ),
-        ("4\n0 1\n1 2\n0 3\n1 4\n", "curves:4: time steps back from 1 to 0 in 'curve 1'"),
+        ("4\n0 1\n1 2\n0 3\n1 4\n", "curves:4, 'curve 1': time steps back from 1 to 0"),
     ],
 )
 def test_curves_that_are_none_are_refused(text: str, reason: str) -> None:
