@@ -42,6 +42,11 @@ class Field(NamedTuple):
         """Number of the line in its file; counted when it is asked for."""
         return self.block.line + self.distance
 
+    @property
+    def at(self) -> str:
+        """File and line, as messages show them."""
+        return f"{self.file}:{self.line}"
+
 
 Problem = tuple[Field, str]
 """A field that says nothing usable, and why."""
@@ -227,11 +232,11 @@ class Scope:
         if definition is None:
             if later := self.definitions(name):
                 place = later[0].place
-                raise ExpressionError(f"parameter &{name} is defined only below, at {place.file}:{place.line}")
+                raise ExpressionError(f"parameter &{name} is defined only below, at {place.at}")
             raise ExpressionError(f"parameter &{name} is not defined")
         if definition.problem:
             place = definition.place
-            raise ExpressionError(f"parameter &{name} has no value ({place.file}:{place.line}: {definition.problem})")
+            raise ExpressionError(f"parameter &{name} has no value ({place.at}: {definition.problem})")
         if isinstance(definition.value, str):
             raise ExpressionError(f"parameter &{name} is a text, a number was expected")
         return definition.value
@@ -325,6 +330,11 @@ class Card:
     def line(self) -> int:
         """Number of the keyword line, from 1."""
         return self.block.line
+
+    @property
+    def at(self) -> str:
+        """File and line of the keyword, as messages show them."""
+        return f"{self.file}:{self.line}"
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:

@@ -123,9 +123,9 @@ def _notes(deck: Deck, cards: Sequence[Card], elements: Sequence[Elements], part
     """Say what may be missing."""
     for card in cards:
         if not _followed(card):
-            yield f"{card.file}:{card.line}: elements of *{card.name} are not followed"
+            yield f"{card.at}: elements of *{card.name} are not followed"
     for unread in deck.unread:
-        yield f"{unread.name.file}:{unread.name.line}: {unread.name.text} was not read: {unread.reason}"
+        yield f"{unread.name.at}: {unread.name.text} was not read: {unread.reason}"
     for block in deck.encrypted:
         yield f"{block.source.name}:{block.line}: elements may hide in an encrypted block"
     yield from (f"{block.source.name}: {told}" for block, told in cuts(deck) if holds_mesh(block))

@@ -64,7 +64,7 @@ def read(deck: Deck, parts: Parts, nodes: tuple[Places, Reals, Places]) -> Bound
 
 
 def _name(card: Card) -> str:
-    return f"*{card.name} ({card.file}:{card.line})"
+    return f"*{card.name} ({card.at})"
 
 
 def _not_followed(card: Card) -> str:
@@ -239,7 +239,7 @@ def joints_of(deck: Deck) -> Joints:
         if one.kind != "joint" and one.nodes:
             found.append(Held(one.kind, one.nodes, frozenset([one.part] if one.part else [])))
         elif one.kind != "joint":
-            unknown.append(f"{one.kind} ({one.place.file}:{one.place.line})")
+            unknown.append(f"{one.kind} ({one.place.at})")
     sets = cache(partial(node_sets, deck))
     for card in deck.named("CONTACT"):
         if card.name.startswith(("CONTACT_TIED", "CONTACT_SPOTWELD")) or "TIEBREAK" in card.name:

@@ -116,10 +116,10 @@ def _notes(
     """Say what may be missing."""
     for card, words in cards:
         if words and words[0] in NOT_COUNTED:
-            yield f"{card.file}:{card.line}: elements of /{'/'.join(words)} are not followed"
+            yield f"{card.at}: elements of /{'/'.join(words)} are not followed"
     yield from (f"{block.source.name}: {told}" for block, told in cuts(run.deck) if holds_mesh(block))
     for unread in run.deck.unread:
-        yield f"{unread.name.file}:{unread.name.line}: {unread.name.text} was not read: {unread.reason}"
+        yield f"{unread.name.at}: {unread.name.text} was not read: {unread.reason}"
     if starter.moved:
         yield "ids of a //SUBMODEL may be moved, which is not followed"
     unknown = sorted({int(part) for one in elements for part in np.unique(one.part)} - starter.parts.keys())

@@ -54,7 +54,7 @@ def _rows(card: Card) -> list[Row]:
 
 
 def _name(card: Card) -> str:
-    return f"/{card.name} ({card.file}:{card.line})"
+    return f"/{card.name} ({card.at})"
 
 
 # Supports and imposed motion.
@@ -166,7 +166,7 @@ def joints_of(run: Run, starter: Starter, cards: Sequence[tuple[Card, tuple[str,
         if tie:
             found.append(tie)
         elif interface or (words and words[0] in _OTHER_OF_RADIOSS):
-            unknown.append(f"/{'/'.join(words)} ({card.file}:{card.line})")
+            unknown.append(f"/{'/'.join(words)} ({card.at})")
     named = {value.value for leg in run.legs for _, _, nodes in leg.switched for value in nodes}
     for body in starter.bodies:
         always = bool(run.legs) and not body.sensor and body.node.value not in named
@@ -175,7 +175,7 @@ def joints_of(run: Run, starter: Starter, cards: Sequence[tuple[Card, tuple[str,
             held = Held("rigid body", frozenset(members[0] | {body.node.value}), frozenset(members[1]))
             (found if always else switched).append(held)
         elif always:
-            unknown.append(f"/RBODY/{body.id} ({body.card.file}:{body.card.line})")
+            unknown.append(f"/RBODY/{body.id} ({body.card.at})")
     return Joints(tuple(found), tuple(unknown), tuple(switched))
 
 

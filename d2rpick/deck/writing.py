@@ -106,12 +106,12 @@ def _refuse_switched(deck: Deck, printed: Deck) -> None:
         if event.unit.is_set or event.unit.id in parts:
             place = event.by.card
             what = f"{event.unit.kind} {event.unit.id}"
-            raise DeckError(f"{place.file}:{place.line}: the deck switches {what} already; remove this card first")
+            raise DeckError(f"{place.at}: the deck switches {what} already; remove this card first")
     ids = {one.header.swset.value for one in mine if one.header}
     for one in sets:
         if one.header and one.header.swset.value in ids:
             place = one.card
-            found = f"{place.file}:{place.line}: switch set {one.header.swset.value} is one of the cards to be added"
+            found = f"{place.at}: switch set {one.header.swset.value} is one of the cards to be added"
             raise DeckError(f"{found}; print them with other ids")
 
 
@@ -165,7 +165,7 @@ def _refuse_other_run(leg: Leg, printed: Sequence[Leg]) -> None:
     nodes = {node.value for one in printed for _, _, ids in one.switched for node in ids}
     for card, rigid, ids in leg.switched:
         if rigid and (known := nodes & {node.value for node in ids}):
-            found = f"{card.file}:{card.line}: the run switches main node {min(known)} already"
+            found = f"{card.at}: the run switches main node {min(known)} already"
             raise DeckError(f"{found}; remove it from this /RBODY/ON first")
 
 

@@ -8,22 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck import radioss_run, read_deck
 from d2rpick.errors import ConfigurationError
-from d2rpick.rules import (
-    bodies,
-    constraints,
-    energy,
-    force,
-    formats,
-    pairs,
-    reading,
-    runs,
-    scope,
-    switched_parts,
-    times,
-)
-from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, Severity, Unreadable
+from d2rpick.rules import energy, reading, runs, sets, switched_parts, times
+from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, RunCase, Severity, Unreadable
 from d2rpick.rules.configuration import Configuration, expected_instead, find_configuration
-from d2rpick.rules.run_case import RunCase
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -45,11 +32,9 @@ __all__ = [
     "find_rules",
 ]
 
-_MODULES = (reading, pairs, force, times, formats, switched_parts, constraints, energy, scope, runs, bodies)
-
-RULES: Final[Mapping[str, Rule]] = {
-    rule.id: rule for rule in sorted((rule for module in _MODULES for rule in module.RULES), key=lambda rule: rule.id)
-}
+_MODULES = (reading, sets, times, switched_parts, energy, runs)
+_ALL = (one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule))
+RULES: Final[Mapping[str, Rule]] = {rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)}
 
 
 def find_rules(name: str) -> tuple[Rule, ...]:

@@ -1,33 +1,110 @@
-"""D2R001-003, D2R011, D2R109, D2R110, D2R303: what must be readable before anything can be judged."""
+"""D2R001-003, D2R011, D2R109-110, D2R301-306: what cannot be read, and what is not judged."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.card import Field
+from d2rpick.deck.elements import unread_elements
 from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
+from d2rpick.deck.source import STDIN
 from d2rpick.deck.switching import misspelt
-from d2rpick.rules.base import BOTH, Example, Rule, Severity
-from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Example, rule
+from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, PASSES, THERE, automatic, deck
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from d2rpick.deck import SwitchSet
     from d2rpick.deck.card import Card, Problem
     from d2rpick.rules.base import Case, Objection
 
 
+_CURES: Final = {"no such file": "add the file or its *INCLUDE_PATH", UNKNOWN_KIND: "check that file separately"}
+_INNER = THERE + BACK + END
+
+
+def _transformed(factor: str) -> Example:
+    include = f"*INCLUDE_TRANSFORM\nswitch.k\n{'0':>10s}\n{'0':>10s}\n{'1.0':>10s}{factor:>10s}\n{'0':>10s}\n"
+    return Example(HEAD + PARTS + include + END, {"switch.k": _INNER})
+
+
+_PARAMETER = "*PARAMETER\nR tr           0.02\n"
+_BY_NAME = PARTS + automatic(1, "&tr", rigid=["1"]) + BACK + END
+_CODES: Final = {
+    1: "when the force of rigid wall {} is zero",
+    2: "when the force of contact {} is zero",
+    3: "when rigid wall {} has a force",
+    4: "when contact {} has a force",
+    5: "by a *SENSOR_CONTROL of type DEF2RIG",
+}
+
+
+_INERTIA: Final = """\
+*DEFORMABLE_TO_RIGID_INERTIA
+         1
+       0.0       0.0       0.0      12.5
+       1.0       0.0       0.0       1.0       0.0       1.0
+"""
+
+
+def _elements(keyword: str) -> Example:
+    cards = automatic(1, "0.02", rigid=["1", "2"]) + automatic(2, "0.09", deformable=["1", "2"])
+    return deck(keyword + "\n       1       1       1       2       3       4\n" + cards)
+
+
+@rule(
+    "D2R001",
+    ERROR,
+    "the rows after a card do not match its D2R/R2D counts",
+    (PASSES,),
+    (
+        deck(automatic(1, "0.02", rigid=["1"], counts=(2, 0)) + BACK),
+        Example("*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1\n"),
+        deck(automatic(1, "0.02", rigid=["1"], counts=(2, -1)) + BACK),
+        deck(automatic(1, "0.02")),
+        deck("\n".join(THERE.split("\n")[:3] + THERE.split("\n")[5:]) + BACK),
+        deck("\n".join(THERE.split("\n")[:5]) + "\n" + BACK),
+        Example("*DEFORMABLE_TO_RIGID_INERTIA\n         1\n"),
+    ),
+)
 def _counts(case: Case) -> Iterator[Objection]:
+    """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC counts the D2R and R2D lines that follow it, one per part.
+    With wrong counts the solver reads a part from the wrong line, or a line as the next card. A card whose counts
+    are both 0 switches nothing. A line that is missing is named: the solver takes the next one in its place.
+    """
     for card in case.sets:
         if card.count_problem:
             lost = "missing" in card.count_problem
-            cure = (
-                "write all lines of the card" if lost else "write a line per part, and their count on the second line"
-            )
-            yield card.card.here, f"{card.count_problem}; {cure}"
+            rows = "all lines of the card" if lost else "a line per part, and their count on the second line"
+            yield card.card.here, f"{card.count_problem}; write {rows}"
 
 
+@rule(
+    "D2R002",
+    ERROR,
+    "a switching keyword, number or &parameter that cannot be read",
+    (PASSES, Example(HEAD + _PARAMETER + _BY_NAME)),
+    (
+        Example(HEAD + _BY_NAME),
+        Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
+        deck(automatic(0, "0.02", rigid=["1"])),
+        Example(GOOD.replace("      0.02       0.0", "    0.0135867    0.0")),
+        Example("*SET_PART\n         3\n     &door\n*DEFORMABLE_TO_RIGID\n         3         0      PSET\n"),
+        Example(GOOD.replace("         2         1         1", "       abc         1         1")),
+        Example(HEAD + "*INCLUDE_TRANSFORM\nall.k\n" + f"{'&off':>30s}\n", {"all.k": PARTS + THERE + BACK}),
+        Example(GOOD.replace("_AUTOMATIC", "_AUTOMATC")),
+        Example(GOOD.replace("*DEFORM", "* DEFORM")),
+        Example("*DEFORMABLE_TO_RIGID\n         1         0      WALL\n"),
+    ),
+    BOTH,
+)
 def _fields(case: Case) -> Iterator[Objection]:
+    """Fields are 10 columns wide (20 in long format) unless the line has commas. A text in a number's columns, or an
+    undefined parameter, stops the run or, worse, is read as something else. So is a keyword that begins like a
+    switching card but is not one. ENDTIM and the DT of *DATABASE_GLSTAT and _MATSUM are looked at too: the switching
+    times are judged by them.
+    """
     for unknown, near in misspelt(case.deck):
         head = unknown.block.head.strip()
         yield unknown.here, f"{head!r} is not a switching keyword, so its lines were not read; did you mean {near}?"
@@ -49,20 +126,37 @@ def _unreadable_members(case: Case) -> Iterator[Problem]:
         yield from content.problems if content else ()
 
 
-_CURES: Final = {
-    "no such file": "add the file or its *INCLUDE_PATH",
-    UNKNOWN_KIND: "check that file separately",
-}
-
-
+@rule(
+    "D2R003",
+    ERROR,
+    "an include file is missing or cannot be read",
+    (Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}),),
+    (Example(HEAD + "*INCLUDE\nnowhere.k\n" + END), Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END)),
+    BOTH,
+)
 def _includes(case: Case) -> Iterator[Objection]:
+    """Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's folder. A file
+    that includes itself or cannot be read is reported too; one that a Radioss starter deck asks for, only where a
+    main node that is switched was not found without it. Switching cards, parts or parameters may be in it, so the
+    other findings may be incomplete.
+    """
     for missing in case.unread:
         cure = _CURES.get(missing.reason, "correct it")
         found = f"include {missing.name.text!r} was not read ({missing.reason})"
         yield missing.name, f"{found}; switching cards may hide in it: {cure}"
 
 
+@rule(
+    "D2R109",
+    WARNING,
+    "a parameter used by a card is defined twice with different values",
+    (Example(HEAD + _PARAMETER + _PARAMETER + _BY_NAME),),
+    (Example(HEAD + _PARAMETER + "*PARAMETER\nR tr           0.03\n" + _BY_NAME),),
+)
 def _ambiguous(case: Case) -> Iterator[Objection]:
+    """LS-DYNA by default warns and keeps the first definition; *PARAMETER_DUPLICATION and _MUTABLE change that, and
+    other readers of decks keep the last. A switching time should not depend on it.
+    """
     uses = [(card.card, value) for card in case.sets for value in card.values if value.parameters]
     if case.sets:
         uses += [(card, value) for card, value in case.supporting if value.parameters]
@@ -74,151 +168,157 @@ def _ambiguous(case: Case) -> Iterator[Objection]:
             if first and differing and (card, name) not in seen:
                 seen.add((card, name))
                 other, place = differing[0], first.place
-                yield (
-                    value.field,
-                    (
-                        f"parameter &{name} is {first.value} at {place.file}:{place.line} but {other.value} at "
-                        f"{other.place.file}:{other.place.line}; which one counts depends on the solver: keep one"
-                    ),
-                )
+                found = f"parameter &{name} is {first.value} at {place.at} but {other.value} at {other.place.at}"
+                yield value.field, f"{found}; which one counts depends on the solver: keep one"
 
 
+@rule(
+    "D2R110",
+    WARNING,
+    "the card is in a transformed include whose FCTTIM is not 1",
+    (_transformed("1.0"), _transformed("0.0")),
+    (_transformed("0.5"),),
+)
 def _scaled(case: Case) -> Iterator[Objection]:
+    """*INCLUDE_TRANSFORM multiplies the times of a file by FCTTIM (0 means 1). d2rpick applies it to the switching
+    times too, but whether the solver does is not confirmed by any source that was available.
+    """
     for card in case.sets:
         factor = card.card.transform.time
         if factor != 1:
-            yield (
-                card.card.here,
-                (
-                    f"the card is in an include whose times are multiplied by {factor:g} (FCTTIM); that "
-                    "this holds for switching times is not confirmed: move the card to the main deck"
-                ),
-            )
+            found = f"the card is in an include whose times are multiplied by {factor:g} (FCTTIM)"
+            why = "that this holds for switching times is not confirmed"
+            yield card.card.here, f"{found}; {why}: move the card to the main deck"
 
 
+@rule(
+    "D2R303",
+    INFO,
+    "encrypted block: cards may hide in it",
+    (PASSES,),
+    (Example(GOOD.replace(END, "-----BEGIN PGP MESSAGE-----\nhQEMA\n-----END PGP MESSAGE-----\n") + END),),
+)
 def _encrypted(case: Case) -> Iterator[Objection]:
+    """Vendor models hold blocks between BEGIN PGP MESSAGE and END PGP MESSAGE that only the solver can read."""
     for block in case.deck.encrypted:
-        place = Field("", block, 0, 1)
-        yield (
-            place,
-            "an encrypted block starts here; switching cards may hide in it, nothing in it was checked",
-        )
+        told = "an encrypted block starts here; switching cards may hide in it, nothing in it was checked"
+        yield Field("", block, 0, 1), told
 
 
+@rule(
+    "D2R011",
+    WARNING,
+    "a file of the deck seems to be cut",
+    (Example(GOOD.removesuffix(END)),),
+    (Example(GOOD.removesuffix("      PART\n" + END)), Example(GOOD.removesuffix(END) + "*NODE\n       1\n")),
+    BOTH,
+)
 def _cut(case: Case) -> Iterator[Objection]:
+    """A file without *END (Radioss: /END) whose last line has no line end may have lost the end of a number, and all
+    that came after it; so may a main deck without *END whose last lines are nodes or elements. Switching cards,
+    parts or parameters may be missing. d2rpick parts computes no cost from a mesh that is cut.
+    """
     for block, told in cuts(case.deck):
         yield Field("", block, 0, 1), f"{told} What is missing was not checked: {cure(block)}"
 
 
-_INNER = THERE + BACK + END
+@rule("D2R301", INFO, "a card disabled by *COMMENT", (PASSES,), (deck("*COMMENT c:" + THERE),))
+def _disabled(case: Case) -> Iterator[Objection]:
+    """Everything from *COMMENT to the next keyword is a comment, the rest of the keyword line too. Below it a
+    switching card looks alive and is not.
+    """
+    for card in case.deck.disabled:
+        yield card.here, f"the keyword line {card.block.head.strip()!r} is a comment: this card does nothing"
 
 
-def _transformed(factor: str) -> Example:
-    include = f"*INCLUDE_TRANSFORM\nswitch.k\n{'0':>10s}\n{'0':>10s}\n{'1.0':>10s}{factor:>10s}\n{'0':>10s}\n"
-    return Example(HEAD + PARTS + include + END, {"switch.k": _INNER})
-
-
-_PARAMETER = "*PARAMETER\nR tr           0.02\n"
-_BY_NAME = PARTS + automatic(1, "&tr", rigid=["1"]) + BACK + END
-
-RULES: Final = (
-    Rule(
-        "D2R001",
-        Severity.ERROR,
-        "the rows after a card do not match its D2R/R2D counts",
-        "The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC counts the D2R and R2D lines that follow it, "
-        "one per part. With wrong counts the solver reads a part from the wrong line, or a line as the "
-        "next card. A card whose counts are both 0 switches nothing. A line that is missing is named: the solver takes "
-        "the next one in its place.",
-        _counts,
-        (Example(GOOD),),
-        (
-            Example(HEAD + PARTS + automatic(1, "0.02", rigid=["1"], counts=(2, 0)) + BACK + END),
-            Example("*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1\n"),
-            Example(HEAD + PARTS + automatic(1, "0.02", rigid=["1"], counts=(2, -1)) + BACK + END),
-            Example(HEAD + PARTS + automatic(1, "0.02") + END),
-            Example(HEAD + PARTS + "\n".join(THERE.split("\n")[:3] + THERE.split("\n")[5:]) + BACK + END),
-            Example(HEAD + PARTS + "\n".join(THERE.split("\n")[:5]) + "\n" + BACK + END),
-            Example("*DEFORMABLE_TO_RIGID_INERTIA\n         1\n"),
-        ),
+@rule(
+    "D2R302",
+    INFO,
+    "not judged by time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID",
+    (PASSES,),
+    (
+        deck(automatic(1, "0.0", rigid=["1"], code=2)),
+        Example("*RIGID_DEFORMABLE_R2D\n         1\n"),
+        Example("*DEFORMABLE_TO_RIGID\n         1\n"),
     ),
-    Rule(
-        "D2R002",
-        Severity.ERROR,
-        "a switching keyword, number or &parameter that cannot be read",
-        "Fields are 10 columns wide (20 in long format) unless the line has commas. A text in a number's "
-        "columns, or an undefined parameter, stops the run or, worse, is read as something else. "
-        "So is a keyword that begins like a switching card but is not one. "
-        "ENDTIM and the DT of *DATABASE_GLSTAT and _MATSUM are looked at too: the switching times are "
-        "judged by them.",
-        _fields,
-        (Example(GOOD), Example(HEAD + _PARAMETER + _BY_NAME)),
-        (
-            Example(HEAD + _BY_NAME),
-            Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
-            Example(HEAD + PARTS + automatic(0, "0.02", rigid=["1"]) + END),
-            Example(GOOD.replace("      0.02       0.0", "    0.0135867    0.0")),
-            Example("*SET_PART\n         3\n     &door\n*DEFORMABLE_TO_RIGID\n         3         0      PSET\n"),
-            Example(GOOD.replace("         2         1         1", "       abc         1         1")),
-            Example(HEAD + "*INCLUDE_TRANSFORM\nall.k\n" + f"{'&off':>30s}\n", {"all.k": PARTS + THERE + BACK}),
-            Example(GOOD.replace("_AUTOMATIC", "_AUTOMATC")),
-            Example(GOOD.replace("*DEFORM", "* DEFORM")),
-            Example("*DEFORMABLE_TO_RIGID\n         1         0      WALL\n"),
-        ),
-        solvers=BOTH,
-    ),
-    Rule(
-        "D2R003",
-        Severity.ERROR,
-        "an include file is missing or cannot be read",
-        "Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's "
-        "folder. A file that includes itself or cannot be read is reported too; one that a Radioss starter deck "
-        "asks for, only where a main node that is switched was not found without it. Switching cards, parts or "
-        "parameters may be in it, so the other findings may be incomplete.",
-        _includes,
-        (Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}),),
-        (Example(HEAD + "*INCLUDE\nnowhere.k\n" + END), Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END)),
-        solvers=BOTH,
-    ),
-    Rule(
-        "D2R011",
-        Severity.WARNING,
-        "a file of the deck seems to be cut",
-        "A file without *END (Radioss: /END) whose last line has no line end may have lost the end of a number, and "
-        "all that came after it; so may a main deck without *END whose last lines are nodes or elements. Switching "
-        "cards, parts or parameters may be missing. d2rpick parts computes no cost from a mesh that is cut.",
-        _cut,
-        (Example(GOOD.removesuffix(END)),),
-        (Example(GOOD.removesuffix("      PART\n" + END)), Example(GOOD.removesuffix(END) + "*NODE\n       1\n")),
-        solvers=BOTH,
-    ),
-    Rule(
-        "D2R109",
-        Severity.WARNING,
-        "a parameter used by a card is defined twice with different values",
-        "LS-DYNA by default warns and keeps the first definition; *PARAMETER_DUPLICATION and _MUTABLE "
-        "change that, and other readers of decks keep the last. A switching time should not depend on it.",
-        _ambiguous,
-        (Example(HEAD + _PARAMETER + _PARAMETER + _BY_NAME),),
-        (Example(HEAD + _PARAMETER + "*PARAMETER\nR tr           0.03\n" + _BY_NAME),),
-    ),
-    Rule(
-        "D2R110",
-        Severity.WARNING,
-        "the card is in a transformed include whose FCTTIM is not 1",
-        "*INCLUDE_TRANSFORM multiplies the times of a file by FCTTIM (0 means 1). d2rpick applies it to the "
-        "switching times too, but whether the solver does is not confirmed by any source that was available.",
-        _scaled,
-        (_transformed("1.0"), _transformed("0.0")),
-        (_transformed("0.5"),),
-    ),
-    Rule(
-        "D2R303",
-        Severity.INFO,
-        "encrypted block: cards may hide in it",
-        "Vendor models hold blocks between BEGIN PGP MESSAGE and END PGP MESSAGE that only the solver can read.",
-        _encrypted,
-        (Example(GOOD),),
-        (Example(GOOD.replace(END, "-----BEGIN PGP MESSAGE-----\nhQEMA\n-----END PGP MESSAGE-----\n") + END),),
-    ),
+    BOTH,
 )
+def _untimed(case: Case) -> Iterator[Objection]:
+    """CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the restart begins,
+    plain cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: no time on the card can be compared
+    with an energy history.
+    """
+    for place, how in case.untimed:
+        yield place, f"{how}; not judged by time"
+    for card in case.sets:
+        reason = _reason(card) if case.solver == LS_DYNA else ""
+        if reason:
+            yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
+
+
+@rule(
+    "D2R304",
+    INFO,
+    "elements of a kind that is not searched for shared nodes",
+    (PASSES, _elements("*ELEMENT_SHELL_COMPOSITE"), Example(GOOD.replace(END, "*ELEMENT_SHELL_DOF\n"))),
+    (_elements("*ELEMENT_SHELL_DOF"), _elements("*ELEMENT_BEAM_PID")),
+)
+def _unread(case: Case) -> Iterator[Objection]:
+    """D2R108 looks for nodes that separate rigid bodies share. Element keywords with options that put more whole
+    numbers on their lines are not followed, so it may miss some.
+    """
+    switched = {event.unit for event in case.windows.events if event.line.to_rigid}
+    if len(switched) < 2:
+        return
+    first: dict[str, Card] = {}
+    for card in unread_elements(case.deck):
+        first.setdefault(card.name, card)
+    for card in first.values():
+        yield card.here, f"nodes that parts share were not searched in *{card.name}, whose lines are not followed"
+
+
+@rule(
+    "D2R305",
+    INFO,
+    "*DEFORMABLE_TO_RIGID_INERTIA: mass and inertia given for a switch",
+    (PASSES,),
+    (deck(_INERTIA + THERE + BACK), deck(_INERTIA)),
+)
+def _inertias(case: Case) -> Iterator[Objection]:
+    """The card replaces the mass properties that the solver computes from the mesh when the part is made rigid; left
+    over from another state of the model they are wrong without a word. Source: vendor keyword data.
+    """
+    made = {event.unit.id for event in case.made_rigid}
+    unknown = any(event.unit.is_set for event in case.windows.events)
+    for card in case.sets:
+        if card.kind != "inertia" or card.part is None:
+            continue
+        part = card.part.value
+        used = "" if part in made or unknown else f"; no card of this deck makes part {part} rigid"
+        yield card.card.here, f"gives mass and inertia of part {part} for when a switch makes it rigid{used}"
+
+
+@rule(
+    "D2R306",
+    INFO,
+    "switching cards on standard input without parts: ids are not checked",
+    (Example(THERE + BACK), Example(GOOD, stdin=True)),
+    (Example(THERE + BACK, stdin=True),),
+)
+def _without_parts(case: Case) -> Iterator[Objection]:
+    """A file of cards alone is for another deck to include, which is checked with it. Cards on standard input, as in
+    d2rpick card ... | d2rpick check -, have no deck around them: that their parts exist is not known.
+    """
+    if case.deck.path == STDIN and case.sets and not case.parts.materials and case.parts.all_known:
+        told = "the parts are unknown: no *PART came with the cards, so their ids were not checked"
+        yield case.sets[0].card.here, told
+
+
+def _reason(card: SwitchSet) -> str:
+    if card.kind == "restart":
+        return "acts at the restart, whose time is the end of the run before"
+    if card.kind == "plain":
+        return "acts at the start of the run"
+    if card.header is None or card.header.code.problem or card.header.code.value not in _CODES:
+        return ""
+    return "switches " + _CODES[card.header.code.value].format(card.header.entno.value)

@@ -1,32 +1,97 @@
-"""D2R401-405: the legs of a Radioss run."""
+"""D2R307, D2R401-408: the legs of a Radioss run, and its rigid bodies.
+
+Bodies may go through walls, begin at rest, or be rigid all along.
+"""
 
 from __future__ import annotations
 
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, left_rigid
 from d2rpick.errors import name_units
-from d2rpick.rules.base import RADIOSS, Rule, Severity
-from d2rpick.rules.example_runs import GOOD_RUN, WINDOW, engine_files, run_of, starter_deck
-from d2rpick.rules.run_case import RunCase
+from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Example, RunCase, rule
+from d2rpick.rules.examples import GOOD_RUN, WINDOW, engine_files, run_of, starter_deck
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.radioss_engine import Leg
-    from d2rpick.rules.base import Case, Objection
+    from d2rpick.rules.base import Example, Objection
 
 _MOST_CAP = 0.01  # of the rigid window: the release comes up to a step late
 _MOST_LISTED = 8
 
+_MIXED: Final = {
+    name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text
+    for name, text in engine_files(*WINDOW).items()
+}
 
-def _switching_legs(case: Case) -> list[Leg]:
+
+def _row(*fields: float | str, width: int = 10) -> str:
+    return "".join(f"{field:>{width}}" for field in fields) + "\n"
+
+
+_LEGS: Final = engine_files(*WINDOW)
+_NODES: Final = "/GRNOD/NODE/8\nnodes of the box\n" + _row(1, 2, 3, 4)
+_MAIN: Final = "/GRNOD/NODE/9\nmain node\n" + _row(1808)
+_PLACES: Final = "/NODE\n" + "".join(_row(n)[:-1] + _row(0.1 * n, 0.0, 0.05, width=20) for n in (1, 2, 3, 4))
+_KEEPS: Final = starter_deck().partition("/GRNOD")[0].replace("         7\n", "         7         1\n")  # Ikrem
+
+
+def _wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
+    """Write the ground, at z = 0: nodes of a group, less those of another, and those that are near."""
+    text = "/RWALL/PLANE/3\nground\n" + _row(0, 0, added, left_out) + _row(reach, 0.0, 0.0, width=20)
+    return text + _row(0.0, 0.0, 0.0, width=20) + _row(0.0, 0.0, 1.0, width=20)
+
+
+def _velocity(group: int, speed: float = 10.0) -> str:
+    return "/INIVEL/TRA/4\nthrown\n" + _row(speed, 0.0, 0.0, width=20)[:-1] + _row(group)
+
+
+def _with(*more: str) -> Example:
+    """Add to the starter deck of a good run."""
+    return run_of(_LEGS, starter_deck(more="".join(more)))
+
+
+def _start(state: str, *nodes: int) -> Example:
+    """Give nodes a velocity in the first leg, in which the body is on or off."""
+    files = engine_files(("0.02", state), ("0.2", "OFF"))
+    files["box_0001.rad"] += "/INIV/TRA/X/1\n10.0\n" + _row(*nodes)
+    return run_of(files, starter_deck(_NODES.replace("NODE/8", "NODE/7")))
+
+
+def _wheel(named: str = "", members: tuple[int, ...] = (5, 6, 7, 8)) -> Example:
+    """Add a wheel that is a rigid body of its own; ``named`` stands in the /RBODY/OFF of the first leg too."""
+    wheel = (
+        "/PART/2\nwheel\n" + _row(1, 1) + "/SHELL/2\n" + _row(2, 5, 6, 7, 8) + "/GRNOD/NODE/6\nwheel\n" + _row(*members)
+    )
+    body = "/RBODY/2\nwheel\n" + _row(1809, 0, 0, 0, "", 0, 6)
+    files = {**_LEGS, "box_0001.rad": _LEGS["box_0001.rad"].replace("1808\n", f"1808 {named}\n")}
+    return run_of(files, starter_deck(more=wheel + body))
+
+
+def _switching_legs(case: RunCase) -> list[Leg]:
     """Legs of a run in which one switches a body; none of any other, whose legs are nobody's business here."""
-    legs = case.run.legs if isinstance(case, RunCase) else []
-    return legs if any(leg.switched for leg in legs) else []
+    return case.run.legs if any(leg.switched for leg in case.run.legs) else []
 
 
-def _order(case: Case) -> Iterator[Objection]:
+@rule(
+    "D2R401",
+    ERROR,
+    "legs of a Radioss run that do not follow each other",
+    (GOOD_RUN, run_of(engine_files(("0.05", "ON"), ("0.05", "OFF")))),
+    (
+        run_of(engine_files(("0.09", "OFF"), ("0.02", "ON"), ("0.2", "OFF"))),
+        run_of({name: text for name, text in engine_files(*WINDOW).items() if "0002" not in name}),
+    ),
+    (RADIOSS,),
+)
+def _order(case: RunCase) -> Iterator[Objection]:
+    """Each engine file continues the run where the one before ended: their numbers count up from 1, their /RUN names
+    are the same, and none ends before the one before it. Otherwise nothing can be said about when a part is rigid.
+    Two legs with the same end are not reported. Source: Altair's help for /RUN, and runs computed with OpenRadioss.
+    """
     legs = _switching_legs(case)
     for expected, leg in enumerate(legs, start=1):
         if leg.number != expected:
@@ -36,13 +101,25 @@ def _order(case: Case) -> Iterator[Objection]:
         if not leg.stop.problem and not before.stop.problem and leg.stop.value < before.stop.value:
             place = before.stop.field
             found = f"leg {leg.number} ends at {leg.stop.value:g}, before leg {before.number} at {before.stop.value:g}"
-            yield leg.stop.field, f"{found} ({place.file}:{place.line}); the end of each leg must follow the one before"
+            yield leg.stop.field, f"{found} ({place.at}); the end of each leg must follow the one before"
         if leg.name.casefold() != before.name.casefold():
             yield leg.run.here, f"leg {leg.number} belongs to run {leg.name!r}, the one before to {before.name!r}"
 
 
-def _main_nodes(case: Case) -> Iterator[Objection]:
-    if not isinstance(case, RunCase) or case.run.starter is None or case.run.starter.moved or case.unread:
+@rule(
+    "D2R402",
+    ERROR,
+    "/RBODY/ON or /RBODY/OFF names what is not a main node",
+    (GOOD_RUN, run_of(engine_files(*WINDOW, node="0"))),
+    (run_of(engine_files(*WINDOW, node="1")), run_of(engine_files(*WINDOW, node="1808 77"))),
+    (RADIOSS,),
+)
+def _main_nodes(case: RunCase) -> Iterator[Objection]:
+    """The engine takes the main nodes of rigid bodies, not the ids of bodies, and skips an unknown one without a
+    message: the part stays as it was. 0 names nothing and is not reported. Judged only when the starter deck and its
+    includes could be read. Source: Altair's help and the published source of OpenRadioss.
+    """
+    if case.run.starter is None or case.run.starter.moved or case.unread:
         return
     bodies = {body.node.value: body for body in case.run.starter.bodies}
     by_id = {body.id: body for body in bodies.values()}
@@ -58,8 +135,19 @@ def _main_nodes(case: Case) -> Iterator[Objection]:
                 yield node.field, f"{found}; {hint or f'main nodes here: {there}'}"
 
 
-def _never_off(case: Case) -> Iterator[Objection]:
-    if not isinstance(case, RunCase) or not case.run.legs or case.run.legs[0].number != 1:
+@rule(
+    "D2R403",
+    WARNING,
+    "/RBODY/ON in a later leg for a body that was rigid from the start",
+    (GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.2", "OFF")))),
+    (run_of(engine_files(("0.02", ""), ("0.09", "ON"), ("0.2", "OFF"))),),
+    (RADIOSS,),
+)
+def _never_off(case: RunCase) -> Iterator[Objection]:
+    """A rigid body is on by default in the first leg. Where no leg before says /RBODY/OFF the part is rigid from
+    time 0 on, through the load as well. Source: Altair's help for /RBODY in engine files.
+    """
+    if not case.run.legs or case.run.legs[0].number != 1:
         return
     said: set[int] = set()
     for leg in case.run.legs:
@@ -71,9 +159,24 @@ def _never_off(case: Case) -> Iterator[Objection]:
             said.update(node.value for node in nodes)
 
 
-def _step(case: Case) -> Iterator[Objection]:
-    if not isinstance(case, RunCase):
-        return
+@rule(
+    "D2R404",
+    WARNING,
+    "no limit of the time step, or a large one, in a leg with rigid parts",
+    (
+        GOOD_RUN,
+        run_of(
+            engine_files(*WINDOW, cap=""), starter_deck().replace("/RBODY", "/SHELL/2\n         2         1\n/RBODY")
+        ),
+    ),
+    (run_of(engine_files(*WINDOW, cap="")), run_of(engine_files(*WINDOW, cap="1e-5 1e-3"))),
+    (RADIOSS,),
+)
+def _step(case: RunCase) -> Iterator[Objection]:
+    """With nothing deformable left the step grows by 10 % per cycle without limit, and the release comes late with a
+    kick; /DTIX caps it. A cap above a hundredth of the rigid window is reported too. A leg without cap is reported
+    only where every element lies in a rigid part. Source: runs computed with OpenRadioss (td came 0.26 ms late).
+    """
     for index, held in case.rigid_legs:
         leg = case.run.legs[index]
         back = [window.td - window.tr for window in held if window.td is not None]
@@ -81,10 +184,8 @@ def _step(case: Case) -> Iterator[Objection]:
             found = f"/DTIX lets the step grow to {leg.cap.value:g} in a rigid window of {min(back):g}"
             yield leg.cap.field, f"{found}; the release may come a step late: take less than a hundredth of it"
         elif leg.cap is None and back and not _deformable_left(case, {window.unit.id for window in held}):
-            yield (
-                leg.run.here,
-                f"nothing is deformable in leg {leg.number}, so the step grows without limit; add /DTIX",
-            )
+            found = f"nothing is deformable in leg {leg.number}, so the step grows without limit"
+            yield leg.run.here, f"{found}; add /DTIX"
 
 
 def _deformable_left(case: RunCase, rigid: set[int]) -> bool:
@@ -95,86 +196,110 @@ def _deformable_left(case: RunCase, rigid: set[int]) -> bool:
     return not kinds or bool(kinds - rigid)
 
 
-def _versions(case: Case) -> Iterator[Objection]:
+@rule("D2R405", WARNING, "legs of different /VERS", (GOOD_RUN,), (run_of(_MIXED),), (RADIOSS,))
+def _versions(case: RunCase) -> Iterator[Objection]:
+    """The version says how the fields of an engine file are read. Source: Altair's help for /VERS; that a mixture
+    does harm was not seen.
+    """
     for before, leg in pairwise([leg for leg in _switching_legs(case) if leg.version]):
         if leg.version != before.version:
             found = f"/VERS/{leg.version} in leg {leg.number}, /VERS/{before.version} in leg {before.number}"
             yield leg.run.here, f"{found}; fields are read by the version: give the same in all legs"
 
 
-_MIXED: Final = {
-    name: text.replace("VERS/2022", "VERS/2019") if "0002" in name else text
-    for name, text in engine_files(*WINDOW).items()
-}
+def _flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
+    for flaw in case.flaws:
+        if flaw.code == code:
+            yield flaw.place, flaw.message
 
-RULES: Final = (
-    Rule(
-        "D2R401",
-        Severity.ERROR,
-        "legs of a Radioss run that do not follow each other",
-        "Each engine file continues the run where the one before ended: their numbers count up from 1, their /RUN "
-        "names are the same, and none ends before the one before it. Otherwise nothing can be said about when a part "
-        "is rigid. Two legs with the same end are not reported. Source: Altair's help for /RUN, and runs computed with "
-        "OpenRadioss.",
-        _order,
-        (GOOD_RUN, run_of(engine_files(("0.05", "ON"), ("0.05", "OFF")))),
-        (
-            run_of(engine_files(("0.09", "OFF"), ("0.02", "ON"), ("0.2", "OFF"))),
-            run_of({name: text for name, text in engine_files(*WINDOW).items() if "0002" not in name}),
-        ),
-        (RADIOSS,),
-    ),
-    Rule(
-        "D2R402",
-        Severity.ERROR,
-        "/RBODY/ON or /RBODY/OFF names what is not a main node",
-        "The engine takes the main nodes of rigid bodies, not the ids of bodies, and skips an unknown one without a "
-        "message: the part stays as it was. 0 names nothing and is not reported. Judged only when the starter deck and "
-        "its includes could be read. Source: Altair's help and the published source of OpenRadioss.",
-        _main_nodes,
-        (GOOD_RUN, run_of(engine_files(*WINDOW, node="0"))),
-        (run_of(engine_files(*WINDOW, node="1")), run_of(engine_files(*WINDOW, node="1808 77"))),
-        (RADIOSS,),
-    ),
-    Rule(
-        "D2R403",
-        Severity.WARNING,
-        "/RBODY/ON in a later leg for a body that was rigid from the start",
-        "A rigid body is on by default in the first leg. Where no leg before says /RBODY/OFF the part is rigid from "
-        "time 0 on, through the load as well. Source: Altair's help for /RBODY in engine files.",
-        _never_off,
-        (GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.2", "OFF")))),
-        (run_of(engine_files(("0.02", ""), ("0.09", "ON"), ("0.2", "OFF"))),),
-        (RADIOSS,),
-    ),
-    Rule(
-        "D2R404",
-        Severity.WARNING,
-        "no limit of the time step, or a large one, in a leg with rigid parts",
-        "With nothing deformable left the step grows by 10 % per cycle without limit, and the release comes late with "
-        "a kick; /DTIX caps it. A cap above a hundredth of the rigid window is reported too. A leg without cap is "
-        "reported only where every element lies in a rigid part. Source: runs computed with OpenRadioss (td came "
-        "0.26 ms late).",
-        _step,
-        (
-            GOOD_RUN,
-            run_of(
-                engine_files(*WINDOW, cap=""),
-                starter_deck().replace("/RBODY", "/SHELL/2\n         2         1\n/RBODY"),
-            ),
-        ),
-        (run_of(engine_files(*WINDOW, cap="")), run_of(engine_files(*WINDOW, cap="1e-5 1e-3"))),
-        (RADIOSS,),
-    ),
-    Rule(
-        "D2R405",
-        Severity.WARNING,
-        "legs of different /VERS",
-        "The version says how the fields of an engine file are read. Source: Altair's help for /VERS; that a mixture "
-        "does harm was not seen.",
-        _versions,
-        (GOOD_RUN,),
-        (run_of(_MIXED),),
-        (RADIOSS,),
-    ),
+
+@rule(
+    "D2R408",
+    WARNING,
+    "a rigid body that no leg switches, in a run that switches others",
+    (GOOD_RUN, _wheel("1809"), _wheel(members=(5, 6, 7)), run_of(engine_files(("0.2", "OFF")), _wheel().deck)),
+    (_wheel(),),
+    (RADIOSS,),
 )
+def _left_rigid(case: RunCase) -> Iterator[Objection]:
+    """A body is on from time 0 unless the first leg says /RBODY/OFF, and what it holds is rigid to the end: the
+    wheels of a car whose legs name its body alone. Reported where the body holds whole parts. With a history it is
+    an error if these parts have internal energy there, and nothing if they have none; without one it may be meant: a
+    comment silences it. Source: Altair's help for /RBODY in engine files, and runs computed with OpenRadioss.
+    """
+    left = left_rigid(case.run, case.windows.windows)
+    deforming = case.judge.deforming(left.parts) if left and case.judge else None
+    if left is None or deforming == ():
+        return
+    if deforming:
+        yield left.place, f"{left.found}, which deform in the history; {left.way_out}", ERROR
+    else:
+        yield left.place, f"{left.found}; where the run without switching keeps the bodies off, {left.way_out}"
+
+
+@rule(
+    "D2R307",
+    INFO,
+    "a rigid wall, an initial velocity or a rigid body whose nodes are not known",
+    (GOOD_RUN, _with(_NODES, _wall(8))),
+    (
+        _with("/GRNOD/BOX/8\nbox\n", _row(1), _wall(8)),
+        _with(_velocity(8)),
+        _with(_PLACES, "/TRANSFORM/TRA/1\n", _wall(0, 0, 0.1)),
+    ),
+    (RADIOSS,),
+)
+def _d2r307(case: RunCase) -> Iterator[Objection]:
+    """What walls and velocities do to the nodes of rigid bodies (D2R406, D2R407) is judged by groups of nodes, parts
+    and subsets, and by the distance from the wall. Other groups, nodes that /TRANSFORM moves and the ids of a
+    //SUBMODEL are not followed.
+    """
+    return _flaws(case, code=NOT_FOLLOWED)
+
+
+@rule(
+    "D2R406",
+    ERROR,
+    "a rigid wall that does not hold what a switched rigid body holds",
+    (
+        GOOD_RUN,
+        _with(_NODES, _wall(8, 8)),
+        run_of(_LEGS, f"{_KEEPS}{_NODES.replace('/8', '/7')}{_wall(7)}/END\n"),
+        _with(_PLACES, _wall(0, 0, 0.01)),
+        run_of({}, starter_deck(more=_NODES + _wall(8))),
+    ),
+    (_with(_NODES, _wall(8)), _with(_PLACES, _wall(0, 0, 0.1)), _with(_wall(7))),
+    (RADIOSS,),
+)
+def _d2r406(case: RunCase) -> Iterator[Objection]:
+    """The starter removes the nodes of every /RBODY with Ikrem 0 from all /RWALL, also of one that the engine puts
+    off in the first leg (warning 446): what they hold goes through the wall. OpenRadioss takes the Ikrem of the
+    /RBODY with the highest id for all. With Ikrem 1 the wall holds the nodes while the body is off, and not while it
+    is on: switch back before it touches. Walls with the penalty formulation (Iform 1, since 2026) keep their nodes.
+    Source: Altair's help for /RBODY and /RWALL, the published source of OpenRadioss, and runs computed with it (a
+    car that flew through a pole).
+    """
+    return _flaws(case, code=THROUGH_WALL)
+
+
+@rule(
+    "D2R407",
+    ERROR,
+    "an initial velocity that moves nodes of a switched rigid body and not its main node",
+    (
+        GOOD_RUN,
+        _with(_NODES, _velocity(8), _MAIN, _velocity(9)),
+        _with(_NODES, _velocity(8, 0.0)),
+        _start("OFF", 1, 4),
+        _start("ON", 1, 1808),
+    ),
+    (_with(_NODES, _velocity(8)), _with(_velocity(7)), _start("ON", 1, 4)),
+    (RADIOSS,),
+)
+def _d2r407(case: RunCase) -> Iterator[Objection]:
+    """The starter gives all nodes of an /RBODY the velocity of its main node, also of one that the engine puts off
+    in the first leg. Where the node group of /INIVEL lacks that node the body begins at rest, without a message. An
+    /INIV of an engine file moves a body that is on by its main node alone, one that is off by its nodes. Velocities
+    that begin later (tstart, a sensor) are not judged. Source: runs computed with OpenRadioss.
+    """
+    return _flaws(case, code=AT_REST)

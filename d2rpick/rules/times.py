@@ -1,4 +1,4 @@
-"""D2R101, D2R102, D2R105, D2R111: the times of the windows, and whether a history can support them."""
+"""D2R101, D2R102, D2R105, D2R111, D2R114, D2R115: the times of the windows, and whether a history can support them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME
 from d2rpick.errors import name_units
-from d2rpick.rules.base import BOTH, Example, Rule, Severity
-from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.base import BOTH, ERROR, WARNING, Example, grouped, rule
+from d2rpick.rules.examples import BACK, END, GOOD, PARTS, PASSES, THERE, automatic, deck, window
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.deck import SwitchSet, Window
+    from d2rpick.deck.switching import Header
     from d2rpick.rules.base import Case, Objection
 
 _INTERVALS = 200  # output intervals per rigid window, for crossings to be found within 0.5 %
@@ -20,22 +21,35 @@ _ROUNDING = 1e-9
 _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
+THOUSAND = 1000.0
+_FEW = 2  # cards: D2R102 and D2R105 say it already
+_SECOND: Final = automatic(3, "0.1", rigid=["2"]) + automatic(4, "0.1", deformable=["2"])
+
+
+@rule(
+    "D2R101",
+    ERROR,
+    "switch time outside [0, ENDTIM)",
+    (PASSES,),
+    (
+        window("0.02", "0.2"),
+        window("-0.02", "0.09"),
+        Example(PARTS + automatic(1, "0.02", rigid=["1"], code=2).replace("       0.0", "      0.01", 1) + END),
+    ),
+)
 def _in_run(case: Case) -> Iterator[Objection]:
-    for card in case.sets:
-        header = card.header
-        if header is None or header.code.problem or header.time1.problem or header.code.value == BY_SENSOR:
+    """TIME1 is the switching time for CODE 0 and the earliest one for CODE 1 to 4. At or after ENDTIM of
+    *CONTROL_TERMINATION the switch never happens, and with CODE 1 to 4 not after TIME2 either.
+    """
+    for card, header in case.headers:
+        if header.code.problem or header.time1.problem or header.code.value == BY_SENSOR:
             continue
         time = header.time1.value * card.card.transform.time
         if time < 0:
             yield header.time1.field, f"TIME1 is {time:g}, a time from 0 on was expected"
         elif case.end is not None and time >= case.end:
-            yield (
-                header.time1.field,
-                (
-                    f"TIME1 is {time:g} but the run ends at {case.end:g} (ENDTIM), so nothing is ever switched; "
-                    "correct one of them"
-                ),
-            )
+            found = f"TIME1 is {time:g} but the run ends at {case.end:g} (ENDTIM)"
+            yield header.time1.field, f"{found}, so nothing is ever switched; correct one of them"
         latest = header.time2
         if header.code.value != BY_TIME and not latest.problem and 0 < latest.value < header.time1.value:
             problem = f"TIME2 is {latest.value:g}, before TIME1 ({header.time1.value:g}), so nothing is ever switched"
@@ -44,47 +58,65 @@ def _in_run(case: Case) -> Iterator[Objection]:
 
 def _closed(case: Case) -> dict[tuple[SwitchSet, SwitchSet], list[Window]]:
     """Windows with both ends, by the cards that open and close them."""
-    found: dict[tuple[SwitchSet, SwitchSet], list[Window]] = {}
-    for window in case.windows.windows:
-        if window.closed is not None:
-            found.setdefault((window.opened.by, window.closed.by), []).append(window)
-    return found
+    return grouped(((one.opened.by, one.closed.by), one) for one in case.windows.windows if one.closed is not None)
 
 
-def _lost(window: Window) -> bool:
-    return window.tr == 0 == window.td
+def _named(windows: Sequence[Window]) -> str:
+    return name_units(one.unit.id for one in windows)
 
 
+def _lost(one: Window) -> bool:
+    return one.tr == 0 == one.td
+
+
+@rule(
+    "D2R102",
+    ERROR,
+    "switched back before (or when) it was switched to rigid",
+    (PASSES,),
+    (window("0.09", "0.02"), window("0.02", "0.02")),
+    BOTH,
+)
 def _order(case: Case) -> Iterator[Objection]:
+    """The R2D switch of a part must come after its D2R switch; the solver does not sort them for you."""
     for (opening, closing), windows in _closed(case).items():
         first = windows[0]
         if first.td is not None and first.td <= first.tr and not _lost(first):
-            place = opening.time_field
-            yield (
-                closing.time_field,
-                (
-                    f"{name_units(window.unit.id for window in windows)} switched back at {first.td:g} but "
-                    f"made rigid at {first.tr:g} ({place.file}:{place.line}), an earlier time was expected "
-                    "there; are the two times swapped?"
-                ),
-            )
+            found = f"{_named(windows)} switched back at {first.td:g} but made rigid at {first.tr:g}"
+            way_out = f"({opening.time_field.at}), an earlier time was expected there; are the two times swapped?"
+            yield closing.time_field, f"{found} {way_out}"
 
 
+@rule(
+    "D2R105",
+    ERROR,
+    "both times of a window are 0 (decimals lost in writing)",
+    (PASSES, window("0.0", "0.09")),
+    (window("0.0", "0.0"),),
+)
 def _zero(case: Case) -> Iterator[Objection]:
+    """Writers that print times with one decimal turn everything below 0.05 into 0.0. Two sets that both switch at 0
+    are a sign of it.
+    """
     for (opening, closing), windows in _closed(case).items():
         if _lost(windows[0]) and opening.kind == "automatic":
-            place = opening.time_field
-            yield (
-                closing.time_field,
-                (
-                    f"both times of {name_units(window.unit.id for window in windows)} are 0 (the other at "
-                    f"{place.file}:{place.line}); print times below 0.05 with more than one decimal"
-                ),
-            )
+            found = f"both times of {_named(windows)} are 0 (the other at {opening.time_field.at})"
+            yield closing.time_field, f"{found}; print times below 0.05 with more than one decimal"
 
 
+@rule(
+    "D2R111",
+    WARNING,
+    "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200",
+    (PASSES, Example(THERE + BACK)),
+    (Example(PARTS + THERE + BACK + END), Example(GOOD.replace("    0.0001", "      0.01"))),
+)
 def _sampling(case: Case) -> Iterator[Objection]:
-    spans = [window.td - window.tr for window in case.windows.windows if window.td is not None]
+    """Switching times are chosen by the internal energy of a reference run: glstat holds it for the whole run,
+    matsum for every part. Written too rarely, the energy at tr and td is not known well enough. Decks that are only
+    switching cards, and runs with --history, are not judged.
+    """
+    spans = [one.td - one.tr for one in case.windows.windows if one.td is not None]
     spans = [span for span in spans if span > 0]
     if case.judge is not None or not spans:
         return
@@ -104,74 +136,79 @@ def _sampling(case: Case) -> Iterator[Objection]:
         if interval <= 0:
             missing.append(f"*{keyword} with DT above 0")
         elif interval > limit * (1 + _ROUNDING):
-            yield (
-                value.field,
-                (
-                    f"DT of *{keyword} is {interval:g}, at most {limit:g} was expected ({_INTERVALS} intervals "
-                    "in the shortest rigid window) to choose a switching time from its energies; write it "
-                    "more often"
-                ),
-            )
-    whole = case.parts.all_known and (case.parts.materials or case.end_time is not None)
-    if missing and whole:  # a file with nothing but cards is for another deck to include
-        yield (
-            next(window for window in case.windows.windows if window.closed).opened.by.card.here,
-            (
-                f"the deck has no {' and no '.join(missing)}, so there is no energy history to choose the "
-                "times by; add what is missing"
-            ),
-        )
+            found = f"DT of *{keyword} is {interval:g}, at most {limit:g} was expected ({_INTERVALS} intervals"
+            why = "in the shortest rigid window) to choose a switching time from its energies"
+            yield value.field, f"{found} {why}; write it more often"
+    whole = case.whole or (case.parts.all_known and case.end_time is not None)
+    if missing and whole:
+        found = f"the deck has no {' and no '.join(missing)}, so there is no energy history to choose the times by"
+        first = next(one for one in case.windows.windows if one.closed)
+        yield first.opened.by.card.here, f"{found}; add what is missing"
 
 
-def _window(tr: str, td: str) -> Example:
-    there, back = automatic(1, tr, rigid=["1"]), automatic(2, td, deformable=["1"])
-    return Example(HEAD + PARTS + there + back + END)
+def _timed(case: Case) -> list[tuple[SwitchSet, Header]]:
+    return [(card, header) for card, header in case.headers if card.time is not None and header.code.value == BY_TIME]
 
 
-RULES: Final = (
-    Rule(
-        "D2R101",
-        Severity.ERROR,
-        "switch time outside [0, ENDTIM)",
-        "TIME1 is the switching time for CODE 0 and the earliest one for CODE 1 to 4. At or after ENDTIM of "
-        "*CONTROL_TERMINATION the switch never happens, and with CODE 1 to 4 not after TIME2 either.",
-        _in_run,
-        (Example(GOOD),),
-        (
-            _window("0.02", "0.2"),
-            _window("-0.02", "0.09"),
-            Example(PARTS + automatic(1, "0.02", rigid=["1"], code=2).replace("       0.0", "      0.01", 1) + END),
-        ),
-    ),
-    Rule(
-        "D2R102",
-        Severity.ERROR,
-        "switched back before (or when) it was switched to rigid",
-        "The R2D switch of a part must come after its D2R switch; the solver does not sort them for you.",
-        _order,
-        (Example(GOOD),),
-        (_window("0.09", "0.02"), _window("0.02", "0.02")),
-        solvers=BOTH,
-    ),
-    Rule(
-        "D2R105",
-        Severity.ERROR,
-        "both times of a window are 0 (decimals lost in writing)",
-        "Writers that print times with one decimal turn everything below 0.05 into 0.0. Two sets that "
-        "both switch at 0 are a sign of it.",
-        _zero,
-        (Example(GOOD), _window("0.0", "0.09")),
-        (_window("0.0", "0.0"),),
-    ),
-    Rule(
-        "D2R111",
-        Severity.WARNING,
-        "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200",
-        "Switching times are chosen by the internal energy of a reference run: glstat holds it for the "
-        "whole run, matsum for every part. Written too rarely, the energy at tr and td is not known well "
-        "enough. Decks that are only switching cards, and runs with --history, are not judged.",
-        _sampling,
-        (Example(GOOD), Example(THERE + BACK)),
-        (Example(PARTS + THERE + BACK + END), Example(GOOD.replace("    0.0001", "      0.01"))),
-    ),
+@rule(
+    "D2R114",
+    ERROR,
+    "all switching times are equal (decimals lost in writing)",
+    (PASSES, deck(THERE + automatic(3, "0.02", rigid=["2"]))),
+    (window("0.1", "0.1", _SECOND), deck(automatic(1, "0.0", rigid=["1"]) + automatic(2, "0.0", deformable=["2"]))),
 )
+def _equal(case: Case) -> Iterator[Objection]:
+    """Writers with one decimal make 0.0 of every time below 0.05, and 0.1 of 0.07 and 0.13. Cards that make parts
+    rigid and cards that make them deformable, all at one time, are a sign of it. Source: a public drop tool wrote
+    such decks.
+    """
+    timed = _timed(case)
+    times = {card.time for card, _ in timed}
+    ways = {line.to_rigid for card, _ in timed for line in card.switched}
+    inverted = any(one.td is not None and one.td <= one.tr for one in case.windows.windows)
+    if len(times) != 1 or len(timed) < _FEW or len(ways) < 2 or (inverted and len(timed) == _FEW):
+        return
+    (time,) = times
+    found = f"all {len(timed)} switching times of the deck are {time:g}, to rigid and back; were decimals lost?"
+    yield timed[0][1].time1.field, f"{found} print them with more digits"
+
+
+def factor_of(times: list[float], end: float) -> float:
+    """1000 or 1/1000 where all times multiplied by its inverse suit a run up to ``end``, and as they are do not.
+
+    Times before the run, or at its start, suit it in any unit.
+    """
+    later = [time for time in times if time > 0]
+    if not later:
+        return 1.0
+    latest, earliest = max(later), min(later)
+    if earliest >= end and latest < THOUSAND * end:
+        return THOUSAND if latest > 10 * end else 1.0
+    return 1 / THOUSAND if end / 50 <= THOUSAND * latest < end else 1.0
+
+
+def mistaken(factor: float) -> str:
+    """Say which units seem to be mixed."""
+    way = ("later", "milliseconds for seconds") if factor > 1 else ("earlier", "seconds for milliseconds")
+    return f"about 1000 times {way[0]}: {way[1]}?"
+
+
+@rule(
+    "D2R115",
+    WARNING,
+    "the switching times are about 1000 times the termination time, or a thousandth of it",
+    (PASSES, Example(THERE + BACK), window("-0.01", "0.07"), window("-0.02", "-0.01"), window("0.0", "0.07")),
+    (window("20.0", "90.0"), window("2.0e-5", "9.0e-5")),
+)
+def _thousand(case: Case) -> Iterator[Objection]:
+    """Seconds and milliseconds are mixed: the times would lie in the run if they were divided, or multiplied, by
+    1000, and do not, or only in its first 1/1000. D2R101 reports times after the end too. Files name no units, so
+    this is a guess by size.
+    """
+    times = [card.time for card, _ in _timed(case) if card.time is not None]
+    if case.end is None:
+        return
+    factor = factor_of(times, case.end)
+    if factor != 1:
+        found = f"the switching times reach {max(times):g} but the run ends at {case.end:g} (ENDTIM)"
+        yield _timed(case)[0][1].time1.field, f"{found}, {mistaken(factor)} give both in the same unit"

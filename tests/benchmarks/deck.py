@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.deck import find_windows, read_deck, read_parts, read_switching
 from d2rpick.rules import check_deck
-from d2rpick.rules.example_decks import BACK, HEAD, PARTS, THERE
+from d2rpick.rules.examples import BACK, HEAD, PARTS, THERE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from d2rpick.rules import RULES
-from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import BOX, DECK, ENERGY, GLSTAT, answer, run
 from tests.json_schemas import check_by_schema
 from tests.report.test_findings import junit_is_valid, sarif_is_valid

@@ -11,7 +11,7 @@ from d2rpick.deck import read_deck, read_switching
 from d2rpick.deck.source import find_marks
 from d2rpick.deck.stored import Held
 from d2rpick.errors import DeckError
-from d2rpick.rules.example_decks import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.decks import found, read, spans
 
 if TYPE_CHECKING:

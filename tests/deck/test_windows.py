@@ -8,7 +8,7 @@ import pytest
 
 from d2rpick.deck import read_parts
 from d2rpick.deck.elements import first_shared_nodes
-from d2rpick.rules.example_decks import PARTS, automatic
+from d2rpick.rules.examples import PARTS, automatic
 from tests.decks import read, spans, windows
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from d2rpick.deck.radioss_run import read_run
 from d2rpick.deck.writing import write_deck
 from d2rpick.errors import DeckError
 from d2rpick.rules import RULES, check_deck
-from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE
+from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE
 from tests.decks import write
 
 if TYPE_CHECKING:

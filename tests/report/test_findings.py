@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from d2rpick.report import findings as report
 from d2rpick.rules import RULES, Checked, Finding, Severity, check_deck
-from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, automatic
+from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, automatic
 from tests.deck.test_radioss_run import place
 from tests.decks import write
 from tests.json_schemas import check_by_schema

@@ -13,7 +13,7 @@ import pytest
 from d2rpick.errors import ConfigurationError, DeckError
 from d2rpick.rules import RULES, Example, Rule, Severity, check_deck
 from d2rpick.rules.configuration import Configuration
-from d2rpick.rules.example_decks import END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import answer, run
 from tests.decks import found, write
 

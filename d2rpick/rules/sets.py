@@ -1,0 +1,262 @@
+"""D2R004-010: switch sets among each other, and switches by the force of a contact or rigid wall."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.deck.constraints import read_contacts, read_rigid_walls
+from d2rpick.deck.switching import BY_TIME
+from d2rpick.errors import listing
+from d2rpick.rules.base import ERROR, WARNING, Example, rule
+from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.deck.constraints import Entities, Entity
+    from d2rpick.deck.switching import Header, SwitchSet
+    from d2rpick.deck.windows import Unit
+    from d2rpick.rules.base import Case, Objection
+
+_FAMILIES: Final = ({1, 3}, {2, 4})  # rigid wall, contact
+_WITHOUT_FORCE, _WITH_FORCE = {1, 2}, {3, 4}
+
+
+def _pair(codes: tuple[int, int], signs: tuple[int, int] = (1, -1), back: int = 1) -> Example:
+    there = automatic(1, "0.0", rigid=["1"], code=codes[0], pair=(2, signs[0]))
+    again = automatic(2, "0.0", deformable=["1"], code=codes[1], pair=(back, signs[1]))
+    return deck(there + again)
+
+
+_OF_WALL: Final = {1, 3}
+_OF_CONTACT: Final = {2, 4}
+_NEEDS_FORCE: Final = {3, 4}
+_ABLE: Final = ("SURFACE_TO_SURFACE", "NODES_TO_SURFACE", "NODE_TO_SURFACE")  # in the names of contacts that trigger
+_MOST_LISTED = 8
+
+
+def _force(code: int, entno: int, time3: str = "1.0e-3", contact: str = "") -> Example:
+    card = automatic(1, "0.0", rigid=["1"], code=code)
+    old = f"{'0.0':>10s}{'0.0':>10s}{'0.0':>10s}{0:10d}"
+    assert old in card
+    card = card.replace(old, f"{'0.0':>10s}{'0.0':>10s}{time3:>10s}{entno:10d}", 1)
+    return deck(contact + card)
+
+
+def _contact(name: str, number: int = 7) -> str:
+    zeros = f"{0:10d}" * 8 + "\n"
+    return f"*CONTACT_AUTOMATIC_{name}_ID\n{number:10d}floor\n" + 3 * zeros
+
+
+_FLOOR: Final = _contact("SURFACE_TO_SURFACE")
+_BY_ORDER: Final = "*CONTACT_NODES_TO_SURFACE\n" + 3 * ("         0" * 8 + "\n")
+_WALL: Final = (
+    "*RIGIDWALL_PLANAR_ID\n         3ground\n         0         0         0\n       0.0       0.0       0.0\n"
+)
+
+
+_with_floor = partial(_force, contact=_FLOOR)
+
+
+@rule("D2R004", ERROR, "SWSET used twice", (PASSES,), (deck(THERE + automatic(1, "0.09", deformable=["1"])),))
+def _unique(case: Case) -> Iterator[Objection]:
+    """Every *DEFORMABLE_TO_RIGID_AUTOMATIC is a switch set with an id of its own; RELSW refers to it."""
+    first: dict[int, Header] = {}
+    for _, header in case.headers:
+        if header.swset.problem:
+            continue
+        known = first.setdefault(header.swset.value, header)
+        if known is not header:
+            found = f"SWSET {header.swset.value} is already used at {known.swset.field.at}"
+            yield header.swset.field, f"{found}; give every set its own id"
+
+
+@rule(
+    "D2R005",
+    WARNING,
+    "RELSW/PAIRED not mutual, not of opposite sign, or CODEs of different families",
+    (_pair((2, 4)), _pair((1, 3))),
+    (_pair((2, 4), back=7), _pair((2, 4), signs=(1, 1)), _pair((1, 4))),
+)
+def _mutual(case: Case) -> Iterator[Objection]:
+    """Paired sets alternate as a contact or wall force comes and goes: each names the other in RELSW, PAIRED is 1
+    for the one that acts first and -1 for the other, and their CODEs are 1 and 3 (wall) or 2 and 4 (contact). Sets,
+    paired or not, that are rigid under force (CODE 3 or 4 on the D2R side, 1 or 2 on the other) are the wrong way
+    round, rigid during the impact and deformable in flight: that finding is an error. Source: vendor keyword data
+    for the codes; a public drop tool wrote decks with 2 and 4 exchanged for months.
+    """
+    by_id = {header.swset.value: header for _, header in reversed(case.headers)}
+    for _, header in case.headers:
+        problem = _alone(header)
+        partner = by_id.get(header.relsw.value)
+        if not problem and header.relsw.value and partner is None and not case.deck.unread:
+            problem = f"RELSW names set {header.relsw.value}, which no card defines"
+        if not problem and header.relsw.value and partner is not None:
+            first = header.swset.value < partner.swset.value  # what both share is said once, at one of them
+            problem = _one_sided(header, partner) or (_mismatch(header, partner) if first else "")
+        if problem:
+            yield header.relsw.field, f"{problem}; check RELSW, PAIRED and CODE of both sets"
+    for header, problem in _swapped(case):
+        yield header.code.field, f"{problem}; exchange the CODEs", ERROR
+
+
+def _swapped(case: Case) -> Iterator[tuple[Header, str]]:
+    """Sets that make the same parts rigid under a force and deformable without one, paired or not."""
+    rigid = [(card, header) for card, header in case.headers if header.code.value in _WITH_FORCE]
+    back = [(card, header) for card, header in case.headers if header.code.value in _WITHOUT_FORCE]
+    for there, header in rigid:
+        for again, other in back:
+            family = {header.code.value, other.code.value} in _FAMILIES
+            if family and _units(case, there, to_rigid=True) & _units(case, again, to_rigid=False):
+                ids = f"sets {header.swset.value} and {other.swset.value}"
+                found = f"{ids} make parts rigid while there is a force and deformable while there is none"
+                why = "rigid in the impact and deformable in flight: the CODEs seem to be swapped"
+                yield header, f"{found}, {why}"
+                break
+
+
+def _units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
+    return {event.unit for event in case.windows.events if event.by is card and event.line.to_rigid == to_rigid}
+
+
+def _alone(header: Header) -> str:
+    relsw, paired = header.relsw.value, header.paired.value
+    if relsw and not paired:
+        return f"RELSW names set {relsw} but PAIRED is 0"
+    if paired and not relsw:
+        return f"PAIRED is {paired} but RELSW names no set"
+    return f"PAIRED is {paired}" if paired not in {-1, 0, 1} else ""
+
+
+def _one_sided(header: Header, partner: Header) -> str:
+    if partner.relsw.value == header.swset.value and partner is not header:
+        return ""
+    return f"RELSW names set {header.relsw.value}, which names set {partner.relsw.value}"
+
+
+def _mismatch(one: Header, other: Header) -> str:
+    """Say what is wrong with a mutual pair: signs, or families of CODEs."""
+    ids = f"sets {one.swset.value} and {other.swset.value}"
+    if one.paired.value == other.paired.value:
+        return f"{ids} both have PAIRED {one.paired.value}"
+    codes = [one.code.value, other.code.value]
+    if any(codes) and not any(set(codes) <= family for family in _FAMILIES):
+        return f"{ids} have CODE {codes[0]} and {codes[1]}, one of 1 and 3 or of 2 and 4 was expected"
+    return ""
+
+
+@rule(
+    "D2R006",
+    WARNING,
+    "PAIRED together with CODE 0",
+    (PASSES, _pair((2, 4))),
+    (deck(automatic(1, "0.02", rigid=["1"], pair=(2, 1)) + BACK),),
+)
+def _timed_pair(case: Case) -> Iterator[Objection]:
+    """For one window by time two unpaired sets are enough."""
+    for _, header in case.headers:
+        if header.paired.value and header.code.value == BY_TIME and not header.code.problem:
+            found = f"PAIRED is {header.paired.value} with CODE 0; a pair alternates by force"
+            yield header.paired.field, f"{found}, a switch by time needs none: set PAIRED and RELSW to 0"
+
+
+def _by_force(case: Case, codes: set[int]) -> Iterator[Header]:
+    for _, header in case.headers:
+        if not header.code.problem and not header.entno.problem and header.code.value in codes:
+            yield header
+
+
+@rule(
+    "D2R007",
+    ERROR,
+    "ENTNO names no contact or rigid wall of the deck",
+    (_with_floor(4, 7), _force(4, 1, contact=_BY_ORDER), _force(3, 3, contact=_WALL), Example(THERE + BACK)),
+    (_with_floor(4, 8), _force(4, 7), _force(3, 4, contact=_WALL), _force(2, 2, contact=_BY_ORDER)),
+)
+def _there(case: Case) -> Iterator[Objection]:
+    """CODE 2 and 4 wait for the force of contact ENTNO, 1 and 3 for that of a rigid wall. One that does not exist
+    never has a force. ENTNO is the id of *CONTACT_..._ID; without ids the order of definition counts (from memory of
+    the manual, not confirmed). Judged only when all of the deck could be read and it has parts. Source: vendor
+    keyword data.
+    """
+    for codes, what, read in ((_OF_CONTACT, "contact", read_contacts), (_OF_WALL, "rigid wall", read_rigid_walls)):
+        headers = [header for header in _by_force(case, codes) if header.entno.value]
+        entities = read(case.deck) if headers else None
+        if entities is None or not (entities.all_known and case.whole):
+            continue
+        for header in headers:
+            if entities.named(header.entno.value) is None:
+                there = f"has {_listed(entities)}" if entities.found else "has none"
+                found = f"ENTNO is {header.entno.value}, but no {what} has this number: the deck {there}"
+                yield header.entno.field, f"{found}; the switch never comes: give the number of one of them"
+
+
+@rule(
+    "D2R008",
+    ERROR,
+    "ENTNO names a contact whose force cannot trigger a switch",
+    (_with_floor(4, 7), _force(2, 1, contact=_BY_ORDER), _force(3, 7, contact=_contact("GENERAL") + _WALL)),
+    (_force(4, 7, contact=_contact("GENERAL")), _force(2, 7, contact=_contact("SINGLE_SURFACE"))),
+)
+def _able(case: Case) -> Iterator[Objection]:
+    """Only surface-to-surface and nodes-to-surface contacts switch parts by their force; one of type GENERAL or
+    SINGLE_SURFACE never does, so the part stays as it is, silently. Source: Vol I, Remark 1, as quoted by a public
+    drop tool, and the vendor's help on OFFSET, which names the same types; not tried with the solver.
+    """
+    headers = [header for header in _by_force(case, _OF_CONTACT) if header.entno.value]
+    entities = read_contacts(case.deck) if headers else None
+    for header in headers:
+        named = entities.named(header.entno.value) if entities else None
+        if named and entities and not _triggers(named):
+            others = [one for one in entities.found if _triggers(one)]
+            able = f" (here: {_listed(entities._replace(found=tuple(others)))})" if others else ""
+            found = f"ENTNO {header.entno.value} is *{named.keyword}, whose force triggers no switch"
+            yield header.entno.field, f"{found}; choose a surface-to-surface or nodes-to-surface contact{able}"
+
+
+def _triggers(contact: Entity) -> bool:
+    return any(name in contact.keyword for name in _ABLE)
+
+
+def _listed(entities: Entities) -> str:
+    texts = [
+        f"{one.id or one.number} (*{one.keyword}{f' {one.title!r}' if one.title else ''})" for one in entities.found
+    ]
+    return listing(texts, most=_MOST_LISTED)
+
+
+@rule(
+    "D2R009",
+    WARNING,
+    "TIME3 is 0 with a contact CODE",
+    (PASSES, _with_floor(4, 7)),
+    (_with_floor(4, 7, "0.0"), _with_floor(2, 7, "0.0")),
+)
+def _delay(case: Case) -> Iterator[Objection]:
+    """TIME3 is how long after a switch no other one of the set is made. With 0 the next step may switch back: the
+    force of a contact is zero and not zero many times in one impact, and the parts chatter. Source: vendor keyword
+    data for the meaning; a public drop tool reports the chatter.
+    """
+    for header in _by_force(case, _OF_CONTACT):
+        if not header.time3.problem and header.time3.value == 0:
+            found = f"TIME3 is 0 with CODE {header.code.value}: the parts may switch back and forth in every contact"
+            yield header.time3.field, f"{found}; set it to a time in which the contact settles"
+
+
+@rule(
+    "D2R010",
+    ERROR,
+    "CODE 3 or 4 without a contact or rigid wall (ENTNO 0)",
+    (PASSES, _with_floor(4, 7)),
+    (_with_floor(4, 0), _force(3, 0)),
+)
+def _unnamed(case: Case) -> Iterator[Objection]:
+    """The switch waits for a force that is not zero. Without the number of the contact or rigid wall there is no
+    force to wait for. Source: vendor keyword data; what the solver does with 0 is not confirmed.
+    """
+    for header in _by_force(case, _NEEDS_FORCE):
+        if header.entno.value == 0:
+            what = "a contact" if header.code.value in _OF_CONTACT else "a rigid wall"
+            found = f"ENTNO is 0 with CODE {header.code.value}, which waits for the force of {what}"
+            yield header.entno.field, f"{found}; give its number"
