@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.choice.candidates import judge
 from d2rpick.choice.expectation import most_energy
-from d2rpick.choice.verify import approve
 from d2rpick.histories.samples import passages
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.roots import narrow
@@ -55,8 +55,8 @@ def acceptable_windows(situation: Situation, candidates: Candidates, recommended
         widest = grid[np.newaxis, [0, -1]]
     else:
         widest = _windows_below(situation, grid, min(situation.settings.tolerance, _residual_left(situation)))
-    judged = approve(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
-    kept = widest[np.reshape(judged, (-1, 3)).all(axis=1)]
+    judged = judge(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
+    kept = widest[judged.kept.reshape(-1, 3).all(axis=1)]
     if situation.at_rest:
         return kept
     if kept.size and kept[-1, 1] >= grid[-1] and not (recommended is not None and kept[-1, 0] <= recommended):

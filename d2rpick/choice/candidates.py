@@ -6,7 +6,7 @@ They are judged as columns; a `Candidate` is made only where one is looked at.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
@@ -19,7 +19,7 @@ from d2rpick.vibration.moments import Moment, Moments
 from d2rpick.vibration.together import measured_of, moments_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -62,22 +62,22 @@ class Candidate(NamedTuple):
     energy_ratio: float | None
     level_error: float | None
     rising: bool | None
-    sign_match: bool | None
-    lock_in_error: float | None
-    residual: float | None
-    part_mismatch: float | None
     rigid_time: float
     rigid_fraction: float
-    timing_tolerance: float | None
     tr_low: float | None
     tr_high: float | None
     acceptable: bool
     recommended: bool
     notes: tuple[str, ...]
+    sign_match: bool | None = None
+    lock_in_error: float | None = None
+    residual: float | None = None
+    residual_high: float | None = None
+    timing_tolerance: float | None = None
+    part_mismatch: float | None = None
     run_time_share: float | None = None
     same_swing: bool = False
     parts: tuple[PartMatch, ...] = ()
-    residual_high: float | None = None
     position_error: float | None = None
     position_error_part: str | None = None
     position_error_body: str | None = None
@@ -93,25 +93,26 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
-    """Candidates of one td in some order: columns of what decides, each of shape (n,), made for all of them at once.
+    """Candidates of one td in some order, made where they are looked at, of columns of what decides.
 
-    ``tr`` [time]; ``energy`` [energy]; ``level_error`` [-], NaN where an energy is not positive; ``same_swing``;
-    ``position_error`` [length], NaN where unknown; ``moments`` and ``known``, as the vibration gave them, None where
-    nothing was measured.
-    ``recommended`` is the place of the one that is, ``ranked`` tells whether the order is that of the ranks.
+    All columns are of shape (n,), in the order of time: ``energy`` [energy]; ``level_error`` [-], NaN where an energy
+    is not positive; ``same_swing``; ``position_error`` [length], NaN where unknown; ``moments`` and ``known``, as the
+    vibration gave them, None where nothing was measured.
+    ``order`` has the places in these of the candidates in their order, that of the ranks where it is ``ranked``;
+    ``recommended`` is the place in it of the one that is.
     """
 
     situation: Situation
     moments: Moments
     known: NDArray[np.object_]
-    tr: Samples
     energy: Samples
     level_error: Samples
     same_swing: NDArray[np.bool_]
     position_error: Samples
     objections: tuple[Objection, ...]
-    recommended: int | None = None
+    order: NDArray[np.intp]
     ranked: bool = False
+    recommended: int | None = None
 
     @classmethod
     def of(cls, situation: Situation, moments: Moments, known: Sequence[Measured | None]) -> Candidates:
@@ -127,21 +128,35 @@ class Candidates(Sequence[Candidate]):
             situation=situation,
             moments=moments,
             known=measured,
-            tr=tr,
             energy=energy,
             level_error=level_error,
             same_swing=(situation.turns_since(tr) < 2) & (not still),
             position_error=situation.position_errors(tr),
             objections=tuple(objections(situation, tr, measured, energy, level_error)),
+            order=np.arange(tr.size),
         )
+
+    @property
+    def tr(self) -> Samples:
+        """Times of the switch to rigid [time]."""
+        return self.moments.tr
 
     @cached_property
     def acceptable(self) -> NDArray[np.bool_]:
         """Which of them nothing speaks against."""
-        against = np.zeros(len(self), dtype=bool)
-        for one in self.objections:
-            against |= one.holds
-        return ~against
+        return np.asarray(
+            ~np.logical_or.reduce([np.zeros(len(self), dtype=bool), *(one.holds for one in self.objections)])
+        )
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """Which of them are acceptable and keep the limits asked for: the rule of ``suggest`` and ``verify``."""
+        share, settings, found = self.situation.kinetic_share, self.situation.settings, self.acceptable
+        if settings.max_kinetic_share is not None:
+            found = found & (share is not None and share <= settings.max_kinetic_share)
+        if settings.max_residual is not None:
+            found = found & (self.residual <= settings.max_residual)  # not where unknown, NaN
+        return found
 
     @cached_property
     def residual(self) -> Samples:
@@ -153,21 +168,6 @@ class Candidates(Sequence[Candidate]):
         """What the order goes by, as ``Candidate.error`` [-]."""
         error = np.where(np.isnan(self.residual), self.level_error, self.residual)
         return np.where(np.isnan(error), np.inf, error)
-
-    def ordered(self, order: NDArray[np.intp]) -> Candidates:
-        """Give the same, ranked in this order of their places."""
-        return replace(
-            self,
-            moments=self.moments.at(order),
-            known=self.known[order],
-            tr=self.tr[order],
-            energy=self.energy[order],
-            level_error=self.level_error[order],
-            same_swing=self.same_swing[order],
-            position_error=self.position_error[order],
-            objections=tuple(one.ordered(order) for one in self.objections),
-            ranked=True,
-        )
 
     @cached_property
     def chosen(self) -> Candidate | None:
@@ -182,12 +182,8 @@ class Candidates(Sequence[Candidate]):
             return np.zeros(len(self), dtype=bool)
         return np.asarray(self.position_error > bodies.limit)
 
-    def recommending(self, place: int) -> Candidates:
-        """Give the same with another one recommended."""
-        return replace(self, recommended=place)
-
     def __len__(self) -> int:
-        return self.tr.size
+        return len(self.moments)
 
     @overload
     def __getitem__(self, place: int) -> Candidate: ...
@@ -199,13 +195,14 @@ class Candidates(Sequence[Candidate]):
             i = range(len(self))[place]
             return self[i : i + 1][0]
         # how far the true time may lie away is asked of these only: of all it takes longer than the choice
-        reach = self.situation.vibration.reach(_as_found(self.situation, self.moments[place]))
-        return tuple(map(self._made, range(len(self))[place], reach.tolist()))
+        reach = self.situation.vibration.reach(_as_found(self.situation, self.moments.at(self.order[place])))
+        return tuple(map(self._candidate, range(len(self))[place], reach.tolist()))
 
     def __iter__(self) -> Iterator[Candidate]:
         return iter(self[:])
 
-    def _made(self, i: int, reach: float) -> Candidate:
+    def _candidate(self, rank: int, reach: float) -> Candidate:
+        i = int(self.order[rank])
         situation, found, known = self.situation, self.moments[i], self.known[i]
         history, td, tr = situation.history, situation.td, found.tr
         energy, level, same_swing, off = (
@@ -216,29 +213,24 @@ class Candidates(Sequence[Candidate]):
         parts = situation.vibration.part_matches(tr) if known else ()
         against = tuple(one.sentence(i) for one in self.objections if one.holds[i])
         return Candidate(
-            rank=(i + 1) * self.ranked,
+            rank=(rank + 1) * self.ranked,
             tr=tr,
             kind=found.kind,
             energy=energy,
             energy_ratio=energy / situation.energy_td if situation.energy_td > 0 else None,
             level_error=None if np.isnan(level) else level,
             rising=found.rising,
-            sign_match=known and known.sign_match,
-            lock_in_error=known and known.lock_in_error,
-            residual=known and known.residual,
-            part_mismatch=known and known.part_mismatch,
             rigid_time=td - tr,
             rigid_fraction=rigid_fraction,
-            timing_tolerance=known and known.timing_tolerance,
             tr_low=tr - reach,
             tr_high=tr + reach,
             acceptable=not against,
-            recommended=i == self.recommended,
+            recommended=rank == self.recommended,
             notes=(*against, *_SAME_SWING * same_swing, *_remarks(situation, reach, known, parts)),
             run_time_share=_run_time_share(situation, rigid_fraction),
             same_swing=same_swing,
             parts=parts,
-            residual_high=known and known.residual_high,
+            **(known._asdict() if known else {}),
             **_position(worst),
         )
 
@@ -272,9 +264,9 @@ def _found_together(situations: Sequence[Situation], *, in_flight: bool) -> list
     return [Candidates.of(*row) for row in zip(situations, kept, known, strict=True)]
 
 
-def judge(situation: Situation, found: Sequence[Moment]) -> Candidates:
-    """Measure each tr and hold it against flight, sign and tolerance."""
-    moments = Moments.of(found)
+def judge(situation: Situation, times: Iterable[float]) -> Candidates:
+    """Measure each of the ``times`` before td as tr, and hold it against flight, sign and tolerance."""
+    moments = Moments.of([Moment(tr, "given", None) for tr in times])
     return Candidates.of(situation, moments, situation.vibration.measured(moments.tr))
 
 

@@ -34,10 +34,6 @@ class Objection(NamedTuple):
         """Say it of the candidate at a place."""
         return self.reason if self.error is None else self.reason.format(above(self.error[place], self.limit))
 
-    def ordered(self, order: NDArray[np.intp]) -> Objection:
-        """Give the same for candidates in another order."""
-        return Objection(self.holds[order], self.reason, None if self.error is None else self.error[order], self.limit)
-
 
 def objections(
     situation: Situation, tr: Samples, known: NDArray[np.object_], energy: Samples, level_error: Samples

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ _LIKE_TIMES = 0.1
 
 
 def rank(candidates: Candidates) -> Candidates:
-    """Order candidates, best first, and number them.
+    """Order candidates, best first, number them, and recommend the first that keeps the limits asked for, if any.
 
     Acceptable ones first, of them those on the same swing as td last: they save nothing.  Of each group first those
     of like quality, the earliest first, but where it is much the same those that leave the body out of place behind the
@@ -38,7 +39,9 @@ def rank(candidates: Candidates) -> Candidates:
     acceptable = candidates.acceptable
     group = np.where(acceptable, np.where(candidates.same_swing, 1, 0), 2)
     rigid, room = candidates.situation.td - candidates.tr, like_quality(candidates.situation)
-    return candidates.ordered(order(group, candidates.error, rigid, candidates.out_of_place, room))
+    places = order(group, candidates.error, rigid, candidates.out_of_place, room)
+    kept = np.flatnonzero(candidates.kept[places]).tolist()
+    return replace(candidates, order=places, ranked=True, recommended=kept[0] if kept else None)
 
 
 def like_quality(situation: Situation) -> float:
@@ -79,28 +82,6 @@ def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
         for name, value, limit in limits
         if limit is not None and (value is None or value > limit)
     )  # fmt: skip
-
-
-def keeps(situation: Situation, candidate: Candidate) -> bool:
-    """Whether a candidate is acceptable and keeps the limits asked for: the rule of ``verify``."""
-    return candidate.acceptable and not over_limits(situation, candidate)
-
-
-def kept(situation: Situation, candidates: Candidates) -> NDArray[np.bool_]:
-    """Which of the candidates are acceptable and keep the limits asked for, by the same rule."""
-    share, settings = situation.kinetic_share, situation.settings
-    found = candidates.acceptable
-    if settings.max_kinetic_share is not None:
-        found = found & (share is not None and share <= settings.max_kinetic_share)
-    if settings.max_residual is not None:
-        found = found & (candidates.residual <= settings.max_residual)  # not where unknown, NaN
-    return found
-
-
-def recommend(ranked: Candidates) -> Candidates:
-    """Recommend the first candidate that is acceptable and keeps the limits asked for, where there is one."""
-    places = np.flatnonzero(kept(ranked.situation, ranked))
-    return ranked.recommending(int(places[0])) if places.size else ranked
 
 
 # From the worst to the best.

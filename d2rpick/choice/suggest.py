@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.ranking import EQUALLY_GOOD, over_limits, quality_of, rank, recommend
+from d2rpick.choice.ranking import EQUALLY_GOOD, over_limits, quality_of, rank
 from d2rpick.choice.situation import examine
 from d2rpick.choice.verify import verify_at
 from d2rpick.choice.warnings import Caution, cautions_of, out_of_place
@@ -117,7 +117,7 @@ def suggest_at(situation: Situation, *, with_better: bool = True, found: Candida
 
     ``found`` are the candidates where they are known; those before the flight may be missing.
     """
-    candidates = recommend(rank(find_candidates(situation) if found is None else found))
+    candidates = rank(find_candidates(situation) if found is None else found)
     best = candidates.chosen
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
@@ -160,7 +160,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 
 def _saving(situation: Situation) -> Candidate | None:
     """Give what is recommended at a td, where that saves something."""
-    best = recommend(rank(find_candidates(situation, in_flight=True))).chosen
+    best = rank(find_candidates(situation, in_flight=True)).chosen
     return best if best and not best.same_swing else None
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from d2rpick.choice.candidates import candidates_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import longest_flight, margin_before_contact
-from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, rank, recommend
+from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, rank
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
 from d2rpick.flight.flight import SOURCES
@@ -234,7 +234,7 @@ def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
     asked = list(situations)
     candidates = candidates_of(asked, in_flight=True)
-    found = ((there, recommend(rank(some)).chosen) for there, some in zip(asked, candidates, strict=True))
+    found = ((there, rank(some).chosen) for there, some in zip(asked, candidates, strict=True))
     return [(there, best) for there, best in found if best and not best.same_swing]
 
 

@@ -6,15 +6,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.candidates import Candidate, judge
-from d2rpick.choice.ranking import keeps, kept, over_limits, quality_of
+from d2rpick.choice.ranking import over_limits, quality_of
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of, out_of_place
 from d2rpick.errors import RangeError
-from d2rpick.vibration.moments import Moment
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.health import Health
     from d2rpick.choice.ranking import Quality
@@ -68,21 +65,20 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
     settings, td = situation.settings, situation.td
     _in_order(tr, td)
     situation.history.energy_at(tr, "tr")
-    (candidate,) = judge(situation, [Moment(tr, "given", None)])
+    judged = judge(situation, [tr])
+    candidate = judged[0]
     known = situation.flight.start is not None
     share = situation.kinetic_share
     limit = POOR_KINETIC_SHARE if settings.max_kinetic_share is None else settings.max_kinetic_share
     outside = td > situation.latest_td or (situation.earliest_tr is not None and td <= situation.earliest_tr)
     td_ok = False if outside else None if share is None else share <= limit
-    over = over_limits(situation, candidate)
-    reasons = (*candidate.notes, *over)
     return Verdict(
         situation=situation,
         candidate=candidate,
         tr_ok=candidate.acceptable if known else None,
         td_ok=td_ok,
-        verified=keeps(situation, candidate),
-        reasons=reasons,
+        verified=bool(judged.kept[0]),
+        reasons=(*candidate.notes, *over_limits(situation, candidate)),
         cautions=(*cautions_of(situation), *out_of_place(situation, tr)),
     )
 
@@ -90,12 +86,6 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
 def _in_order(tr: float, td: float) -> None:
     if not tr < td:
         raise RangeError(f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td")
-
-
-def approve(situation: Situation, times: Iterable[float]) -> list[bool]:
-    """Tell for each of ``times`` before td whether ``verify`` would verify it as tr."""
-    judged = judge(situation, [Moment(tr, "given", None) for tr in times])
-    return [bool(one) for one in kept(situation, judged)]
 
 
 def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.acceptable_windows import acceptable_windows
+from d2rpick.choice.candidates import judge
 from d2rpick.choice.expectation import MOST_KEPT, expectation, most_energy
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest_at
 from d2rpick.choice.trade_off import offers_of
-from d2rpick.choice.verify import approve, verify_at
+from d2rpick.choice.verify import verify_at
 from d2rpick.histories.history import History
 from d2rpick.report.suggestion import as_table
 from d2rpick.rules.judgement import faults_of
@@ -59,7 +60,7 @@ def test_up_to_the_limit_it_is_accepted_and_the_windows_end_there() -> None:
     candidates = suggest_at(situation, with_better=False).candidates
     windows = acceptable_windows(situation, candidates, None)
     grid = np.linspace(0.1, float(windows[-1, 1]), 3000)
-    kept = np.array(approve(situation, grid.tolist()))
+    kept = judge(situation, grid.tolist()).kept
     levels = situation.vibration.energies(grid)
     assert kept.any()
     assert levels[kept].max() <= most_energy(situation)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.of_run import read
-from d2rpick.choice.ranking import EQUALLY_GOOD, keeps, kept, order, rank, recommend
+from d2rpick.choice.ranking import EQUALLY_GOOD, order, over_limits, rank
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest
@@ -85,7 +85,7 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
     known, found = Fits(), []
     for td in np.arange(0.141, 0.1502, 0.0007).tolist():
         situation = examine(car(parts), td, Settings(), known)
-        best = recommend(rank(find_candidates(situation))).chosen
+        best = rank(find_candidates(situation)).chosen
         assert best is not None
         assert best.level_error is not None
         assert best.level_error < 0.06
@@ -117,9 +117,11 @@ def test_candidates_are_kept_together_as_one_by_one(history: History, td: float,
     situation = examine(history, td, Settings(**limits), fits(td))  # type: ignore[arg-type]
     ranked = rank(find_candidates(situation))
     assert len(ranked) > 3
-    assert kept(situation, ranked).tolist() == [keeps(situation, one) for one in ranked]
+    kept = ranked.kept[ranked.order].tolist()
+    assert kept == [one.acceptable and not over_limits(situation, one) for one in ranked]
+    assert ranked.recommended == (kept.index(True) if any(kept) else None)
     assert [one.rank for one in ranked] == list(range(1, len(ranked) + 1))
-    assert [one.error for one in ranked] == ranked.error.tolist()
-    assert [one.acceptable for one in ranked] == ranked.acceptable.tolist()
+    assert [one.error for one in ranked] == ranked.error[ranked.order].tolist()
+    assert [one.acceptable for one in ranked] == ranked.acceptable[ranked.order].tolist()
     assert ranked[1:3] == (ranked[1], ranked[2])
-    assert ranked[-1].tr == ranked.tr[-1]
+    assert ranked[-1].tr == ranked.tr[ranked.order[-1]]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.ranking import rank, recommend
+from d2rpick.choice.ranking import rank
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest_td import longest_rigid_times
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def rigid_time(situation: Situation) -> float:
-    best = recommend(rank(find_candidates(situation))).chosen
+    best = rank(find_candidates(situation)).chosen
     return best.rigid_time if best and not best.same_swing else 0.0
 
 

@@ -17,7 +17,7 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threads
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.vibration.moments import SUNK, Moment
+from d2rpick.vibration.moments import SUNK
 from d2rpick.vibration.part_motion import PartMotion
 from d2rpick.vibration.part_signs import MOST_UNSIGNED, SignedParts, read_parts
 from d2rpick.vibration.waves import Waves
@@ -122,7 +122,7 @@ def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
     noise = np.random.default_rng(3).normal(size=(40, 2))
     deformation[300:340] = 0.02 * noise  # the signal is lost for a while
     situation = examine(of(deformation, time), 10.0, replace(PLAIN, after=0.0))
-    early, late = judge(situation, [Moment(2.0, "given", None), Moment(8.0, "given", None)])
+    early, late = judge(situation, [2.0, 8.0])
     assert (early.sign_match, early.residual) == (None, None)
     assert any("cannot be followed" in note for note in early.notes)
     assert late.sign_match is not None
@@ -132,7 +132,7 @@ def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
 
 
 def predicted(situation: Situation, tr: float) -> float:
-    (candidate,) = judge(situation, [Moment(tr, "given", None)])
+    (candidate,) = judge(situation, [tr])
     assert candidate.residual is not None
     return candidate.residual
 
@@ -162,7 +162,7 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
     sunk = replace(parts, motions=(*parts.motions, PartMotion(started, np.zeros(0), 0.0)))
     situation = replace(situation, evidence=situation.evidence._replace(fit=None, span=None, parts=sunk))
     assert (situation.basis, situation.kinetic_share, situation.vibration.doubts) == ("energy", None, (SUNK,))
-    (candidate,) = judge(situation, [Moment(0.18, "given", None)])
+    (candidate,) = judge(situation, [0.18])
     assert (candidate.acceptable, candidate.residual, candidate.sign_match) == (False, None, None)
     assert "the level at td is below the noise of the record" in candidate.notes
     assert any("is below the error of a solver" in note for note in candidate.notes)
@@ -207,7 +207,7 @@ def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
 
 def test_the_parts_that_contribute_most_are_named() -> None:
     situation = examine(chain.history(), chain.TD_PEAK, PLAIN)
-    (candidate,) = judge(situation, [Moment(0.1, "given", None)])
+    (candidate,) = judge(situation, [0.1])
     assert candidate.part_mismatch is not None
     shares = [part.share for part in candidate.parts]
     assert sum(share or 0 for share in shares) == pytest.approx(1)
