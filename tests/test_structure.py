@@ -26,8 +26,8 @@ PACKAGE = ROOT / "d2rpick"
 
 # Each folder imports only from itself and from those on the lines above its own.
 LAYERS = (
-    ("errors", "file_state", "version"),
-    ("bounds", "workers"),
+    ("errors", "version"),
+    ("files", "workers"),
     ("histories", "deck"),
     ("vibration",),
     ("flight",),

@@ -10,7 +10,7 @@ from d2rpick.api import arguments
 from d2rpick.api.asked import asked_of
 from d2rpick.api.document import Document
 from d2rpick.api.frames import frame_of
-from d2rpick.file_state import write_whole
+from d2rpick.files import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -9,7 +9,7 @@ import click
 
 from d2rpick.cli.wording import with_options
 from d2rpick.errors import FORESEEN, D2RPickError, listing, one_line, printable
-from d2rpick.file_state import write_whole
+from d2rpick.files import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

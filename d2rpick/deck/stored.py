@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import DeckError
-from d2rpick.file_state import FileState, is_endless, is_regular, settled_state
+from d2rpick.files import FileState, is_endless, is_regular, settled_state
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -15,7 +15,7 @@ from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import read_switching
 from d2rpick.deck.windows import find_windows
 from d2rpick.errors import DeckError
-from d2rpick.file_state import write_whole
+from d2rpick.files import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

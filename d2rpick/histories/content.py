@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.errors import ChangedError, FormatError
-from d2rpick.file_state import FileState, is_endless, is_regular, settled_state
+from d2rpick.files import FileState, is_endless, is_regular, settled_state
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

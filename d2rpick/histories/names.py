@@ -22,20 +22,7 @@ _UNITS = TIME_UNITS | _ENERGY_UNITS
 
 # Normalised, see `normalised`.
 _TIME_NAMES = frozenset(
-    {
-        "time",
-        "t",
-        "times",
-        "simtime",
-        "simulationtime",
-        "zeit",
-        "temps",
-        "tempo",
-        "tiempo",
-        "時間",
-        "时间",
-        "시간",
-    }
+    {"time", "t", "times", "simtime", "simulationtime", "zeit", "temps", "tempo", "tiempo", "時間", "时间", "시간"}
 )
 _INTERNAL_NAMES = frozenset(
     {"internalenergy", "internal", "ie", "allie", "inten", "eint", "einternal", "intenergy", "internalen",
@@ -178,24 +165,27 @@ def refuse_other_quantity(channel: str, where: str) -> None:
         )
 
 
-def resolve(wanted: str, known: Sequence[str], where: str) -> str:
-    """Find the name that is meant: as it stands, in other case, or but for blanks, underscores and units.
+def meant(wanted: str, known: Sequence[str]) -> list[int]:
+    """Places of the names that are meant: as it stands, in other case, or but for blanks, underscores and units."""
+    spellings: tuple[Callable[[str], str], ...] = (str.strip, lambda text: text.strip().casefold(), normalised)
+    alike = ([place for place, own in enumerate(known) if key(own) == key(wanted)] for key in spellings)
+    return next(filter(None, alike), [])
 
-    FormatError, with near misses and what there is, when none or several are meant.
+
+def resolve(wanted: str, known: Sequence[str], where: str) -> str:
+    """Find the one name that is `meant`; FormatError, with near misses and what there is, when none or several are.
 
     Examples
     --------
     >>> resolve("internal energy", ["kinetic_energy", "internal_energy"], "binout")
     'internal_energy'
     """
-    spellings: tuple[Callable[[str], str], ...] = (str.strip, lambda text: text.strip().casefold(), normalised)
-    for spelling in spellings:
-        same = [name for name in known if spelling(name) == spelling(wanted)]
-        if len(same) == 1:
-            return same[0]
-        if same:
-            raise FormatError(f"{where}: {wanted!r} may be any of these: {listing(same)}; choose one as it is written")
-    raise FormatError(f"{where}: no {wanted!r}{near_miss(wanted, known)}; there are: {listing(known)}")
+    same = [known[place] for place in meant(wanted, known)]
+    if not same:
+        raise FormatError(f"{where}: no {wanted!r}{near_miss(wanted, known)}; there are: {listing(known)}")
+    if len(same) > 1:
+        raise FormatError(f"{where}: {wanted!r} may be any of these: {listing(same)}; choose one as it is written")
+    return same[0]
 
 
 def in_seconds(text: str) -> float | None:

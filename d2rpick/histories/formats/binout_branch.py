@@ -50,67 +50,6 @@ class Group:
             return found.astype(np.float64) if variable.dtype.kind == "f" else found
 
 
-class States:
-    """The states of one branch in all files of a family.
-
-    A solver numbers its states one by one.  Where a file begins higher than the last one ended, a member of
-    the family is missing; a number that comes again begins a newer leg, which writes the same variables, be it
-    the same states again or the next ones: that shows in their times.  A number left out inside a file, a name
-    twice in a state and a leg with other variables are the marks of records lost or out of place: what then seems
-    to be one state may be made of two.
-
-    Attributes
-    ----------
-    numbers : array of int, shape (n,)
-        Number of each state, in the order of the files by their first times.
-    groups : tuple of Group
-        The same states by file and layout.
-    unfinished : tuple of str
-        Files whose last state is not whole; it is left out.
-    missing : tuple of str
-        Numbers between two files, as ``first to last``.
-    late : int
-        Number of the first state, where it is not 1; else 0.
-    damage : str
-        Where records are lost or out of place, so that no state can be trusted; empty if nowhere.
-    """
-
-    def __init__(self, branch: str, family: Sequence[Lsda]) -> None:
-        visited = [file for file in family if file.visits[branch].numbers]
-        files = sorted(visited, key=lambda file: _start(file, branch))
-        cut = [_is_unfinished(file, branch) for file in files]
-        self.unfinished = tuple(file.source for file, last in zip(files, cut, strict=True) if last)
-        self.damage = ""
-        numbers: Indices = np.empty(0, dtype=np.int64)
-        starts: Indices = np.empty(0, dtype=np.int64)
-        kinds: NDArray[np.int32] = np.empty(0, dtype=np.int32)
-        layouts: list[tuple[Lsda, DirectoryLayout]] = []
-        for file in family:
-            if file.odd[branch]:
-                self.damage = f"{file.source}: {branch} has {file.odd[branch][0]!r}, which is not a state"
-        for file, last in zip(files, cut, strict=True):
-            visits = file.visits[branch]
-            whole = slice(len(visits.numbers) - last)
-            here = np.array(visits.numbers[whole])
-            if (np.diff(here) > 1).any():
-                hole = int(np.argmax(np.diff(here) > 1))
-                self.damage = f"{file.source}: {branch} goes from state {here[hole]} to {here[hole + 1]}"
-            used = [file.layouts[kind] for kind in set(visits.layouts[whole])]
-            if doubled := sorted(name for layout in used for name in layout.doubled):
-                self.damage = f"{file.source}: {branch} has {doubled[0]} twice in one state"
-            if (np.diff(here) < 1).any() and len({frozenset(layout.variables) for layout in used}) > 1:
-                self.damage = f"{file.source}: {branch} begins a new leg whose states hold other variables"
-            numbers = np.append(numbers, here)
-            starts = np.append(starts, np.array(visits.starts[whole]))
-            kinds = np.append(kinds, np.array(visits.layouts[whole]) + len(layouts))
-            layouts += [(file, layout) for layout in file.layouts]
-        self.numbers = numbers
-        self.late = int(numbers[0]) if numbers.size and numbers[0] != 1 else 0
-        self.groups = tuple(_groups(layouts, kinds, starts))
-        holes = np.flatnonzero(np.diff(self.numbers) > 1)
-        self.missing = tuple(f"{self.numbers[i] + 1} to {self.numbers[i + 1] - 1}" for i in holes)
-
-
 def _start(file: Lsda, branch: str) -> float:
     """Time of the first state of a branch in a file; before all others where it has none."""
     visits = file.visits[branch]
@@ -126,9 +65,19 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
     return file.unfinished == branch and len(layouts) > 1 and layouts[-1] != layouts[-2]
 
 
-def _groups(
-    layouts: Sequence[tuple[Lsda, DirectoryLayout]], kinds: NDArray[np.int32], starts: Indices
-) -> Iterator[Group]:
+def _damages(numbers: Indices, layouts: Sequence[DirectoryLayout], where: str) -> Iterator[str]:
+    """Say what shows, in the states of one file, that records are lost or out of place."""
+    steps = np.diff(numbers)
+    if (steps > 1).any():
+        hole = int(np.argmax(steps > 1))
+        yield f"{where} goes from state {numbers[hole]} to {numbers[hole + 1]}"
+    if doubled := sorted(name for layout in layouts for name in layout.doubled):
+        yield f"{where} has {doubled[0]} twice in one state"
+    if (steps < 1).any() and len({frozenset(layout.variables) for layout in layouts}) > 1:
+        yield f"{where} begins a new leg whose states hold other variables"
+
+
+def _groups(layouts: Sequence[tuple[Lsda, DirectoryLayout]], kinds: Indices, starts: Indices) -> Iterator[Group]:
     """States by layout; ``kinds`` says which of ``layouts`` each one has."""
     order = np.argsort(kinds, kind="stable")
     cuts = np.flatnonzero(np.diff(kinds[order])) + 1
@@ -140,6 +89,12 @@ def _groups(
 class Branch:
     """The states of one branch in all files of a family; false when no file knows the branch.
 
+    A solver numbers its states one by one.  Where a file begins higher than the last one ended, a member of
+    the family is missing; a number that comes again begins a newer leg, which writes the same variables, be it
+    the same states again or the next ones: that shows in their times.  A number left out inside a file, a name
+    twice in a state and a leg with other variables are the marks of records lost or out of place: what then seems
+    to be one state may be made of two.
+
     Parameters
     ----------
     name : str
@@ -147,13 +102,37 @@ class Branch:
         The family, in its order.
     by_part : bool
         Whether variables are lists with one value per part.
+
+    Attributes
+    ----------
+    damage : str
+        Where records are lost or out of place, so that no state can be trusted; empty if nowhere.
     """
 
     def __init__(self, name: str, files: Sequence[Lsda], *, by_part: bool) -> None:
-        self.name = name
-        self._by_part = by_part
-        self._files = files
-        self._states = States(name, files)
+        self.name, self._by_part, self._files = name, by_part, files
+        visited = sorted((file for file in files if file.visits[name].numbers), key=lambda file: _start(file, name))
+        self._unfinished = [
+            file.source for file in visited if _is_unfinished(file, name)
+        ]  # their last state is left out
+        damages = [
+            f"{file.source}: {name} has {file.odd[name][0]!r}, which is not a state" for file in files if file.odd[name]
+        ]
+        numbers, starts, kinds = np.empty((3, 0), dtype=np.int64)
+        layouts: list[tuple[Lsda, DirectoryLayout]] = []
+        for file in visited:
+            visits = file.visits[name]
+            whole = slice(len(visits.numbers) - (file.source in self._unfinished))
+            here, used = np.array(visits.numbers[whole]), visits.layouts[whole]
+            damages += _damages(here, [file.layouts[kind] for kind in set(used)], f"{file.source}: {name}")
+            numbers, starts = np.append(numbers, here), np.append(starts, np.array(visits.starts[whole]))
+            kinds = np.append(kinds, np.array(used) + len(layouts))
+            layouts += [(file, layout) for layout in file.layouts]
+        self.damage = damages[-1] if damages else ""
+        self._numbers = numbers
+        self._groups = tuple(_groups(layouts, kinds, starts))
+        holes = np.flatnonzero(np.diff(numbers) > 1)
+        self._missing = tuple(f"{numbers[i] + 1} to {numbers[i + 1] - 1}" for i in holes)
 
     def __bool__(self) -> bool:
         return any(self.name in file.names for file in self._files)
@@ -165,55 +144,48 @@ class Branch:
         return f"{', '.join(holders)}: {self.name}"
 
     @property
-    def damage(self) -> str:
-        """Where records are lost or out of place; empty if nowhere."""
-        return self._states.damage
-
-    @property
     def complete(self) -> bool:
         """Whether no state is missing and the last one is whole."""
-        return not (self._states.missing or self._states.unfinished or self.damage)
+        return not (self._missing or self._unfinished or self.damage)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What was left out, what is missing, what only some states hold."""
-        states = self._states
-        notes = [f"{name}: the last state of {self.name} is not whole and was left out" for name in states.unfinished]
-        if states.damage:
-            notes.append(f"{states.damage}; records are lost or out of place")
-        if states.late:
-            notes.append(
-                f"{self.source} begins with state {states.late}, not 1; is a file of the family missing or damaged?"
-            )
-        if states.missing:
-            holes = listing(states.missing, most=3)
+        notes = [f"{name}: the last state of {self.name} is not whole and was left out" for name in self._unfinished]
+        if self.damage:
+            notes.append(f"{self.damage}; records are lost or out of place")
+        first = int(self._numbers[0]) if self._numbers.size else 1
+        if first != 1:
+            notes.append(f"{self.source} begins with state {first}, not 1; is a file of the family missing or damaged?")
+        if self._missing:
+            holes = listing(self._missing, most=3)
             notes.append(f"{self.source} lacks the states {holes}; is a file of the family missing?")
-        names = {name for group in self._states.groups for name in group.layout.variables}
+        names = {name for group in self._groups for name in group.layout.variables}
         if late := sorted(names - self.common):
             notes.append(f"{self.source} has {listing(late)} in some states only")
         if self._changing:
             changing = listing(self._changing)
             notes.append(f"{self.source} has {changing} of another type in some states: damaged there, and left out")
-        if self and not states.numbers.size:
+        if self and not self._numbers.size:
             notes.append(f"{self.source} holds no state yet")
         return tuple(notes)
 
     @cached_property
     def common(self) -> frozenset[str]:
         """Variables that all states hold."""
-        held = [frozenset(group.layout.variables) for group in self._states.groups]
+        held = [frozenset(group.layout.variables) for group in self._groups]
         return frozenset.intersection(*held) if held else frozenset()
 
     @cached_property
     def _changing(self) -> list[str]:
         """Variables that are numbers of one kind in some states, and of another in others."""
-        layouts = [group.layout.variables for group in self._states.groups]
+        layouts = [group.layout.variables for group in self._groups]
         return sorted(name for name in self.common if len({layout[name].dtype.kind for layout in layouts}) > 1)
 
     @cached_property
     def scalars(self) -> tuple[str, ...]:
         """Floating-point variables that all states hold with one value, in the order of the file."""
-        layouts = [group.layout.variables for group in self._states.groups]
+        layouts = [group.layout.variables for group in self._groups]
         return tuple(
             name
             for name in (layouts[0] if layouts else ())
@@ -223,7 +195,7 @@ class Branch:
     @property
     def time_width(self) -> int:
         """Bytes per number of the times, the shortest of all states."""
-        layouts = [group.layout.variables for group in self._states.groups]
+        layouts = [group.layout.variables for group in self._groups]
         return min((layout["time"].dtype.itemsize for layout in layouts if "time" in layout), default=8)
 
     @cached_property
@@ -242,7 +214,7 @@ class Branch:
     def part_ids(self) -> tuple[int, ...]:
         """Ids of all parts that any state holds, in the order of the lists."""
         known: dict[int, None] = {}
-        for group in self._states.groups:
+        for group in self._groups:
             for part in group.chunks(max(self._list_lengths(group), default=1)):
                 listed = self._ids(part)
                 changed = np.append(True, (np.diff(listed, axis=0) != 0).any(axis=1))
@@ -263,7 +235,7 @@ class Branch:
 
     def channel(self, name: str) -> Samples:
         """One variable of one value per state, shape (n,)."""
-        column = np.empty(self._states.numbers.size)
+        column = np.empty(self._numbers.size)
         for group, variable in self._checked(name):
             if variable.count != 1:
                 raise self._refused(group, f"one {name} was expected, not {variable.count}; ask for another")
@@ -273,7 +245,7 @@ class Branch:
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
         """One variable of some parts, shape (n, len(ids))."""
-        columns = np.empty((self._states.numbers.size, len(ids)))
+        columns = np.empty((self._numbers.size, len(ids)))
         for group, variable in self._checked(quantity):
             for part in group.chunks(max(variable.count, len(ids))):
                 listed = self._ids(part)
@@ -290,7 +262,7 @@ class Branch:
         A count that fits neither the parts nor the other states is the mark of records of two states run into
         each other: then no value of the state can be trusted.
         """
-        for group in self._states.groups:
+        for group in self._groups:
             variables = group.layout.variables
             if name not in variables:
                 raise self._refused(group, f"no {name}, only {listing(list(variables), most=40)}; ask for one of these")
@@ -306,7 +278,7 @@ class Branch:
         """Possible counts of a variable: one per state or per part, or what it is in the other states."""
         if self._by_part:
             return {1, *self._list_lengths(group)}
-        first, here = self._states.groups[0].layout.variables, group.layout.variables
+        first, here = self._groups[0].layout.variables, group.layout.variables
         return {first.get(name, here[name]).count}
 
     def _list_lengths(self, group: Group) -> set[int]:
@@ -314,7 +286,7 @@ class Branch:
         return {own.count} if own else {ids.size for _, _, ids in self._id_lists}
 
     def _refused(self, group: Group, why: str, row: int = 0) -> FormatError:
-        return FormatError(f"{self.source} state {self._states.numbers[group.rows[row]]}: {why}")
+        return FormatError(f"{self.source} state {self._numbers[group.rows[row]]}: {why}")
 
     @cached_property
     def _metadata(self) -> list[tuple[Lsda, int, DirectoryLayout]]:

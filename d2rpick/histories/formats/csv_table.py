@@ -19,14 +19,14 @@ from d2rpick.histories.formats.text import UTF16, Text
 from d2rpick.histories.names import (
     internal_energies,
     is_time,
+    meant,
     near_miss,
-    normalised,
     quantity_of,
     refuse_other_quantity,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.formats.layout import Layout
     from d2rpick.histories.history import Precision, Samples
@@ -89,15 +89,7 @@ def internal_energy(source: str, layout: Layout, times: Sequence[int]) -> int:
 
 def named_column(source: str, layout: Layout, wanted: str) -> int:
     """Find a column by its name, or by its 1-based number."""
-    spellings: tuple[Callable[[str], str], ...] = (
-        str.strip,
-        lambda text: text.strip().casefold(),
-        normalised,
-    )
-    found = next(
-        (same for key in spellings if (same := [i for i, own in enumerate(layout.names) if key(own) == key(wanted)])),
-        [],
-    )
+    found = meant(wanted, layout.names)
     if wanted.isdecimal() and 0 < int(wanted) <= layout.columns:
         found = [*({*found} | {int(wanted) - 1})]
     if not found:

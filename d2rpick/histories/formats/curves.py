@@ -120,7 +120,8 @@ class Curves(Database):
         if found.x_label and not is_time(found.x_label):
             notes.append(f"the x axis is called {found.x_label!r}; it was taken for the time")
         last = found.curves[-1]
-        cut = found.unended and bool(last.times) and last.lines[-1] == found.last and not _is_whole(last)
+        breaks_off = found.unended and bool(last.times) and last.lines[-1] == found.last
+        cut = breaks_off and not printed.is_whole(last.values[-1], last.values[:-1])
         if cut:
             for cells in (last.times, last.values, last.lines):
                 cells.pop()
@@ -274,11 +275,6 @@ def _counts(line: str) -> bool:
 def _is_pair(line: str) -> bool:
     cells = line.replace(",", " ").split()
     return len(cells) == 2 and all(as_number(cell, ".") is not None for cell in cells)
-
-
-def _is_whole(curve: _Curve) -> bool:
-    """Whether the last pair, behind which the file stops, is whole for sure."""
-    return printed.is_whole(curve.values[-1], curve.values[:-1])
 
 
 def _uniquely_named(curves: Sequence[_Curve]) -> dict[str, _Curve]:

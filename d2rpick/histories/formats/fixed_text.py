@@ -14,21 +14,20 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.content import Content, content_of
-from d2rpick.histories.formats.alike import BATCH, CHUNK, Ahead, Stretch, like_example
-from d2rpick.histories.formats.grammar import UNSURE
+from d2rpick.histories.content import content_of
+from d2rpick.histories.formats.blocks import BATCH, CHUNK, UNSURE, Ahead, Stretch, like_example
 from d2rpick.histories.formats.printed import decode
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping, Sequence
 
-    from d2rpick.histories.formats.grammar import BlockLayout, Grammar
+    from numpy.typing import NDArray
+
+    from d2rpick.histories.content import Addresses, Bytes, Content
+    from d2rpick.histories.formats.blocks import BlockLayout, Grammar
     from d2rpick.histories.history import Samples
-Bytes = NDArray[np.uint8]
-Addresses = NDArray[np.int64]
 
 _RECENT: Final = 4  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer

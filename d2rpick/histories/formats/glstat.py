@@ -15,8 +15,8 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.database import Database
+from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, overlong, release, written_head
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
-from d2rpick.histories.formats.grammar import UNSURE, BlockLayout, Grammar, head, overlong, release, written_head
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Mapping, Sequence

@@ -222,13 +222,8 @@ def _line(group: h5py.Group, name: str) -> str:
 
 def _named(path: str, columns: Sequence[Column], source: str) -> Column:
     found = [column for column in columns if column.path == path.strip("/")]
-    if len(found) == 1:
-        return found[0]
-    paths = [column.path for column in columns]
-    raise FormatError(
-        f"{source}: {path!r} names {len(found)} columns{near_miss(path.strip('/'), paths)}; "
-        f"choose one of {_listed(columns)}"
-    )
+    near = near_miss(path.strip("/"), [column.path for column in columns])
+    return _only(found, columns, f"{path!r}{near}", source)
 
 
 def _only_energy(columns: Sequence[Column], time: Column | None, source: str) -> Column:
@@ -243,7 +238,7 @@ def _only_energy(columns: Sequence[Column], time: Column | None, source: str) ->
         ]
         if len(fitting) == 1:
             refuse_other_quantity(fitting[0].path, source)
-    return _only(fitting, columns, "internal energy", source)
+    return _only(fitting, columns, "the internal energy", source)
 
 
 def _only_time(columns: Sequence[Column], energy: Column, source: str) -> Column:
@@ -252,7 +247,7 @@ def _only_time(columns: Sequence[Column], energy: Column, source: str) -> Column
     while True:
         fitting = [column for column in columns if column.name in _TIME_NAMES and column.group == group]
         if fitting or not group:
-            return _only(fitting, columns, f"time of {energy.path}", source)
+            return _only(fitting, columns, f"the time of {energy.path}", source)
         group = group.rpartition("/")[0]
 
 
@@ -260,13 +255,8 @@ def _only(fitting: Sequence[Column], columns: Sequence[Column], what: str, sourc
     if len(fitting) == 1:
         return fitting[0]
     count = "no column" if not fitting else f"{len(fitting)} columns"
-    raise FormatError(
-        f"{source}: {count} for the {what}, one was expected; give its path: {_listed(fitting or columns)}"
-    )
-
-
-def _listed(columns: Sequence[Column]) -> str:
-    return listing([f"{column.path} ({column.size})" for column in columns], most=_MANY) or "there is none"
+    there = listing([f"{column.path} ({column.size})" for column in fitting or columns], most=_MANY) or "there is none"
+    raise FormatError(f"{source}: {count} for {what}, one was expected; give its path: {there}")
 
 
 def _import_library(source: str) -> None:

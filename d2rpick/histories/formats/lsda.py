@@ -24,7 +24,7 @@ import numpy as np
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.content import Content, content_of
-from d2rpick.histories.formats.alike import Pattern, repeats
+from d2rpick.histories.formats.blocks import Pattern, repeats
 
 if TYPE_CHECKING:
     from collections.abc import Collection

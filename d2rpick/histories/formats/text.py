@@ -6,8 +6,8 @@ from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.bounds import beyond, long_line
 from d2rpick.errors import FormatError
+from d2rpick.files import beyond, long_line
 from d2rpick.histories.content import Content
 
 if TYPE_CHECKING:

@@ -98,7 +98,7 @@ def test_explicit_paths_win() -> None:
     history = read(written(plain), "kinetic_energy", "internal_energy", time="/time")
     assert history.energy.tolist() == (KINETIC + ENERGY).tolist()
     assert read(written(lasso), "glstat/kinetic_energy").energy.tolist() == KINETIC.tolist()
-    with pytest.raises(FormatError, match=r"'kinetic' names 0 columns.*choose one of .*kinetic_energy \(4\)"):
+    with pytest.raises(FormatError, match=r"no column for 'kinetic'.*give its path: .*kinetic_energy \(4\)"):
         read(written(plain), "kinetic")
 
 
