@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.oscillator import from_mode, lacking_energy
 from tests import paper
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.modes import Modes
 
 # y - z = -V0 exp(-alpha t/2) sin(omega t)/omega, eq. (7), with V0 = 6 m/s and k = 660e3 N/m
 MODE = Mode(paper.OMEGA_2, 50.0, 0.0, -6.0 / paper.OMEGA_2 * (660e3 / 2) ** 0.5, 0.0)
@@ -33,3 +35,18 @@ def noisy(values: Samples, share: float, seed: int) -> Samples:
     """``values`` with white noise whose standard deviation is ``share`` of their maximum."""
     noise = np.random.default_rng(seed).standard_normal(values.size)
     return values + share * float(np.max(values)) * noise
+
+
+def replayed_residual(vibration: Mode | Modes, tr: Samples, td: Samples | float) -> Samples:
+    """Replay each tr of shape (n,) up to ``td`` and give the residual there, of all modes together [-].
+
+    ``td`` is one for all, or one for each.  Energy norm of what the switched run lacks at td, over that of the
+    reference vibration.
+    """
+    lack, whole = np.zeros(tr.shape), np.zeros(tr.shape)
+    for mode in vibration.modes:
+        oscillator, at_td = from_mode(mode, td)
+        at_tr = oscillator.free(at_td, tr - td)  # the closed form runs backwards as well
+        lack += lacking_energy(oscillator, at_td, oscillator.rigid(at_tr, td - tr))
+        whole += oscillator.vibration_energy(at_td)
+    return np.sqrt(lack / whole)

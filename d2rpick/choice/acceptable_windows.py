@@ -169,7 +169,7 @@ def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples
     most = most_energy(situation)
 
     def keeps(times: Samples) -> NDArray[np.bool_]:
-        return (situation.errors(times) <= level) & (situation.vibration.energies(times) <= most)
+        return (situation.errors(times) <= level) & (situation.vibration.whole.energies(times) <= most)
 
     inside = np.pad(keeps(grid), 1)
     first = np.flatnonzero(inside[1:-1] & ~inside[:-2])

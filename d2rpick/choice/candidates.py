@@ -15,8 +15,8 @@ import numpy as np
 from d2rpick.choice.objections import objections
 from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures
-from d2rpick.vibration.moments import Moment, Moments
-from d2rpick.vibration.together import measured_of, moments_of
+from d2rpick.vibration.model import measured_of, moments_of
+from d2rpick.vibration.moments import Moments
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -122,8 +122,8 @@ class Candidates(Sequence[Candidate]):
         """
         vibration, still = situation.vibration, situation.at_rest
         tr, measured = moments.tr, np.fromiter((None if still else one for one in known), object, len(known))
-        energy = vibration.energies(tr)
-        level_error = measures.level_errors(energy, situation.energy_td)
+        energy = vibration.whole.energies(tr)
+        level_error = measures.level_error(energy, situation.energy_td)
         return cls(
             situation=situation,
             moments=moments,
@@ -266,7 +266,7 @@ def _found_together(situations: Sequence[Situation], *, in_flight: bool) -> list
 
 def judge(situation: Situation, times: Iterable[float]) -> Candidates:
     """Measure each of the ``times`` before td as tr, and hold it against flight, sign and tolerance."""
-    moments = Moments.of([Moment(tr, "given", None) for tr in times])
+    moments = Moments.of("given", [*times])
     return Candidates.of(situation, moments, situation.vibration.measured(moments.tr))
 
 
@@ -277,13 +277,13 @@ def _at_start(situation: Situation) -> Moments | None:
         return None
     first = max(start, float(situation.history.time[0]))
     read = not_before(first)
-    return Moments.of([Moment(read if read < situation.td else first, "start", None)])
+    return Moments.of("start", [read if read < situation.td else first])
 
 
 def _as_found(situation: Situation, moments: Moments) -> Moments:
     """Call each given tr a match where one would be found: it is known as well as that one, whoever names it."""
     given, vibration = moments.are("given"), situation.vibration
-    if situation.at_rest or not (given.any() and vibration.has_matches):
+    if situation.at_rest or not (given.any() and vibration.profile):
         return moments
     found = _distinct(situation, vibration.moments(situation.settings.tolerance))
     if not found.are("match").any():
@@ -293,9 +293,8 @@ def _as_found(situation: Situation, moments: Moments) -> Moments:
     return Moments(moments.tr, np.where(same, nearest.kind, moments.kind), moments.rising)
 
 
-def _distinct(situation: Situation, moments: Sequence[Moment]) -> Moments:
+def _distinct(situation: Situation, found: Moments) -> Moments:
     """Give the moments in time order, without the matches that lie next to a crossing or an extremum."""
-    found = Moments.of(moments)
     kept, matches = np.ones(len(found), dtype=bool), found.are("match")
     of_level = found.tr[~matches]
     for place in np.flatnonzero(matches).tolist():

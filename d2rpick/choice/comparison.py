@@ -347,8 +347,7 @@ def _not_of_tr(reference: History, tr: float, frozen: float) -> Iterator[str]:
 
 def _not_of_td(frozen: float, wanted: float, tolerance: float) -> Iterator[str]:
     """Object when the energy that came back is not that of the reference at td."""
-    level_error = measures.level_error(frozen, wanted)
-    if level_error is not None and level_error > tolerance:
+    if measures.level_error(frozen, wanted) > tolerance:
         yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {wanted:.6g}"
 
 

@@ -43,8 +43,8 @@ def replayed_motion(situation: Situation, tr: float, time: Samples | None = None
     Motion or None
         None where no single oscillator describes the record at tr.
     """
-    mode, span, td = situation.vibration.mode, situation.evidence.span, situation.td
-    if not (isinstance(mode, Mode) and span and situation.vibration.described(tr)):
+    mode, span, td = situation.vibration.whole.mode, situation.evidence.span, situation.td
+    if not (isinstance(mode, Mode) and span and situation.vibration.whole.described(tr)):
         return None
     if time is None:
         time = np.linspace(span.start, max(span.end, td), _POINTS)
@@ -74,7 +74,7 @@ class Response(NamedTuple):
 
 def response(situation: Situation) -> Response | None:
     """Give the response of the one oscillator that describes the record; None where none does."""
-    mode, span, td = situation.vibration.mode, situation.evidence.span, situation.td
+    mode, span, td = situation.vibration.whole.mode, situation.evidence.span, situation.td
     if not (isinstance(mode, Mode) and span):
         return None
     time = np.linspace(span.start, max(span.end, td), _POINTS)
@@ -85,5 +85,5 @@ def response(situation: Situation) -> Response | None:
 
 def locked_in(situation: Situation, tr: float) -> float | None:
     """Deformation that tr locks in [square root of energy]; None where no single oscillator describes it."""
-    mode = situation.vibration.mode
-    return float(mode.deformation(tr)) if isinstance(mode, Mode) and situation.vibration.described(tr) else None
+    mode = situation.vibration.whole.mode
+    return float(mode.deformation(tr)) if isinstance(mode, Mode) and situation.vibration.whole.described(tr) else None

@@ -98,7 +98,7 @@ class Situation:
     @property
     def energy_td(self) -> float:
         """Energy level at td, from the oscillator where one describes the record [energy]."""
-        return self.vibration.energy(self.td)
+        return self.vibration.whole.energy(self.td)
 
     @property
     def kinetic_share(self) -> float | None:

@@ -103,7 +103,7 @@ class Suggestion:
             bound = self.chosen.residual_high if self.chosen else None
             uncertain = 0.0 if bound is None else bound - own.residual
             return better if own.residual - better.residual > max(EQUALLY_GOOD, uncertain) else None
-        levels = [max(self.situation.vibration.energy(td), 0.0) ** 0.5 for td in (better.td, own.td)]
+        levels = [max(self.situation.vibration.whole.energy(td), 0.0) ** 0.5 for td in (better.td, own.td)]
         return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
 
 

@@ -192,7 +192,7 @@ def _given_up(longest: float | None, chosen: Pair | None, window: tuple[float, f
 def _by_residual(situation: Situation, window: tuple[float, float], look: Look) -> tuple[float | None, float | None]:
     """Give the td of the longest rigid window among those alike in residual, and among all acceptable ones."""
     peaks = situation.peaks(*window)
-    highest = sorted(peaks, key=lambda t: -situation.vibration.energy(t))[:_MOST_PEAKS]
+    highest = sorted(peaks, key=lambda t: -situation.vibration.whole.energy(t))[:_MOST_PEAKS]
     pairs = _acceptable(look(td) for td in dict.fromkeys((*highest, *peaks[-_MOST_PEAKS:])))
     pairs = pairs or _acceptable(map(look, window))
     limit = min((best.error for _, best in pairs), default=0.0) + like_quality(situation)

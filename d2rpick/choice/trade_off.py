@@ -213,7 +213,7 @@ def _times(situation: Situation, window: tuple[float, float], steps: int) -> tup
     peaks = np.array(situation.peaks(*window))
     if peaks.size > steps:
         place = np.searchsorted(grid, peaks)
-        order = np.lexsort((-situation.vibration.energies(peaks), place))
+        order = np.lexsort((-situation.vibration.whole.energies(peaks), place))
         highest = order[np.diff(place[order], prepend=-1) > 0]
         peaks, grid = peaks[highest], np.delete(grid, place[highest])
     return np.union1d(grid, peaks), set(peaks.tolist())

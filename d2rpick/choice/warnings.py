@@ -52,7 +52,7 @@ def cautions_of(situation: Situation) -> Iterator[Caution]:
 
 
 def _of_energy(situation: Situation) -> Iterator[Caution]:
-    td, mode, share = situation.td, situation.vibration.mode, situation.kinetic_share
+    td, mode, share = situation.td, situation.vibration.whole.mode, situation.kinetic_share
     if situation.at_rest:
         found = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
         yield Caution("at-rest", f"{found}: any tr there is right, and the first one saves the most")

@@ -71,7 +71,7 @@ def spoken(source: str | None) -> str:
 def _basis(situation: Situation) -> str:
     """What the choice rests on, and the oscillator behind it."""
     fit, vibration = situation.evidence.fit, situation.vibration
-    mode, parts = vibration.mode, f"parts, signs of {', '.join(vibration.signed)}" if vibration.signed else ""
+    mode, parts = vibration.whole.mode, f"parts, signs of {', '.join(vibration.signed)}" if vibration.signed else ""
     parts = "swings of the energy, counted" if vibration.basis == "swings" else parts
     if not (mode and fit):
         return f"{parts}; kinetic energy from the modes of each part" if parts else vibration.basis
@@ -161,7 +161,7 @@ def _oscillator(situation: Situation) -> dict[str, Any] | None:
 
 def _modes(situation: Situation) -> list[dict[str, float]] | None:
     """Give the modes whose sum describes the record, or null where one or none does."""
-    modes = situation.vibration.mode.modes if situation.vibration.mode else ()
+    modes = situation.vibration.whole.mode.modes if situation.vibration.whole.mode else ()
     if len(modes) < 2:
         return None
     return [

@@ -149,7 +149,7 @@ def better_about(answer: Suggestion, better: Pair) -> str:
         return "there an acceptable tr exists"
     if better.residual is not None and own.residual is not None:
         return f"residual {tables.measure(better.residual)} instead of {tables.measure(own.residual)}"
-    level, here = answer.situation.vibration.energy(better.td), answer.situation.energy_td
+    level, here = answer.situation.vibration.whole.energy(better.td), answer.situation.energy_td
     return f"at that td {level / here - 1:.0%} more of the energy is there to be locked in"
 
 

@@ -10,17 +10,22 @@ from __future__ import annotations
 
 from itertools import repeat
 from math import sqrt
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from d2rpick.vibration.roots import narrow
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.modes import Mode
+
+    # Largest residual of each tr, from its residual, tr and td: with what a fit may have missed, at worst [-].
+    Bound = Callable[[Samples, Samples, Any], Samples]
 
 
 class Deformation(Protocol):
@@ -48,23 +53,17 @@ class Measured(NamedTuple):
 
 
 def measured(
-    vibration: Deformation,
-    tr: Samples,
-    td: Samples | float,
-    *,
-    residual: Samples,
-    residual_high: Samples,
-    timing_tolerance: Samples,
-    of_parts: bool,
-) -> list[Measured]:
-    """All measures of each tr of shape (n,), those that a model knows best as it gives them.
+    vibration: Deformation, tr: Samples, td: Samples | float, tolerance: Samples, bound: Bound, *, of_parts: bool
+) -> Iterator[Measured]:
+    """Give all measures of each tr of shape (n,), with its timing ``tolerance``, for one ``td`` or each for its own.
 
     ``of_parts``: the deformations are those of parts, whose energy at td the mismatch is held against.
     """
+    lock_in = lock_in_error(vibration, tr, td)
+    error = np.sqrt(lock_in**2 + vibration.kinetic_energy(td) / vibration.vibration_energy(td))
+    columns = (sign_match(vibration, tr, td), lock_in, error, bound(error, tr, td), tolerance)
     mismatch = part_mismatch(vibration, tr, td).tolist() if of_parts else repeat(None, tr.size)
-    columns = (sign_match(vibration, tr, td), lock_in_error(vibration, tr, td), residual, residual_high)
-    lists = (column.tolist() for column in (*columns, timing_tolerance))
-    return [Measured(*row) for row in zip(*lists, mismatch, strict=True)]
+    return map(Measured, *(column.tolist() for column in columns), mismatch)
 
 
 def column_of(known: NDArray[np.object_], name: str) -> Samples:
@@ -78,25 +77,20 @@ def column_of(known: NDArray[np.object_], name: str) -> Samples:
 TOLERATED_GROWTH = 0.05
 
 
-def level_error(energy_tr: float, energy_td: float) -> float | None:
-    """|sqrt(E(tr)/E(td)) - 1| [-]: how far the locked-in amplitude is off; None where an energy is not positive.
+def level_error(energy: Samples | float, level: float) -> Samples:
+    """|sqrt(E(tr)/E(td)) - 1| [-]: how far the locked-in amplitude is off, of the shape of ``energy``.
+
+    NaN where an energy, or the ``level`` at td, is not positive.
 
     Examples
     --------
-    >>> level_error(1.21, 1.0)
-    0.1000...
-    >>> level_error(1.0, -805.0)
+    >>> float(level_error(1.21, 1.0)), float(level_error(1.0, -805.0))
+    (0.1000..., nan)
     """
-    if not (energy_tr >= 0 and energy_td > 0):
-        return None
-    return abs(sqrt(energy_tr / energy_td) - 1)
-
-
-def level_errors(energies: Samples, level: float) -> Samples:
-    """The same of many energies at one ``level`` at td, of the shape of ``energies``; NaN where it is None."""
-    comparable = (energies >= 0) & (level > 0)
+    energy = np.asarray(energy)
+    comparable = (energy >= 0) & (level > 0)
     with np.errstate(over="ignore"):  # a level next to nothing: any other energy is infinitely far off
-        square = np.divide(energies, level, out=np.full(energies.shape, np.nan), where=comparable)
+        square = np.divide(energy, level, out=np.full(energy.shape, np.nan), where=comparable)
     return np.asarray(np.abs(np.sqrt(square) - 1))
 
 

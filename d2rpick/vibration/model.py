@@ -1,114 +1,223 @@
-"""What is known of the vibration at one td: one protocol, and which of its four models can be relied on there.
+"""What is known of the vibration at one td, and which of its four models can be relied on there.
 
 The signs of parts are worth more than an oscillator that describes the record, that more than swings that were counted
-unless it leaves much over, and these more than the energy alone.
-A further kind of vibration is a module with these methods and a line in `model_at`.
+unless it leaves much over, and these more than the energy alone.  Each model is a `Vibration`: the energy of the whole
+around td, and the deformations that can be compared with those at td, if any are known.  A further model is a
+`Deformation` and a line in `model_at`.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.errors import listing
+from d2rpick.vibration import measures
 from d2rpick.vibration.identify import MAX_MISFIT, MIN_SAMPLES_PER_PERIOD
-from d2rpick.vibration.moments import SUNK
-from d2rpick.vibration.of_energy import OfEnergy
-from d2rpick.vibration.of_modes import OfModes
+from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.moments import Moments, Profile
+from d2rpick.vibration.uncertainty import residual_bound
+from d2rpick.vibration.whole_energy import ModalEnergy, SampledEnergy
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
-    from d2rpick.vibration.measures import Measured
-    from d2rpick.vibration.modes import Mode, Modes
-    from d2rpick.vibration.moments import Moment, Moments
+    from d2rpick.vibration.measures import Bound, Deformation, Measured
     from d2rpick.vibration.part_signs import PartMatch, SignedParts, Unsigned
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
-
+# Why no tr can be trusted where the vibration is known but cannot be made out at td.
+SUNK: Final = "the level at td is below the noise of the record"
 # Of the vibration energy: more of it in a further mode moves a residual by a quarter and more.
 _HIDDEN = 0.02
 _LEFT_OVER = "the oscillator leaves more over than the swings of the energy do, which were counted"
+# Of the fastest mode: what a parabola through three of them misses of a minimum is of the order of 1e-4 of a period.
+_POINTS_PER_PERIOD = 64
+# Parts that a warning names of those that share a reason; the JSON document has all.
+_NAMED = 5
 
 
-class Vibration(Protocol):
-    """A vibration seen from one td."""
+class Compared(NamedTuple):
+    """Deformations that can be compared with those at td from ``first`` to ``last`` [time].
+
+    ``times`` before td at which their lock-in error is looked at, None of one mode, of which all has a closed form;
+    ``bound`` on a residual.
+    """
+
+    deformation: Deformation
+    first: float
+    last: float
+    times: Samples | None
+    bound: Bound
+
+
+@dataclass(frozen=True, eq=False)
+class Vibration:
+    """A vibration seen from one td.
+
+    Parameters
+    ----------
+    basis : str
+        Name of the model: "parts", "oscillator", "swings" or "energy".
+    whole : SampledEnergy
+        The energy of all parts together.
+    compared : Compared or None
+        None where no deformation with its sign is known, and ``unknown`` says why.
+    undescribed : str
+        Why a single tr has no measures although deformations are known.
+    estimated : str or None
+        Why the kinetic share is an estimate; None where it is none.
+    doubts : tuple of str
+        Why the level at td means nothing, so that no tr can be trusted.
+    unsigned, signed : tuple
+        Parts that were left out, since their deformation has no sign; names of those whose signs are known.
+    """
+
+    basis: str
+    whole: SampledEnergy
+    compared: Compared | None = None
+    unknown: str | None = None
+    undescribed: str = ""
+    estimated: str | None = None
+    doubts: tuple[str, ...] = ()
+    unsigned: tuple[Unsigned, ...] = ()
+    signed: tuple[str, ...] = ()
 
     @property
-    def basis(self) -> str:
-        """Name of the model: "parts", "oscillator", "swings" or "energy"."""
-
-    @property
-    def unknown(self) -> str | None:
-        """Why no deformation with its sign is known; None where one is."""
-
-    @property
-    def undescribed(self) -> str:
-        """Why a single tr has no measures although deformations are known."""
-
-    @property
-    def estimated(self) -> str | None:
-        """Why the kinetic share is an estimate; None where it is none."""
-
-    @property
-    def doubts(self) -> tuple[str, ...]:
-        """Why the level at td means nothing, so that no tr can be trusted."""
-
-    @property
-    def unsigned(self) -> tuple[Unsigned, ...]:
-        """Parts that were left out, since their deformation has no sign."""
-
-    @property
-    def signed(self) -> tuple[str, ...]:
-        """Names of the parts whose signs are known."""
-
-    @property
-    def mode(self) -> Mode | Modes | None:
-        """Closed form of the whole energy, where there is one."""
+    def td(self) -> float:
+        """The td from which it is seen [time]."""
+        return self.whole.td
 
     @property
     def kinetic_share(self) -> float | None:
         """K at td, None where it is not known [-]."""
+        return self.compared and measures.kinetic_share(self.compared.deformation, self.td)
 
-    @property
-    def has_matches(self) -> bool:
-        """Whether there are closest matches beside crossings and extrema: of several deformations."""
+    @cached_property
+    def profile(self) -> Profile | None:
+        """Lock-in error before td, whose minima are closest matches; None where there are none."""
+        if self.compared is None or self.compared.times is None:
+            return None
+        return Profile.of(self.compared.deformation, self.compared.times, self.td)
 
-    def energy(self, time: float) -> float:
-        """E at a time: of the model where it describes the record, of the samples elsewhere [energy]."""
+    def moments(self, tolerance: float, since: float = -np.inf, passed: Samples | None = None) -> Moments:
+        """Times before td that may serve as tr: crossings, standstills within the tolerance, and closest matches.
 
-    def energies(self, times: Samples) -> Samples:
-        """E at many times, of their shape [energy]."""
-
-    def described(self, time: float) -> bool:
-        """Whether the energy at a time is the model's own."""
-
-    def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Times in (start, end], ascending, where the energy peaks [time]."""
-
-    def moments(self, tolerance: float, since: float = -np.inf) -> Sequence[Moment]:
-        """Times before td that may serve as tr; standstills only where their error is within the tolerance.
-
-        Those before ``since`` [time] may be left out.
+        Those before ``since`` [time] may be left out.  ``passed``: when modes pass the level, where that is known.
         """
+        if self.compared and isinstance(self.whole, ModalEnergy):
+            turns = self.whole.standstills()
+            turns = turns[self.comparable(turns)]
+            turns = turns[measures.lock_in_error(self.compared.deformation, turns, self.td) <= tolerance]
+        else:
+            turns = self.whole.turns_near(tolerance, since)
+        matches = self.profile.minima() if self.profile else ()
+        crossings = self.whole.crossings(since, passed)
+        return Moments.of_level(*crossings, Moments.of("extremum", turns), Moments.of("match", matches))
 
     def measured(self, times: Samples) -> Sequence[Measured | None]:
         """Measures of each time as tr, None where its deformation cannot be compared with that at td."""
+        return measured_of([self], [times])[0]
 
     def errors(self, times: Samples) -> Samples:
-        """What a tolerance is held against, of the shape of ``times``; infinite where no tolerance would help [-]."""
+        """What a tolerance is held against, of the shape of ``times``; infinite where no tolerance would help [-].
+
+        The lock-in error where the signs match, the level error where no signs are known.
+        """
+        if self.compared is None:
+            errors = measures.level_error(self.whole.energies(times), self.whole.energy(self.td))
+            return np.where(np.isnan(errors), np.inf, errors)
+        deformation = self.compared.deformation
+        comparable = self.comparable(times) & measures.sign_match(deformation, times, self.td)
+        return np.where(comparable, measures.lock_in_error(deformation, times, self.td), np.inf)
 
     def knots(self) -> Samples:
         """Times before td between which the errors run monotone [time]."""
+        return np.append(self.whole.edges(), self.profile.time if self.profile else ())
 
     def reach(self, moments: Moments) -> Samples:
-        """How far the true time of each moment may lie away [time]."""
+        """How far the true time of each moment may lie away; of a match half a cell of the profile [time]."""
+        reach = self.whole.reach(moments.tr)
+        return self.profile.bounding(moments, reach) if self.profile else reach
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:
         """What each part has of the mismatch; nothing where single parts are not known."""
+        if self.basis != "parts" or self.compared is None:
+            return ()
+        from d2rpick.vibration.part_signs import SignedParts, contributions  # not above: a table has no parts
+
+        assert isinstance(self.compared.deformation, SignedParts)
+        return contributions(self.compared.deformation, tr, self.td)
+
+    def comparable(self, times: Samples) -> NDArray[np.bool_]:
+        """Which times have a deformation that can be compared with that at td."""
+        if self.compared is None:
+            return np.zeros(times.shape, dtype=bool)
+        return (times >= self.compared.first) & (times <= self.compared.last)
+
+    def measures_of(self, tr: Samples, td: Samples | float) -> Iterator[Measured]:
+        """Measures of comparable times (n,) for one ``td``; of a single mode also for a td each."""
+        assert self.compared
+        deformation = self.compared.deformation
+        if isinstance(deformation, Mode):
+            tolerance = measures.timing_tolerance(deformation, tr, td)
+        else:
+            assert self.profile is not None
+            tolerance = self.profile.tolerances(tr, measures.lock_in_error(deformation, tr, td))
+        of_parts = self.basis == "parts"
+        return measures.measured(deformation, tr, td, tolerance, self.compared.bound, of_parts=of_parts)
+
+
+def moments_of(vibrations: Sequence[Vibration], tolerance: float, since: Sequence[float]) -> list[Moments]:
+    """Give the moments of each vibration, as ``Vibration.moments`` does: of one mode in one go.
+
+    Parameters
+    ----------
+    vibrations : sequence of length n
+    tolerance : float
+        [-]
+    since : sequence of length n
+        [time]
+    """
+    passed: dict[int, Samples] = {}
+    for places in _alike(vibrations):
+        whole = vibrations[places[0]].whole
+        if len(places) > 1 and isinstance(whole, ModalEnergy) and isinstance(whole.mode, Mode):
+            seen_from = np.array([vibrations[i].td for i in places])
+            passed |= zip(places, whole.mode.all_level_crossings(seen_from, whole.before), strict=True)
+    return [one.moments(tolerance, since[i], passed.get(i)) for i, one in enumerate(vibrations)]
+
+
+def measured_of(vibrations: Sequence[Vibration], times: Sequence[Samples]) -> list[Sequence[Measured | None]]:
+    """Give the measures of the times of each vibration, None where its deformation is not comparable to that at td."""
+    known: dict[int, list[Measured | None]] = {}
+    for places in _alike(vibrations):
+        inside = [vibrations[i].comparable(times[i]) for i in places]
+        tr = np.concatenate([times[i][here] for i, here in zip(places, inside, strict=True)])
+        seen_from = [vibrations[i].td for i in places]
+        td = np.repeat(seen_from, [np.count_nonzero(here) for here in inside]) if len(places) > 1 else seen_from[0]
+        found = vibrations[places[0]].measures_of(tr, td) if tr.size else iter(())
+        for place, here in zip(places, inside, strict=True):
+            known[place] = [next(found) if one else None for one in here.tolist()]
+    return [known[i] for i in range(len(vibrations))]
+
+
+def _alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
+    """Places of the vibrations that a single mode describes in one window, together; of each other one by itself."""
+    groups: dict[object, list[int]] = {}
+    for place, one in enumerate(vibrations):
+        whole, single = one.whole, one.compared is not None and isinstance(one.compared.deformation, Mode)
+        key = (id(whole.fit), whole.span.start) if single and isinstance(whole, ModalEnergy) else place
+        groups.setdefault(key, []).append(place)
+    return groups.values()
 
 
 class Evidence(NamedTuple):
@@ -141,42 +250,87 @@ class Evidence(NamedTuple):
 
 def model_at(history: History, td: float, evidence: Evidence) -> Vibration:
     """Give the best model that can be relied on at ``td``."""
-    whole, signed = energy_at(history, td, evidence), evidence.signed
-    sunk = signed is not None and isinstance(whole, OfEnergy) and signed.sunk(td)  # a model of the whole tells more
+    whole, signed, swings = energy_at(history, td, evidence), evidence.signed, evidence.swings
+    sunk = signed is not None and whole.compared is None and signed.sunk(td)  # a model of the whole tells more
     if signed and not sunk:
-        from d2rpick.vibration.of_parts import OfParts  # not above: a table has no parts
-
-        return OfParts(whole, signed)
-    swings = evidence.swings
+        return replace(
+            _with_signs(whole, signed),
+            basis="parts",
+            undescribed="the signs of the parts' deformations cannot be followed from here to td",
+            unsigned=signed.unsigned,
+            signed=signed.names,
+        )
     if swings and not whole.doubts and doubtful(whole) and swings.known_at(td):
-        from d2rpick.vibration.of_swings import OfSwings  # not above: an oscillator does without it
+        modes = whole.whole
+        if not isinstance(modes, ModalEnergy):
+            return _of_swings(whole, swings)
+        if swings.unseen(modes.span.start, td)[0] < modes.fit.hidden_share:
+            return _of_swings(Vibration("energy", SampledEnergy(history, td), unknown=_LEFT_OVER), swings)
+    return whole if whole.compared else _without_parts(whole, evidence.parts, sunk=sunk)
 
-        if isinstance(whole, OfEnergy) or swings.unseen(whole.span.start, td)[0] < whole.fit.hidden_share:
-            return OfSwings(OfEnergy(history, td, _LEFT_OVER) if isinstance(whole, OfModes) else whole, swings)
-    if isinstance(whole, OfModes):
-        return whole
-    return whole.without_parts(evidence.parts, sunk=sunk)
+
+def _of_swings(whole: Vibration, swings: Swings) -> Vibration:
+    """The energy alone where its swings can be counted: the deformation is the root of what lies above the floor."""
+    undescribed = "the swings of the energy cannot be counted from here to td"
+    return replace(_with_signs(whole, swings), basis="swings", undescribed=undescribed)
 
 
-def doubtful(whole: OfModes | OfEnergy) -> bool:
+def _with_signs(whole: Vibration, parts: SignedParts | Swings) -> Vibration:
+    """Compare signed deformations, while levels and times are those of the whole energy."""
+    first = parts.comparable_since(whole.td)
+    times = parts.time[parts.time >= first]
+    compared = Compared(parts, first, float(parts.time[-1]), times, parts.residual_bound)
+    return replace(whole, compared=compared, unknown=None, estimated=whole.unknown)
+
+
+def _without_parts(whole: Vibration, parts: SignedParts | None, *, sunk: bool) -> Vibration:
+    """Say too why single parts do not tell the deformation: without a sign, or ``sunk`` at td."""
+    reasons = [whole.unknown or ""]
+    reasons += ["at td the vibration of the parts is below the error of a solver"] * sunk
+    names: dict[str, list[str]] = {}  # of each reason, since all parts of a structure often share one
+    for part in parts.unsigned if parts else ():
+        names.setdefault(part.reason, []).append(part.name)
+    reasons += [f"{listing(alike, most=_NAMED)}: {reason}" for reason, alike in names.items()]
+    doubts = (SUNK, *(doubt for doubt in whole.doubts if doubt != SUNK)) if sunk else whole.doubts
+    return replace(whole, unknown="; ".join(reasons), doubts=doubts)
+
+
+def doubtful(whole: Vibration) -> bool:
     """Whether no oscillator is known, or one that leaves so much over that its sign may be wrong."""
-    return isinstance(whole, OfEnergy) or whole.fit.hidden_share > _HIDDEN
+    return not isinstance(whole.whole, ModalEnergy) or whole.whole.fit.hidden_share > _HIDDEN
 
 
-def energy_at(history: History, td: float, evidence: Evidence) -> OfModes | OfEnergy:
+def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
     """Give the model of the whole energy to be relied on at ``td``: an oscillator, else the samples."""
-    fit = evidence.fit
+    fit, whole = evidence.fit, describing(history, td, evidence)
+    samples = partial(Vibration, "energy", SampledEnergy(history, td))
     if fit is None:
-        return OfEnergy(history, td, "identification was switched off")
+        return samples(unknown="identification was switched off")
     prescribed = ("the oscillator that was asked for does not describe the record at td",) * evidence.prescribed
     if fit.reason:
         what = "the given oscillator does not describe" if evidence.given else "no single oscillator describes"
-        return OfEnergy(history, td, f"{what} the record: {fit.reason}", (*prescribed, *_aliased(history, fit)))
-    model = describing(history, td, evidence)
-    if not model.described(td):
-        return OfEnergy(history, td, "the oscillator does not describe the record at td", prescribed)
-    sunk = model.sunk
-    return OfEnergy(history, td, sunk, (SUNK, *prescribed)) if sunk else model
+        return samples(unknown=f"{what} the record: {fit.reason}", doubts=(*prescribed, *_aliased(history, fit)))
+    if not isinstance(whole, ModalEnergy) or not whole.described(td):
+        return samples(unknown="the oscillator does not describe the record at td", doubts=prescribed)
+    if whole.sunk:
+        return samples(unknown=whole.sunk, doubts=(SUNK, *prescribed))
+    compared = Compared(whole.mode, *whole.span, _times_before(whole), partial(residual_bound, fit))
+    return Vibration("oscillator", whole, compared, undescribed="not described by the oscillator")
+
+
+def _times_before(whole: ModalEnergy) -> Samples | None:
+    """Times in the span before td at which several modes are looked at."""
+    mode, start, td = whole.mode, whole.span.start, whole.td
+    if isinstance(mode, Mode) or td <= start:
+        return None
+    step = 2 * np.pi / mode.fastest / _POINTS_PER_PERIOD
+    return np.linspace(start, td, max(3, int(np.ceil((td - start) / step)) + 1))
+
+
+def describing(history: History, td: float, evidence: Evidence) -> SampledEnergy:
+    """Give the energy as it is known whatever it is worth at ``td``: of modes where they describe a window."""
+    fit, span = evidence.fit, evidence.span
+    return ModalEnergy(history, td, fit, span) if fit and fit.mode and span else SampledEnergy(history, td)
 
 
 def _aliased(history: History, fit: Identification) -> tuple[str, ...]:
@@ -192,11 +346,3 @@ def _aliased(history: History, fit: Identification) -> tuple[str, ...]:
     return (
         f"the energy has {states:.3g} states per period, fewer than the {MIN_SAMPLES_PER_PERIOD} that show a level",
     )
-
-
-def describing(history: History, td: float, evidence: Evidence) -> OfModes | OfEnergy:
-    """Give the model of the energy whatever it is worth at ``td``: an oscillator where it describes a window."""
-    fit, span = evidence.fit, evidence.span
-    if fit and fit.mode and span:
-        return OfModes(history, td, fit, span)
-    return OfEnergy(history, td, "no oscillator describes the record")

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.modes import Modes
 
 
 # in quotes: numpy.typing costs start-up
@@ -220,21 +219,6 @@ def lacking_energy(oscillator: Oscillator, reference: State, switched: State) ->
     """Energy of the vibration that ``switched`` lacks against ``reference``, states at td, numbers or arrays."""
     lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
     return oscillator.vibration_energy(lack)
-
-
-def replayed_residual(vibration: Mode | Modes, tr: Samples, td: Samples | float) -> Samples:
-    """Replay each tr of shape (n,) up to ``td`` and give the residual there, of all modes together [-].
-
-    ``td`` is one for all, or one for each.  Energy norm of what the switched run lacks at td, over that of the
-    reference vibration.
-    """
-    lack, whole = np.zeros(tr.shape), np.zeros(tr.shape)
-    for mode in vibration.modes:
-        oscillator, at_td = from_mode(mode, td)
-        at_tr = oscillator.free(at_td, tr - td)  # the closed form runs backwards as well
-        lack += lacking_energy(oscillator, at_td, oscillator.rigid(at_tr, td - tr))
-        whole += oscillator.vibration_energy(at_td)
-    return np.sqrt(lack / whole)
 
 
 def from_mode(mode: Mode, time: Samples | float) -> tuple[Oscillator, State]:

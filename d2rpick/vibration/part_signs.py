@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.part_motion import PartMotion, Places
-    from d2rpick.vibration.swings import Swings
 
 
 # A deformation that swings about zero is zero on average; beyond this share of its mean size it swings about
@@ -185,7 +184,7 @@ class PartMatch(NamedTuple):
     reason: str | None = None
 
 
-def contributions(vibration: SignedParts | Swings, tr: float, td: float) -> tuple[PartMatch, ...]:
+def contributions(vibration: SignedParts, tr: float, td: float) -> tuple[PartMatch, ...]:
     """Give the match of each part, that with the largest share first, then those without a sign."""
     shares = np.bincount(vibration.owner, measures.mismatch_shares(vibration, tr, td)).tolist()
     same = np.bincount(vibration.owner, vibration.amplitudes(tr) * vibration.amplitudes(td)) >= 0

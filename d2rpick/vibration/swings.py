@@ -8,7 +8,7 @@ on a smooth floor, another mode holds the rest of the energy there, and nothing 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -58,9 +58,6 @@ class Swings:
     envelope: Envelope
     bottoms: Samples
     floor: Samples
-    names: ClassVar = ("energy",)
-    unsigned: ClassVar[tuple[()]] = ()
-    owner: ClassVar = np.zeros(1, np.intp)
 
     def amplitudes(self, t: Samples | float) -> Samples:
         """Signed deformation, of the shape of ``t`` with an axis of one before it [sqrt(energy)]."""

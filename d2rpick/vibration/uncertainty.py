@@ -259,7 +259,7 @@ def _strongest(spectrum: _Spectrum) -> Samples:
     return np.asarray(spectrum.rate[tops[np.argsort(-spectrum.amplitude[tops])[:_STARTS]]])
 
 
-def residual_bound(residual: Samples, fit: Identification, tr: Samples, td: Samples | float) -> Samples:
+def residual_bound(fit: Identification, residual: Samples, tr: Samples, td: Samples | float) -> Samples:
     """Largest residual of each tr of shape (n,) with the energy that a hidden mode may have, at worst [-].
 
     It then stood at tr at one end of its swing and at td at the other, where it is smaller by the damping in between:

@@ -18,8 +18,7 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Modes
-from d2rpick.vibration.oscillator import replayed_residual
-from tests.records import ENERGY, MODE, TIME, printed, vibration
+from tests.records import ENERGY, MODE, TIME, printed, replayed_residual, vibration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -120,7 +120,7 @@ def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> Non
     two = Modes((Mode(100.0, 4.0, 2.0, 3.0, 0.0), Mode(261.0, 4.0, -1.5, 1.0, 0.0)))
     time = np.linspace(0.0, 0.3, 3001)
     modes = suggest(History(time, two.energy(time), ("made",), "made", "energy"), td, Settings(tolerance=0.4))
-    assert isinstance(modes.situation.vibration.mode, Modes)
+    assert isinstance(modes.situation.vibration.whole.mode, Modes)
     check(modes, 1)
     parts = suggest(chain.history(), td, Settings())
     assert parts.situation.basis == "parts"

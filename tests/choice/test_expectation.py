@@ -61,7 +61,7 @@ def test_up_to_the_limit_it_is_accepted_and_the_windows_end_there() -> None:
     windows = acceptable_windows(situation, candidates, None)
     grid = np.linspace(0.1, float(windows[-1, 1]), 3000)
     kept = judge(situation, grid.tolist()).kept
-    levels = situation.vibration.energies(grid)
+    levels = situation.vibration.whole.energies(grid)
     assert kept.any()
     assert levels[kept].max() <= most_energy(situation)
     within = np.abs(np.sqrt(levels / situation.energy_td) - 1) <= 0.2

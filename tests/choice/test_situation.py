@@ -10,7 +10,6 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.flight.bodies import RigidBody
 from d2rpick.histories.opening import Selection
-from d2rpick.vibration.moments import Moments
 from d2rpick.vibration.span import Fits
 from tests import chain, paper
 from tests.energies import rollover
@@ -32,9 +31,9 @@ def test_every_model_answers_alike() -> None:
     ):
         vibration = situation.vibration
         found = vibration.moments(situation.settings.tolerance)
-        times = np.array([moment.tr for moment in found])
+        times = found.tr
         measured = vibration.measured(times)
-        assert len(measured) == len(found) == vibration.reach(Moments.of(found)).size > 0
+        assert len(measured) == len(found) == vibration.reach(found).size > 0
         assert np.all(times < situation.td)
         assert (vibration.kinetic_share is None) == (vibration.unknown is not None) == (not any(measured))
         # what a tolerance is held against is the lock-in error, where the sign is right

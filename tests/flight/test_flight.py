@@ -127,7 +127,7 @@ def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
     assert situation.flight.start == 0.005
     assert situation.evidence.span is not None
     assert situation.evidence.span.start == pytest.approx(0.020, abs=PERIOD / 10)
-    assert situation.vibration.energy(0.01) == pytest.approx(loaded().energy_at(0.01))
+    assert situation.vibration.whole.energy(0.01) == pytest.approx(loaded().energy_at(0.01))
 
 
 def test_a_fit_window_away_from_td_says_nothing_of_td() -> None:
@@ -202,7 +202,7 @@ def test_td_in_the_next_contact_is_after_the_end_of_the_flight(td: float, after:
 @pytest.mark.parametrize("td", [0.1, 0.149])
 def test_a_contact_does_not_creep_into_the_fit(td: float) -> None:
     situation = examine(STRUCK, td, Settings())
-    fitted = situation.vibration.mode
+    fitted = situation.vibration.whole.mode
     assert fitted is not None
     assert fitted.alpha == pytest.approx(10, abs=0.05)
     assert situation.flight.end == pytest.approx(0.150, abs=PERIOD / 25)

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.oscillator import from_mode, replayed_residual, to_mode
+from d2rpick.vibration.oscillator import from_mode, to_mode
 from d2rpick.vibration.replay import Replay
 from tests import paper
+from tests.records import replayed_residual
 
 modes = st.builds(
     Mode,

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from d2rpick.histories.history import History
 from d2rpick.vibration import measures
 from d2rpick.vibration.identify import identify_several
-from d2rpick.vibration.lock_in_profile import Profile
+from d2rpick.vibration.model import Evidence, energy_at
 from d2rpick.vibration.modes import Mode, Modes
-from d2rpick.vibration.moments import Moment, Moments
-from d2rpick.vibration.of_modes import OfModes
+from d2rpick.vibration.moments import Moment, Moments, Profile
 from d2rpick.vibration.span import Span
 
 MODE = Mode(omega=2 * np.pi, alpha=0.2, cosine=0.0, sine=1.0, origin=0.0)
@@ -59,28 +56,23 @@ def test_a_td_at_which_two_modes_set_in_has_nothing_before_it_to_compare() -> No
     time = np.linspace(0.0, 6.0, 1201)
     history = History(time, np.asarray(modes.energy(time)), ("made",), "made", "energy")
     fit = identify_several(time, history.energy)
-    vibration = OfModes(history, 2.0, fit, Span(2.0, 6.0))
+    vibration = energy_at(history, 2.0, Evidence(fit, Span(2.0, 6.0)))
     crossings = vibration.moments(0.2)
-    assert all(one.tr < 2.0 and one.kind == "crossing" for one in crossings)
-    assert np.isfinite(vibration.reach(Moments.of(crossings))).all()
-    assert vibration.measured(np.array([one.tr for one in crossings])) == [None] * len(crossings)
+    assert vibration.basis == "oscillator"
+    assert crossings.are("crossing").all()
+    assert (crossings.tr < 2.0).all()
+    assert np.isfinite(vibration.reach(crossings)).all()
+    assert vibration.measured(crossings.tr) == [None] * len(crossings)
 
 
-KINDS = st.sampled_from(["crossing", "extremum", "match", "start", "given"])
-ANY = st.lists(st.builds(Moment, st.floats(-1e9, 1e9), KINDS, st.sampled_from([None, False, True])))
-
-
-@given(ANY, st.data())
-def test_columns_are_the_moments_they_were_made_of(found: list[Moment], data: st.DataObject) -> None:
-    columns = Moments.of(found)
-    assert list(columns) == found
-    assert Moments.of(columns) is columns
-    assert columns.are("match").tolist() == [one.kind == "match" for one in found]
-    places = data.draw(st.permutations(range(len(found))))
-    assert list(columns.at(np.array(places, dtype=np.intp))) == [found[i] for i in places]
-    assert list(columns[1:3]) == found[1:3]
-
-
-def test_crossings_of_a_level_come_before_the_extrema_near_it() -> None:
-    found = Moments.of_level(np.array([1.0, 3.0]), np.array([True, False]), np.array([2.0]))
-    assert list(found) == [Moment(1.0, "crossing", True), Moment(3.0, "crossing", False), Moment(2.0, "extremum", None)]
+def test_crossings_of_a_level_come_before_the_other_moments() -> None:
+    others = Moments.of("extremum", [2.0]), Moments.of("match", ()), Moments.of("given", np.array([0.5]))
+    found = Moments.of_level(np.array([1.0, 3.0]), np.array([True, False]), *others)
+    each = [found[i] for i in range(len(found))]
+    assert each == [
+        Moment(1.0, "crossing", True), Moment(3.0, "crossing", False), Moment(2.0, "extremum", None),
+        Moment(0.5, "given", None),
+    ]  # fmt: skip
+    assert found.are("extremum").tolist() == [False, False, True, False]
+    assert found.at(np.array([3, 0]))[1] == found.at(slice(1))[0] == each[0]
+    assert found.at(found.are("given"))[0] == each[3]

@@ -15,11 +15,10 @@ from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, identify_several
 from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual
 from d2rpick.vibration.modes import Mode, Modes, sum_and_jacobian
-from d2rpick.vibration.oscillator import replayed_residual
 from tests import chain, paper
 from tests.command import ROLLOVER
 from tests.computed import columns
-from tests.records import MODE, noisy, printed
+from tests.records import MODE, noisy, printed, replayed_residual
 
 MODES = st.builds(
     Mode,
@@ -261,7 +260,7 @@ def test_several_modes_are_chosen_by_and_replayed() -> None:
     answer = suggest(of(TWO), TWO.peaks(4.0, 5.0)[0], Settings(tolerance=0.5))
     situation = answer.situation
     assert (situation.basis, situation.evidence.fit and situation.evidence.fit.describes_record) == ("oscillator", True)
-    assert isinstance(situation.vibration.mode, Modes)
+    assert isinstance(situation.vibration.whole.mode, Modes)
     assert {c.kind for c in answer.candidates} == {"crossing", "extremum", "match"}
     tr = np.array([c.tr for c in answer.candidates])
     expected = replayed_residual(TWO, tr, situation.td)
@@ -271,16 +270,19 @@ def test_several_modes_are_chosen_by_and_replayed() -> None:
 
 def test_the_total_energy_of_the_chain_tells_its_two_modes() -> None:
     situation = examine(chain.history("IE_total_J"), chain.TD_PEAK, Settings())
-    assert isinstance(situation.vibration.mode, Modes)
-    periods = sorted(2 * np.pi / mode.omega for mode in situation.vibration.mode.modes)
+    assert isinstance(situation.vibration.whole.mode, Modes)
+    periods = sorted(2 * np.pi / mode.omega for mode in situation.vibration.whole.mode.modes)
     assert periods == pytest.approx([0.0285, 0.0491], abs=1e-4)
-    assert situation.vibration.mode.alpha == pytest.approx(5, rel=1e-3)
+    assert situation.vibration.whole.mode.alpha == pytest.approx(5, rel=1e-3)
     assert situation.kinetic_share == pytest.approx(0.00065, abs=1e-4)
     errors = []
     for run in chain.scan():
         there = situation.at(run["td_s"])
-        assert there.vibration.mode is not None
+        assert there.vibration.whole.mode is not None
         errors.append(
-            abs(float(replayed_residual(there.vibration.mode, np.array([run["tr_s"]]), there.td)[0]) - run["R_sim"])
+            abs(
+                float(replayed_residual(there.vibration.whole.mode, np.array([run["tr_s"]]), there.td)[0])
+                - run["R_sim"]
+            )
         )
     assert max(errors) < 0.025

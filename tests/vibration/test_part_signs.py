@@ -17,7 +17,7 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threads
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.vibration.moments import SUNK
+from d2rpick.vibration.model import SUNK
 from d2rpick.vibration.part_motion import PartMotion
 from d2rpick.vibration.part_signs import MOST_UNSIGNED, SignedParts, read_parts
 from d2rpick.vibration.waves import Waves

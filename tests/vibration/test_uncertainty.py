@@ -13,10 +13,9 @@ from d2rpick.histories.history import History, Precision
 from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Mode, Modes
-from d2rpick.vibration.oscillator import replayed_residual
 from d2rpick.vibration.uncertainty import curvature, fitted_reach, reach, residual_bound, resolved, sampled_reach
 from tests.benchmarks.identification import small_second_modes
-from tests.records import ENERGY, TIME, noisy, printed
+from tests.records import ENERGY, TIME, noisy, printed, replayed_residual
 
 
 def rounded(values: np.ndarray, digits: int) -> np.ndarray:
@@ -189,7 +188,7 @@ def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
         found = resolved(TIMES, energy, identify(TIMES, energy))
         assert found.mode is not None
         true, told = replayed_residual(truth, tr, td), replayed_residual(found.mode, tr, td)
-        assert np.all(residual_bound(told, found, tr, td) > true - 0.05)
+        assert np.all(residual_bound(found, told, tr, td) > true - 0.05)
 
 
 def test_candidates_state_how_large_their_residual_may_be() -> None:
