@@ -14,13 +14,7 @@ from d2rpick.errors import FormatError
 from d2rpick.histories.companions import check_companions
 from d2rpick.histories.database import Legs
 from d2rpick.histories.formats import binout, csv_table, glstat, matsum, radioss_th
-from d2rpick.histories.opening import (
-    READERS,
-    Run,
-    Selection,
-    open_run,
-    reader,
-)
+from d2rpick.histories.opening import READERS, Run, Selection, open_run, reader
 from d2rpick.histories.source import Source
 from tests.computed import stored
 from tests.made_binout import binout as made_binout

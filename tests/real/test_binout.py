@@ -65,12 +65,7 @@ REAL = [
     (
         PLADE,
         1,
-        [
-            ("time", 0, 0.0),
-            ("internal_energy", 0, 2e-20),
-            ("kinetic_energy", 0, 0.0),
-            ("total_energy", 0, 2e-20),
-        ],
+        [("time", 0, 0.0), ("internal_energy", 0, 2e-20), ("kinetic_energy", 0, 0.0), ("total_energy", 0, 2e-20)],
     ),
 ]
 REAL_PARTS = [

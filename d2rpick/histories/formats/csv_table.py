@@ -16,14 +16,7 @@ from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, sp
 from d2rpick.histories.formats.printed import of_one_run
 from d2rpick.histories.formats.table_values import checked_values, line_of, plain_values
 from d2rpick.histories.formats.text import UTF16, Text
-from d2rpick.histories.names import (
-    internal_energies,
-    is_time,
-    meant,
-    near_miss,
-    quantity_of,
-    refuse_other_quantity,
-)
+from d2rpick.histories.names import internal_energies, is_time, meant, near_miss, quantity_of, refuse_other_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

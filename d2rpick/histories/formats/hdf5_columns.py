@@ -332,10 +332,7 @@ def _pandas_frame(name: str, group: h5py.Group) -> Iterator[Column]:
     for number in range(int(group.attrs["nblocks"])):
         titles = _titles(group[f"block{number}_items"][()])
         values = group[f"block{number}_values"]
-        if values.dtype.kind not in "iuf" or values.shape not in (
-            (index.size, len(titles)),
-            (len(titles), index.size),
-        ):
+        if values.dtype.kind not in "iuf" or values.shape not in ((index.size, len(titles)), (len(titles), index.size)):
             continue
         across = values.shape[0] == index.size and (index.size != len(titles) or bool(values.attrs.get("transposed")))
         for place, title in enumerate(titles):

@@ -57,26 +57,14 @@ SCENARIOS: dict[str, tuple[str | bytes, str, str]] = {
     "units behind a slash": ("t/ms,E_int/mJ\n" + table(), "E_int/mJ", "ms"),
     "units behind a line": ("time_s,IE_J\n" + table(), "IE_J", "s"),
     "units in a row": ("time,internal energy\nms,J\n" + table(), "internal energy", "ms"),
-    "units in a row, in brackets": (
-        "time,internal energy\n[ms],[kN mm]\n" + table(),
-        "internal energy",
-        "ms",
-    ),
-    "LS-PrePost, unnamed curve": (
-        "Global Data,Internal Energy\nTime,\n" + table(tail=","),
-        "Internal Energy",
-        "",
-    ),
+    "units in a row, in brackets": ("time,internal energy\n[ms],[kN mm]\n" + table(), "internal energy", "ms"),
+    "LS-PrePost, unnamed curve": ("Global Data,Internal Energy\nTime,\n" + table(tail=","), "Internal Energy", ""),
     "LS-PrePost, named curve": (
         "Material Data,Internal Energy\nTime,A12,\n" + table(tail=","),
         "A12: Internal Energy",
         "",
     ),
-    "3DEXPERIENCE": (
-        "Time(s),Energy(J),ALLIE_Global/ALLIE\n" + table(tail=","),
-        "Energy(J): ALLIE_Global/ALLIE",
-        "s",
-    ),
+    "3DEXPERIENCE": ("Time(s),Energy(J),ALLIE_Global/ALLIE\n" + table(tail=","), "Energy(J): ALLIE_Global/ALLIE", "s"),
     "comments": ("# a run\n$ more\n% more\n// more\ntime,IE\n" + table() + "# the end\n", "IE", ""),
     "comments between": ("time,IE\n" + table().replace("\n0.625", "\n# switched\n\n0.625"), "IE", ""),
     "names in a comment": ("# run 7\n# time internal_energy\n" + table(" "), "internal_energy", ""),
@@ -96,11 +84,7 @@ SCENARIOS: dict[str, tuple[str | bytes, str, str]] = {
     "signs": ("time,IE\n+0,+1.5\n+.25,2.75e+0\n0.625,-3.125E0\n", "IE", ""),
     "the energy first": ("IE,time\n1.5,0.0\n2.75,0.25\n-3.125,0.625\n", "IE", ""),
     "an index first": (",time,IE\n0,0,1.5\n1,.25,2.75\n2,.625,-3.125\n", "IE", ""),
-    "words in an unused column": (
-        "time,phase,IE\n0,load,1.5\n.25,flight,2.75\n.625,flight,-3.125\n",
-        "IE",
-        "",
-    ),
+    "words in an unused column": ("time,phase,IE\n0,load,1.5\n.25,flight,2.75\n.625,flight,-3.125\n", "IE", ""),
     "gaps in an unused column": ("time,KE,IE\n0,,1.5\n.25,nan,2.75\n.625,7,-3.125\n", "IE", ""),
     "gaps in an unused last column": ("time,IE,KE\n0,1.5,\n.25,2.75,3\n.625,-3.125,\n", "IE", ""),
     "more names than values, th_to_csv": (
@@ -108,11 +92,7 @@ SCENARIOS: dict[str, tuple[str | bytes, str, str]] = {
         "INTERNAL ENERGY",
         "",
     ),
-    "an internal energy among others": (
-        "time,boxIE_J,boxKE_J\n0,1.5,9\n.25,2.75,9\n.625,-3.125,9\n",
-        "boxIE_J",
-        "",
-    ),
+    "an internal energy among others": ("time,boxIE_J,boxKE_J\n0,1.5,9\n.25,2.75,9\n.625,-3.125,9\n", "boxIE_J", ""),
     "equal times, the last counts": ("time,IE\n0,1.5\n.25,9\n.25,2.75\n.625,-3.125\n", "IE", ""),
     "restart, the newer leg counts": ("time,IE\n0,1.5\n.25,9\n.5,9\n.25,2.75\n.625,-3.125\n", "IE", ""),
 }
@@ -200,11 +180,7 @@ def test_curves_side_by_side_are_not_mixed(text: str, energy: list[str], reason:
         ("time,IE,IE\n0,1,2\n1,2,3\n", [], "2 columns are named"),
         ("time,3,2\n0,1,2\n1,2,3\n", ["2"], "may be any of these"),
         ("Time,Y1,Y2,Time\n0,1,5,2\n1,3,6,4\n", ["Y1"], "choose with `time`: 1 'Time', 4 'Time'"),
-        (
-            '"time","INTERNAL ENERGY",A,B\n0,1,2\n1,2,3\n',
-            ["A"],
-            "4 names for 3 values .th_to_csv.*2 'INTERNAL ENERGY'",
-        ),
+        ('"time","INTERNAL ENERGY",A,B\n0,1,2\n1,2,3\n', ["A"], "4 names for 3 values .th_to_csv.*2 'INTERNAL ENERGY'"),
         ('"time","INTERNAL ENERGY",A,B\n0,1,2\n1,2,3\n', ["3"], "only these may be used"),
         ('"time",A,"INTERNAL ENERGY",B\n0,1,2\n1,2,3\n', [], "no column is named like an internal energy"),
         ("index,time,IE,KE\n0,1,2\n1,2,3\n", [], "3 values below a header of 4 names"),

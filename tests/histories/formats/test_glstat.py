@@ -71,10 +71,7 @@ SCENARIOS = {
     "as written": (WHOLE, STATES),
     "one state": (HEAD + block(0.0, 4.5), [(0.0, 4.5)]),
     "line ends of another system": (WHOLE.replace("\n", "\r\n"), STATES),
-    "no blank line behind the controller": (
-        HEAD + block(0.0, 1.0, gap="") + block(1.0, 2.0, gap=""),
-        [(0, 1), (1, 2)],
-    ),
+    "no blank line behind the controller": (HEAD + block(0.0, 1.0, gap="") + block(1.0, 2.0, gap=""), [(0, 1), (1, 2)]),
     "blocks without blank lines between": (re.sub("\n+", "\n", WHOLE), STATES),
     "title in latin-1": (WHOLE.replace("box", "Stoßfänger"), STATES),
     "every controller": (
@@ -98,10 +95,7 @@ SCENARIOS = {
         HEAD + block(0.0, 1.0) + block(1.0, 9.0)[:500] + HEAD + block(1.0, 2.0) + block(2.0, 3.0),
         [(0, 1), (1, 2), (2, 3)],
     ),
-    "equal times, the last counts": (
-        HEAD + block(0.0, 1.0) + block(0.0, 2.0) + block(1.0, 3.0),
-        [(0, 2), (1, 3)],
-    ),
+    "equal times, the last counts": (HEAD + block(0.0, 1.0) + block(0.0, 2.0) + block(1.0, 3.0), [(0, 2), (1, 3)]),
     "restart, the newer leg counts": (
         HEAD + "".join(block(float(t), e) for t, e in ((0, 1.0), (1, 2.0), (2, 3.0), (1, 5.0), (2, 6.0))),
         [(0, 1), (1, 5), (2, 6)],
@@ -178,10 +172,7 @@ REFUSED = {
         HEAD + block(0.0, None) + block(1.0, None),
         "no internal energy; choose with `energy`: time",
     ),
-    "time at random": (
-        HEAD + "".join(block(float(t), 1.0) for t in (5, 1, 4, 2, 3)),
-        "glstat: time steps back",
-    ),
+    "time at random": (HEAD + "".join(block(float(t), 1.0) for t in (5, 1, 4, 2, 3)), "glstat: time steps back"),
     "line missing": (WHOLE.replace(GOOD, ""), NOT_ONCE),
     "line twice": (WHOLE.replace(GOOD, 2 * GOOD), NOT_ONCE),
     "wider than its column": (WHOLE.replace(GOOD, GOOD[:-1] + "1\n"), NOT_ONCE),
@@ -207,10 +198,7 @@ def test_refused(name: str) -> None:
 @pytest.mark.parametrize(
     ("asked", "reason"),
     [
-        (
-            ("kinetik energy",),
-            "did you mean 'kinetic energy'.*there are: time step, kinetic energy, internal energy",
-        ),
+        (("kinetik energy",), "did you mean 'kinetic energy'.*there are: time step, kinetic energy, internal energy"),
         (("stonewall energy",), "no 'stonewall energy' .did you mean 'stonewall energy wall# [12]'"),
         (("internal energy", "Internal Energy"), "given twice"),
         (("time",), "no 'time'"),

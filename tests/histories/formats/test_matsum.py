@@ -70,10 +70,7 @@ def test_parts_swapped_within_blocks_of_one_size_are_not_shifted() -> None:
 
 
 def test_part_that_comes_or_goes_is_refused_and_the_others_are_read() -> None:
-    states = [
-        *STATES[:2],
-        *(matsum_state(t, IDS[1:], e[1:]) for t, e in zip(TIMES[2:], ENERGIES[2:], strict=True)),
-    ]
+    states = [*STATES[:2], *(matsum_state(t, IDS[1:], e[1:]) for t, e in zip(TIMES[2:], ENERGIES[2:], strict=True))]
     run = read(matsum_head(IDS) + b"".join(states))
     assert run.notes == ("only some states have part 10",)
     assert run.part_channel("internal_energy", [1])[:, 0].tolist() == ENERGIES[:, 1].tolist()

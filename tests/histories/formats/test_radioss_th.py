@@ -45,10 +45,7 @@ def test_legs_follow_one_another() -> None:
 def test_any_age_of_the_format(globals_: int, code: int, title: int) -> None:
     run = opened(t01(5, globals_=globals_, code=code, title=title))
     assert run.time.tolist() == [state / 8 for state in range(5)]
-    assert (run.title, run.version) == (
-        "made for tests",
-        "Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss, linuxa64 gf",
-    )
+    assert (run.title, run.version) == ("made for tests", "Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss, linuxa64 gf")
     assert len(run.channels) == globals_
     for number, name in enumerate(run.channels, start=1):
         assert run.channel(name).tolist() == [value(state, 0, number) for state in range(5)]
