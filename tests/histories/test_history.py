@@ -1,14 +1,26 @@
-"""A history keeps its numbers, whatever becomes of the arrays it was made of, and copies no more than that takes."""
+"""What a history refuses, and what it tells of one time is what it tells of many."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from d2rpick.histories.history import History, Samples
+from d2rpick.errors import RangeError
+from d2rpick.histories.history import History, Precision, Samples
+from d2rpick.histories.samples import find_extrema
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
-def history(energy: Samples) -> History:
-    return History(np.arange(4.0), energy, source=("run",), format="csv", channel="internal energy")
+def history(energy: ArrayLike, time: ArrayLike | None = None) -> History:
+    energy = np.asarray(energy, dtype=np.float64)
+    time = np.arange(float(energy.size)) if time is None else np.asarray(time)
+    return History(time, energy, source=("run",), format="csv", channel="internal energy")
 
 
 def read_only(values: Samples) -> Samples:
@@ -18,8 +30,8 @@ def read_only(values: Samples) -> Samples:
 
 def test_what_could_change_is_copied() -> None:
     energy = np.array([1.0, 3.0, 2.0, 5.0])
-    for given in (energy, energy.view(), read_only(energy.view())):
-        kept = history(given).energy
+    for values in (energy, energy.view(), read_only(energy.view())):
+        kept = history(values).energy
         energy[0] += 1
         assert kept[0] == energy[0] - 1
         assert not kept.flags.writeable
@@ -31,3 +43,38 @@ def test_what_cannot_change_is_not_copied_unless_it_holds_more_than_itself() -> 
     assert np.shares_memory(history(energy.reshape(4)).energy, energy)
     table = read_only(np.ones((4, 20)))
     assert not np.shares_memory(history(table[:, 3]).energy, table)
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=30), st.lists(st.floats(0, 1), min_size=1, max_size=20))
+def test_many_energies_are_those_of_single_times(energy: list[float], shares: list[float]) -> None:
+    found = history(energy, np.arange(len(energy)) * 0.5)
+    times = np.array([*shares, 0.0, 1.0]) * found.time[-1]
+    assert found.energies_at(times).tolist() == pytest.approx([found.energy_at(t) for t in times.tolist()])
+
+
+@given(st.lists(st.integers(-2, 2), min_size=2, max_size=20))
+def test_turns_and_peaks_are_the_extrema(energy: list[int]) -> None:
+    found = history(energy)
+    extrema = find_extrema(found.time, found.energy)
+    assert found.turns.tolist() == [one.time for one in extrema]
+    assert found.peaks.tolist() == [one.time for one in extrema if one.peak]
+
+
+@pytest.mark.parametrize("precision", [Precision(6), Precision(decimals=4), Precision()])
+def test_quanta_are_the_quantum_of_each(precision: Precision) -> None:
+    values = np.array([0.0, 1.0, -1.0, 0.0640123, 999999.0, 1e-30, -7.5e12])
+    assert precision.quanta(values).tolist() == pytest.approx(
+        [precision.quantum(v) for v in values.tolist()], rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("states", [1, 2, 3, 50])
+def test_energy_between_the_states_is_that_of_numpy_over_the_whole_record(states: int) -> None:
+    rng = np.random.default_rng(3)
+    time, energy = np.cumsum(rng.uniform(0.1, 1, states)), rng.normal(size=states)
+    found = history(energy, time)
+    for t in (*time, *rng.uniform(time[0], time[-1], 20)):
+        assert found.energy_at(float(t)) == np.interp(t, time, energy)
+    for outside in (time[0] - 0.01, time[-1] + 0.01):
+        with pytest.raises(RangeError, match="lies outside the record"):
+            found.energy_at(float(outside))

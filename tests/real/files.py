@@ -6,6 +6,7 @@ the clone.  Where it is absent, the tests in this folder are left out (``tests/a
 
 from __future__ import annotations
 
+import csv
 import os
 from pathlib import Path
 
@@ -22,3 +23,8 @@ def real(name: str) -> str:
 def content(name: str) -> bytes:
     """Content of a history."""
     return Path(real(f"histories/{name}")).read_bytes()
+
+
+def rows_of(table: str) -> list[dict[str, str]]:
+    """Rows of a table of expected numbers beside this file."""
+    return list(csv.DictReader(Path(__file__).with_name(f"{table}.csv").read_text("utf-8").splitlines()))

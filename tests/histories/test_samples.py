@@ -1,4 +1,4 @@
-"""Crossings and extrema of sampled energies: conventions, exactness, and what shifting and scaling must not change."""
+"""Where a curve crosses a level or turns, and its outline with fewer points."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.histories.samples import find_crossings, find_extrema
+from d2rpick.histories.samples import find_crossings, find_extrema, outline
 
 # small integers hit every coincidence: samples on the level, plateaus, touching
 levels = st.integers(-3, 3)
@@ -111,3 +111,22 @@ def test_a_straight_line_is_crossed_where_it_is(slope: float, offset: float) -> 
     time = np.linspace(0, 1, 11)
     (one,) = find_crossings(time, offset + slope * time, offset + 0.437 * slope)
     assert one.time == pytest.approx(0.437, abs=1e-12 + 1e-15 * abs(offset) / slope * 4)
+
+
+@given(st.integers(3, 3000), st.integers(0, 100), st.integers(1, 200))
+def test_an_outline_keeps_ends_and_extremes_and_stays_small(states: int, seed: int, stretches: int) -> None:
+    energy = np.random.default_rng(seed).standard_normal(states)
+    time, drawn = outline(np.arange(states, dtype=float), energy, stretches)
+    assert time.size <= min(states, 2 * stretches + 2)
+    assert (drawn.min(), drawn.max()) == (energy.min(), energy.max())
+    assert (time[0], time[-1]) == (0, states - 1)
+    assert np.all(np.diff(time) > 0)
+    assert np.all(energy[time.astype(int)] == drawn)
+
+
+@given(st.integers(10, 3000), st.integers(0, 100))
+def test_of_each_stretch_the_extremes_stay(states: int, seed: int) -> None:
+    energy = np.random.default_rng(seed).standard_normal(states)
+    time, _ = outline(np.arange(states, dtype=float), energy, 4)
+    for piece in np.array_split(np.arange(states), 4):
+        assert {piece[0] + energy[piece].argmin(), piece[0] + energy[piece].argmax()} <= {*time.astype(int).tolist()}
