@@ -107,9 +107,9 @@ class Suggestion(Answer):
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick suggest``, schema d2rpick/suggest/1."""
-        from d2rpick.report.suggestion import as_json
+        from d2rpick.report.suggestion import DOCUMENT
 
-        return as_json(self._core, self.command)
+        return DOCUMENT.as_json(self._core, self.command)
 
     def to_frame(self) -> pd.DataFrame:
         """Give the candidates as a table at full precision.
@@ -127,12 +127,10 @@ class Suggestion(Answer):
         >>> answer.to_frame().query("recommended")["tr"].round(6).tolist()
         [0.012885]
         """
-        from d2rpick.report.keys import CANDIDATE
+        from d2rpick.report.suggestion import CANDIDATE
 
         source = list(self.situation.history.source)
-        return frame_of(
-            self.to_dict()["candidates"], [*CANDIDATE, "parts"], td=self.td, basis=self.basis, source=source
-        )
+        return frame_of(self.to_dict()["candidates"], CANDIDATE.keys, td=self.td, basis=self.basis, source=source)
 
     def plot(self) -> Figure:
         """Draw the energy with its level at td, and the choice, as a matplotlib Figure."""
@@ -176,9 +174,9 @@ class Verdict(Answer):
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick verify``, schema d2rpick/verify/1."""
-        from d2rpick.report.verdict import as_json
+        from d2rpick.report.verdict import DOCUMENT
 
-        return as_json(self._core, self.command)
+        return DOCUMENT.as_json(self._core, self.command)
 
     def to_frame(self) -> pd.DataFrame:
         """Give the measures of the pair as a table of one row, with the columns of the csv; what is not known is NaN.
@@ -190,9 +188,9 @@ class Verdict(Answer):
         >>> verdict.to_frame()["verified"].tolist()
         [True]
         """
-        from d2rpick.report.verdict import row
+        from d2rpick.report.verdict import measures
 
-        found = row(self._core)
+        found = measures(self._core)
         return frame_of([found], list(found), basis=self.basis, source=list(self.situation.history.source))
 
     def plot(self) -> Figure:

@@ -42,9 +42,9 @@ class Calibration(Document):
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick calibrate``, schema d2rpick/calibrate/1."""
-        from d2rpick.report.calibration import as_json
+        from d2rpick.report.calibration import DOCUMENT
 
-        return as_json(self._core, self.command)
+        return DOCUMENT.as_json(self._core, self.command)
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per formulation: its weight, what was measured with OpenRadioss, whether the runs tell it.

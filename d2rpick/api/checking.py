@@ -41,11 +41,9 @@ class Findings(Document):
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick check``, schema d2rpick/check/1; paths relative to the working folder."""
-        from d2rpick.report.findings import Checks, as_json
-        from d2rpick.report.keys import of_warnings
+        from d2rpick.report.findings import DOCUMENT, Checks
 
-        checks = Checks(self._checked, warnings=of_warnings(self.warnings), history=self._history)
-        return as_json(checks, self.command)
+        return DOCUMENT.as_json(Checks(self._checked, cautions=self.warnings, history=self._history), self.command)
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per finding, a column per key of ``findings`` in the JSON.
@@ -57,8 +55,9 @@ class Findings(Document):
         >>> d2.check("sample_data/switching.k", history=history).to_frame()["rule"].tolist()
         ['D2R202', 'D2R203']
         """
-        keys = ("rule", "severity", "message", "file", "line", "column", "deck")
-        return frame_of(self.to_dict()["findings"], keys, decks=list(self.decks))
+        from d2rpick.report.findings import FINDING
+
+        return frame_of(self.to_dict()["findings"], FINDING.keys, decks=list(self.decks))
 
 
 def check(

@@ -52,9 +52,9 @@ class Exploration(Document):
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick explore``, schema d2rpick/explore/1."""
-        from d2rpick.report.trade_off import as_json
+        from d2rpick.report.trade_off import DOCUMENT
 
-        return as_json(self._core, self.command)
+        return DOCUMENT.as_json(self._core, self.command)
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per td, a column per single value of ``offers`` in the JSON; what is not known is NaN.

@@ -44,9 +44,9 @@ class PartTable(Document):
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick parts``, schema d2rpick/parts/1."""
-        from d2rpick.report.parts import as_json
+        from d2rpick.report.parts import DOCUMENT
 
-        return as_json(self._core, self.command)
+        return DOCUMENT.as_json(self._core, self.command)
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per part.
@@ -59,15 +59,15 @@ class PartTable(Document):
         >>> d2.parts(d2.read("sample_data/rollover_box.matsum")).to_frame()["verdict"].tolist()
         ['unknown', 'unknown']
         """
-        from d2rpick.report.parts import PART, part
+        from d2rpick.report.parts import PART
 
-        return frame_of([part(row) for row in self.rows], PART, source=list(self.run.sources))
+        return frame_of(list(map(PART.plain, self.rows)), PART.keys, source=list(self.run.sources))
 
     def sets_frame(self) -> pd.DataFrame:
         """Give a row per set; the columns are the keys of ``sets`` in the JSON."""
-        from d2rpick.report.parts import SET, set_
+        from d2rpick.report.parts import SET
 
-        return frame_of([set_(one) for one in self.sets], SET, source=list(self.run.sources))
+        return frame_of(list(map(SET.plain, self.sets)), SET.keys, source=list(self.run.sources))
 
     def report(self, path: arguments.Path) -> Path:
         """Write everything to one HTML page that needs no network; an existing file is replaced."""

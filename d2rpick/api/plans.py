@@ -52,9 +52,9 @@ class Plan(Document):
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick plan``, schema d2rpick/plan/1."""
-        from d2rpick.report.plan import as_json
+        from d2rpick.report.plan import DOCUMENT
 
-        return as_json(self._core, self.command)
+        return DOCUMENT.as_json(self._core, self.command)
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per flight, a column per key of ``windows`` in the JSON; what is not known is NaN.
@@ -67,7 +67,7 @@ class Plan(Document):
         """
         from d2rpick.report.plan import WINDOW
 
-        return frame_of(self.to_dict()["windows"], WINDOW, source=list(self._core.history.source))
+        return frame_of(self.to_dict()["windows"], WINDOW.keys, source=list(self._core.history.source))
 
     def plot(self) -> Figure:
         """Draw the energy with the flights and the rigid windows, as a matplotlib Figure."""

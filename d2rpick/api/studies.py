@@ -44,9 +44,9 @@ class Study(Document):
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick study``, schema d2rpick/study/1."""
-        from d2rpick.report.study import as_json
+        from d2rpick.report.study import DOCUMENT
 
-        return as_json(self._core, self.command)
+        return DOCUMENT.as_json(self._core, self.command)
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per run, a column per key of ``runs`` in the JSON; what is not known is NaN.
@@ -59,7 +59,7 @@ class Study(Document):
         """
         from d2rpick.report.study import RUN
 
-        return frame_of(self.to_dict()["runs"], RUN, td=self.td)
+        return frame_of(self.to_dict()["runs"], RUN.keys, td=self.td)
 
     def plot(self) -> Figure:
         """Draw the energies over each other, with every tr, as a matplotlib Figure."""

@@ -50,7 +50,7 @@ class Planned:
 
     ``status``: "supported" by this reference, "re-plan" from a switched run, "done", or "left-out"; ``reason`` says
     why for all but the first.  ``answer`` is what ``suggest`` says for this flight, None where it was not asked.
-    ``done`` is what became of a window that is done.
+    ``done`` is what became of a window that is done; ``record`` is the length of the record.
     """
 
     number: int
@@ -58,6 +58,7 @@ class Planned:
     start: float
     end: float
     margin: Margin
+    record: float
     status: str
     reason: str | None = None
     answer: Suggestion | None = None
@@ -75,6 +76,11 @@ class Planned:
     def rigid_time(self) -> float | None:
         """Length of the window [time]."""
         return self.window[1] - self.window[0] if self.window else None
+
+    @property
+    def rigid_fraction(self) -> float | None:
+        """Share of the record in which the parts are rigid by the window [-]."""
+        return None if self.rigid_time is None else self.rigid_time / self.record
 
     @property
     def candidate(self) -> Candidate | None:
@@ -211,12 +217,13 @@ def _rows(
 ) -> Iterator[Planned]:
     """Give every flight with its window, as if each were the first."""
     last = max((one.td for one in known), default=None)
+    record = float(reference.history.time[-1] - reference.history.time[0])
     landed: float | None = None  # of the flight before
     for number, seen in enumerate(flights, start=1):
         flight = _given(reference.history, seen, settings.after)
         start, end = bounds(reference.history, flight)
         margin = margin_before_contact(reference.history, flight, settings.margin)
-        row = Planned(number, flight, start, end, margin, "left-out")
+        row = Planned(number, flight, start, end, margin, record, "left-out")
         within = [one for one in known if one.flight == seen]
         if within:
             for one in within:

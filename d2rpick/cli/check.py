@@ -71,8 +71,8 @@ def command(
         tell(f"d2rpick: {one.reason}")
     limit = Severity(fail_on)
     if results or output_format != "table":
-        checks = Checks(results, failed=failed, warnings=_warnings(cautions, failed), fail_on=limit,
-                        history=judge.run.sources if judge else None)  # fmt: skip
+        history = judge.run.sources if judge else None
+        checks = Checks(results, failed=failed, cautions=cautions, fail_on=limit, history=history)
         text = write("findings", output_format, checks, Shown(ctx.meta["d2rpick.command"]))
         output.result(in_words(text, output_format))
     if not results or any(one.code == INTERNAL_ERROR for one in failed):
@@ -156,12 +156,6 @@ def _cautions(results: Sequence[Checked], judge: HistoryJudge | None) -> list[Ca
 
     remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
     return [*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)]
-
-
-def _warnings(cautions: Sequence[Caution], failed: Sequence[Unreadable]) -> list[dict[str, str]]:
-    from d2rpick.report.keys import of_warnings
-
-    return of_warnings(cautions) + [{"code": one.code, "message": one.reason} for one in failed]
 
 
 def _ids(texts: Sequence[str]) -> tuple[str, ...]:

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.choice.cost import MEASURED
 from d2rpick.choice.weights_file import written
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.version import __version__
+from d2rpick.report.fields import NUMBER, SOME, TEXT, TEXTS, Document, Field, each, many, row
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from d2rpick.choice.calibration import Calibration
 
-    from d2rpick.choice.calibration import Calibration, Observation
-
-SCHEMA = "d2rpick/calibrate/1"
+_LEG: Final = row(
+    Field("name", TEXT),
+    Field("counts", each(NUMBER)),
+    Field("rigid_nodes", NUMBER),
+    Field("step_time", NUMBER, get=lambda leg: leg.total),
+    Field("element_time", SOME, get=lambda leg: leg.elements),
+)
+DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; times in us per cycle.", row(
+    keys.WARNINGS,
+    Field("element_share", NUMBER, "share of the elements in a deformable step",
+          lambda ours: ours.weights.element_share),
+    Field("rigid_node", NUMBER, "cost of a node of a rigid body", lambda ours: ours.weights.rigid_node),
+    Field("per_element", each(NUMBER), "cost of an element by formulation", lambda ours: ours.weights.per_element),
+    Field("told", TEXTS, "what the legs decide; the others keep the measured ratio"),
+    Field("misfit", NUMBER),
+    Field("legs", many(_LEG), get=lambda ours: ours.observations),
+), closed=True)  # fmt: skip
 HEAD = ("formulation", "weight", "measured with OpenRadioss", "by")
 COLUMNS = ("formulation", "weight", "measured", "told")
 LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
@@ -47,34 +61,6 @@ def as_csv(found: Calibration) -> str:
 def as_toml(found: Calibration) -> str:
     """The file that ``--weights`` reads."""
     return written(found.weights)
-
-
-def as_json(found: Calibration, command: Sequence[str]) -> str:
-    """Everything by schema d2rpick/calibrate/1; times in us per cycle."""
-    return tables.as_json(
-        {
-            "schema": SCHEMA,
-            "tool_version": __version__,
-            "command": list(command),
-            "warnings": keys.of_warnings(found.cautions),
-            "element_share": found.weights.element_share,
-            "rigid_node": found.weights.rigid_node,
-            "per_element": dict(found.weights.per_element),
-            "told": list(found.told),
-            "misfit": found.misfit,
-            "legs": [_leg(one) for one in found.observations],
-        }
-    )
-
-
-def _leg(one: Observation) -> dict[str, Any]:
-    return {
-        "name": one.name,
-        "counts": dict(one.counts),
-        "rigid_nodes": one.rigid_nodes,
-        "step_time": one.total,
-        "element_time": one.elements,
-    }
 
 
 def plain_rows(found: Calibration) -> list[list[tables.Cell]]:

@@ -12,20 +12,21 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
+from d2rpick.choice.warnings import Caution
 from d2rpick.deck.source import STDIN
 from d2rpick.errors import name_units, printable
-from d2rpick.report import tables
+from d2rpick.report import keys, tables
+from d2rpick.report.fields import INTEGER, NUMBER, SOME, TEXT, TEXTS, Document, Field, many, maybe, one_of, row
 from d2rpick.rules import RULES, Example, Severity
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.deck import Window
-    from d2rpick.rules import Checked, Finding, Rule, Unreadable
+    from d2rpick.rules import Checked, Rule, Unreadable
 
 
-SCHEMA: Final = "d2rpick/check/1"
 SARIF_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
 _GITHUB: Final = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
 _SARIF: Final = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}
@@ -36,16 +37,37 @@ _NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010f
 class Checks:
     """What was found in several decks; paths are shown relative to ``root`` where they lie below it.
 
-    ``failed`` are decks that could not be read, ``warnings`` have code and message.  ``history`` are the files by which
+    ``failed`` are decks that could not be read, ``history`` are the files by which
     the windows were judged, None without any; findings lighter than ``fail_on`` are no failures.
     """
 
     results: Sequence[Checked]
     root: Path = field(default_factory=Path.cwd)
     failed: Sequence[Unreadable] = ()
-    warnings: Sequence[Mapping[str, str]] = ()
+    cautions: Sequence[Caution] = ()
     history: Sequence[str] | None = None
     fail_on: Severity = Severity.ERROR
+
+
+_LINE: Final = INTEGER.within(minimum=1)
+_COUNTS: Final = ("errors", "warnings", "infos", "decks")
+FINDING: Final = row(
+    Field("rule", TEXT.within(pattern="^D2R[0-9]{3}$")),
+    Field("severity", one_of(*map(str, Severity)), get=lambda finding: str(finding["severity"])),
+    Field("message", TEXT),
+    Field("file", TEXT),
+    Field("line", _LINE),
+    Field("column", _LINE),
+    Field("deck", TEXT),
+)
+_WINDOW: Final = row(
+    *(Field(key, maybe(INTEGER)) for key in ("part", "part_set", "node")),
+    Field("tr", NUMBER),
+    Field("td", SOME),
+    Field("file", TEXT),
+    Field("line", _LINE),
+    Field("deck", TEXT),
+)
 
 
 def as_table(checks: Checks) -> str:
@@ -66,30 +88,9 @@ def as_table(checks: Checks) -> str:
     return "\n".join([*map(printable, lines), "", _summary_line(checks.results) + left_out])
 
 
-def as_json(checks: Checks, command: Sequence[str]) -> str:
-    """Give everything by schema d2rpick/check/1."""
-    return tables.as_json(_content(checks, command))
-
-
 def as_ndjson(checks: Checks, command: Sequence[str]) -> str:
-    """Give a line for each deck, by the same schema as ``as_json``."""
-    contents = (_content(replace(checks, results=[result]), command) for result in checks.results)
-    return "\n".join(map(tables.as_line, contents))
-
-
-def _content(checks: Checks, command: Sequence[str]) -> dict[str, Any]:
-    results, root, history = checks.results, checks.root, checks.history
-    return {
-        "schema": SCHEMA,
-        "tool_version": __version__,
-        "command": list(command),
-        "warnings": [dict(warning) for warning in checks.warnings],
-        "decks": [_shown(result.deck, root) for result in results],
-        "history": None if history is None else [_shown(name, root) for name in history],
-        "windows": [_window(result, window, root) for result in results for window in result.windows],
-        "findings": [_finding(finding, root) for result in results for finding in result.findings],
-        "summary": {**_counts(results), "decks": len(results)},
-    }
+    """Give a line for each deck, by the same schema as the JSON of all."""
+    return "\n".join(DOCUMENT.as_line(replace(checks, results=[result]), command) for result in checks.results)
 
 
 def as_github(checks: Checks) -> str:
@@ -204,30 +205,47 @@ def _window_lines(windows: Sequence[Window], root: Path) -> Iterator[str]:
         yield f"{names}: rigid from {first.tr:g} to {until} ({_shown(card.file, root)}:{card.line})"
 
 
-def _window(result: Checked, window: Window, root: Path) -> dict[str, Any]:
-    card = window.opened.by.card
-    return {
-        "part": window.part,
-        "part_set": window.unit.id if window.unit.is_set else None,
-        "node": window.unit.id if window.unit.is_body else None,
-        "tr": window.tr,
-        "td": window.td,
-        "file": _shown(card.file, root),
-        "line": card.line,
-        "deck": _shown(result.deck, root),
-    }
+def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
+    for result in checks.results:
+        for window in result.windows:
+            card, unit = window.opened.by.card, window.unit
+            yield {
+                "part": window.part,
+                "part_set": unit.id if unit.is_set else None,
+                "node": unit.id if unit.is_body else None,
+                "tr": window.tr,
+                "td": window.td,
+                "file": _shown(card.file, checks.root),
+                "line": card.line,
+                "deck": _shown(result.deck, checks.root),
+            }
 
 
-def _finding(finding: Finding, root: Path) -> dict[str, Any]:
-    return {
-        "rule": finding.rule,
-        "severity": str(finding.severity),
-        "message": finding.message,
-        "file": _shown(finding.file, root),
-        "line": finding.line,
-        "column": finding.column,
-        "deck": _shown(finding.deck, root),
-    }
+def _findings(checks: Checks) -> Iterator[dict[str, Any]]:
+    for finding in (one for result in checks.results for one in result.findings):
+        shown = {"file": _shown(finding.file, checks.root), "deck": _shown(finding.deck, checks.root)}
+        yield {**vars(finding), **shown}
+
+
+def _warnings(checks: Checks) -> list[Caution]:
+    """Give what to be aware of, decks that could not be read among it."""
+    return [*checks.cautions, *(Caution(one.code, one.reason) for one in checks.failed)]
+
+
+DOCUMENT: Final = Document(
+    "d2rpick/check/1",
+    "Answer of d2rpick check; times in the unit of the deck, lines and columns from 1.",
+    row(
+        keys.WARNINGS._replace(get=_warnings),
+        Field("decks", TEXTS, get=lambda checks: [_shown(result.deck, checks.root) for result in checks.results]),
+        Field("history", maybe(TEXTS),
+              get=lambda checks: checks.history and [_shown(name, checks.root) for name in checks.history]),
+        Field("windows", many(_WINDOW), get=_windows),
+        Field("findings", many(FINDING), get=_findings),
+        Field("summary", row(*(Field(key, INTEGER.within(minimum=0)) for key in _COUNTS)),
+              get=lambda checks: {**_counts(checks.results), "decks": len(checks.results)}),
+    ),
+)  # fmt: skip
 
 
 def _counts(results: Sequence[Checked]) -> dict[str, int]:

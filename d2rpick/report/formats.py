@@ -28,7 +28,7 @@ class Shown(NamedTuple):
 
 _PLAIN: Final[Mapping[str, Writer]] = {
     "table": lambda report, answer, _: report.as_table(answer),
-    "json": lambda report, answer, shown: report.as_json(answer, shown.command),
+    "json": lambda report, answer, shown: report.DOCUMENT.as_json(answer, shown.command),
     "csv": lambda report, answer, _: report.as_csv(answer),
     "markdown": lambda report, answer, _: report.as_markdown(answer),
 }
@@ -39,7 +39,7 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         **_PLAIN,
         "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
-        "ndjson": lambda report, answer, shown: report.as_ndjson(answer, shown.command),
+        "ndjson": lambda report, answer, shown: report.DOCUMENT.as_line(answer, shown.command),
         "value": lambda report, answer, _: report.as_value(answer),
     },
     "plan": {**_PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
@@ -54,7 +54,7 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
     "overview": _PLAIN,
     "study": {
         **_PLAIN,
-        "ndjson": lambda report, answer, shown: "\n".join([*shown.lines, report.as_last_line(answer, shown.command)]),
+        "ndjson": lambda report, answer, shown: "\n".join([*shown.lines, report.LAST.as_line(answer, shown.command)]),
     },
     "reproduction": {**_PLAIN, "csv": lambda report, answer, _: report.as_csv(answer.rows)},
     "rollover": {
@@ -64,7 +64,7 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
     },
     "findings": {
         "table": lambda report, answer, _: report.as_table(answer),
-        "json": lambda report, answer, shown: report.as_json(answer, shown.command),
+        "json": lambda report, answer, shown: report.DOCUMENT.as_json(answer, shown.command),
         "ndjson": lambda report, answer, shown: report.as_ndjson(answer, shown.command),
         "github": lambda report, answer, _: report.as_github(answer),
         "junit": lambda report, answer, _: report.as_junit(answer),

@@ -2,20 +2,64 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
+from d2rpick.report.fields import (
+    FLAG,
+    INTEGER,
+    NUMBER,
+    SOME,
+    SOME_TEXT,
+    TEXT,
+    TEXTS,
+    Document,
+    Field,
+    many,
+    maybe,
+    one_of,
+    row,
+)  # fmt: skip
 from d2rpick.report.situation import head, measures_of, spoken
-from d2rpick.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from d2rpick.choice.overview import Overview
     from d2rpick.flight.window import FreeFlight
 
-SCHEMA = "d2rpick/info/1"
+_EVIDENCE: Final = one_of("momentum", "contact-energy", "energy-balance", "oscillator", "energy")
+_FLIGHT: Final = row(
+    Field("start", NUMBER, get=lambda seen: seen[1].start),
+    Field("end", SOME, "null where the record ends in flight", lambda seen: seen[1].end if seen[1].end_seen else None),
+    Field("parts", maybe(many(keys.PART)), "that fly together, null for the whole model",
+          lambda seen: seen[1].parts or None),
+    Field("source", _EVIDENCE, get=lambda seen: seen[0]),
+)  # fmt: skip
+_PART: Final = row(
+    *keys.PART.of_part(lambda one: one.part),
+    Field("energy_max", SOME, "null where not written in every state"),
+)
+DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in the unit of the history.", row(
+    keys.WARNINGS,
+    Field("source", TEXTS.within(minItems=1)),
+    Field("format", TEXT, "formats of companions joined by ' + '"),
+    Field("version", TEXT, "of the solver, empty where no file names it"),
+    Field("title", TEXT),
+    Field("states", maybe(INTEGER.within(minimum=0)),
+          "null where several columns may be the time; then, and at 0, the times are null"),
+    Field("time_start", SOME), Field("time_end", SOME),
+    Field("time_unit", TEXT, "empty where no file names it"),
+    Field("sampling", maybe(row(*(Field(key, NUMBER.within(exclusiveMinimum=0)) for key in ("min", "median", "max")))),
+          "output intervals, null with a single state"),
+    Field("complete", FLAG, "false when the input ends within a state"),
+    Field("channels", TEXTS),
+    Field("parts", many(_PART)),
+    Field("flights", many(_FLIGHT), "windows of free flight, by the best evidence that the files hold"),
+    Field("should_write", SOME_TEXT,
+          "output of the solver that would show the flights for sure, null where the files have it"),
+    keys.HEALTH,
+    Field("notes", TEXTS),
+))  # fmt: skip
 _PARTS_HEAD = ("part", "title", "highest internal energy")
 # Keys of the JSON output with a single value.
 _PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "time_unit", "complete")
@@ -57,45 +101,6 @@ def as_csv(overview: Overview) -> str:
         "notes": "; ".join(overview.notes),
     }
     return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
-
-
-def as_json(overview: Overview, command: Sequence[str]) -> str:
-    """Everything by schema d2rpick/info/1."""
-    sampling = overview.sampling
-    return tables.as_json(
-        {
-            "schema": SCHEMA,
-            "tool_version": __version__,
-            "command": list(command),
-            "warnings": keys.of_warnings(overview.cautions),
-            "source": overview.source,
-            "format": overview.format,
-            "version": overview.version,
-            "title": overview.title,
-            "states": overview.states,
-            "time_start": overview.time_start,
-            "time_end": overview.time_end,
-            "time_unit": overview.time_unit,
-            "sampling": {"min": sampling.min, "median": sampling.median, "max": sampling.max} if sampling else None,
-            "complete": overview.complete,
-            "channels": overview.channels,
-            "parts": [
-                {"id": one.part.id, "title": one.part.title, "energy_max": one.energy_max} for one in overview.parts
-            ],
-            "flights": [
-                {
-                    "start": f.start,
-                    "end": f.end if f.end_seen else None,
-                    "parts": keys.of_parts(f.parts or None),
-                    "source": source,
-                }
-                for source, f in overview.flights
-            ],
-            "should_write": overview.should_write,
-            "health": keys.of_health(overview.health),
-            "notes": overview.notes,
-        }
-    )
 
 
 def _rows(overview: Overview) -> list[tuple[str, tables.Cell]]:

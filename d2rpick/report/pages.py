@@ -8,7 +8,6 @@ from d2rpick.choice.study_rows import runs_of
 from d2rpick.report import page, parts, plan, study, suggestion, trade_off, verdict
 from d2rpick.report.explorer import explorer
 from d2rpick.report.html import Markup, document, drawings, pairs, remarks, section, table, tag
-from d2rpick.report.keys import of_verdict
 from d2rpick.report.tables import known, measure, short
 
 if TYPE_CHECKING:
@@ -125,7 +124,9 @@ def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
     )
     yield page.front([card], remarks(answer.cautions, answer.reasons))
     yield from page.shown(_draw_verdict(answer), record)
-    measures = ((name.replace("_", " "), short(one)) for name, one in of_verdict(answer).items() if one is not None)
+    measures = (
+        (name.replace("_", " "), short(one)) for name, one in verdict.MEASURES.plain(answer).items() if one is not None
+    )
     yield section("Measures", pairs(measures))
     yield page.parts(candidate)
     if answer.switched:

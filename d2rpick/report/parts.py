@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 from math import isinf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.errors import in_rows, listing, printable
 from d2rpick.report import keys, tables
-from d2rpick.version import __version__
+from d2rpick.report.fields import (
+    FLAG,
+    INTEGER,
+    NUMBER,
+    SOME,
+    SOME_FLAG,
+    SOME_TEXT,
+    TEXT,
+    TEXTS,
+    Document,
+    Field,
+    csv_of,
+    each,
+    many,
+    maybe,
+    one_of,
+    row,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.part_evidence import InFlight
     from d2rpick.choice.sets_of_parts import Parts, PartSet
     from d2rpick.choice.switchable_parts import PartRow
 
-SCHEMA = "d2rpick/parts/1"
 HEAD = (
     "", "part", "title", "verdict", "elements", "formulation", "material", "mass", "energy", "scatter", "flies",
     "deforms", "cost", "step", "shares nodes with", "why",
@@ -33,18 +48,111 @@ TABLES = {
 }
 _WIDTH = 110  # of a table, as screens hold side by side with other things
 
-# Keys of a part in JSON, and columns of the csv.
-PART = (
-    "id", "title", "elements", "formulations", "material", "kind", "mass", "mass_source", "energy", "energy_change",
-    "energy_scatter", "flies", "deforms", "cost_share", "smallest_step", "step_source", "shares_nodes", "verdict",
-    "merge_with", "reasons",
+_COUNTS: Final = maybe(each(INTEGER))
+_IN_FLIGHT: Final = row(
+    Field("energy", SOME, "mean internal energy in the flight", lambda one: one.mean),
+    Field("energy_change", SOME, "at its end less at its start", lambda one: one.change),
+    Field("energy_scatter", SOME, "standard deviation over mean", lambda one: one.scatter),
+    Field("flies", SOME_FLAG, "whether the part flies with the rest"),
+    Field("deforms", SOME_FLAG, "whether its energy still scatters by a tenth of its mean or more"),
+)
+# What it does in flight is that of the longest.
+PART: Final = row(
+    *keys.PART.fields,
+    Field("elements", _COUNTS, "numbers by kind; null without a deck"),
+    Field("formulations", TEXTS),
+    Field("material", SOME_TEXT),
+    Field("kind", maybe(one_of("deformable", "rigid", "spring", "airbag", "void", "particles"))),
+    Field("mass", SOME),
+    Field("mass_source", maybe(one_of("history", "deck"))),
+    *_IN_FLIGHT.of_part(lambda part: part.flight),
+    Field("cost_share", SOME, "share of its elements in the cost of all elements"),
+    Field("smallest_step", SOME, "smallest stable time step"),
+    Field("step_source", maybe(one_of("deck", "glstat", "d3hsp"))),
+    Field("shares_nodes", maybe(many(INTEGER)), "parts that share nodes with it; null without a deck"),
+    Field("verdict", one_of("switch", "merge", "keep", "unknown")),
+    Field("merge_with", maybe(INTEGER)),
+    Field("reasons", TEXTS),
+)
+
+
+def _free(one: PartSet) -> bool | None:
+    """Tell whether nothing deformable keeps the step."""
+    return None if one.step_growth is None else isinf(one.step_growth)
+
+
+SET: Final = row(
+    Field("name", TEXT),
+    Field("recommended", FLAG),
+    Field("parts", many(INTEGER)),
+    Field("bodies", maybe(many(many(INTEGER))), "the rigid bodies that its parts make; null without a deck",
+          lambda one: one.bodies or None),
+    Field("elements", maybe(INTEGER), "elements that are rigid with it"),
+    Field("element_fraction", SOME),
+    Field("mass_fraction", SOME),
+    Field("cost_share", SOME, "share of a step that is saved while it is rigid"),
+    Field("step_growth", SOME, "how much the step may at least grow while it is rigid",
+          lambda one: None if _free(one) else one.step_growth),
+    Field("step_free", SOME_FLAG, "whether nothing deformable keeps the step", _free),
+    Field("tr", SOME, get=lambda one: one.window and one.window[0]),
+    Field("td", SOME, get=lambda one: one.window and one.window[1]),
+    Field("rigid_fraction", SOME),
+    Field("run_time_share", SOME),
+    Field("saving", SOME),
+    keys.CANDIDATE["position_error"]._replace(kind=SOME),
+    Field("position_limit", SOME),
+    Field("position_part", maybe(many(keys.PART)), get=lambda one: one.position_part and (one.position_part,)),
+    Field("position_body", maybe(many(INTEGER)),
+          "parts of the rigid body that is off, where there are several; else null",
+          lambda one: one.position_body or None),
+    keys.CANDIDATE["position_error_assumes"]._replace(key="position_assumes"),
+    Field("angle_error", SOME, "by how much the body is turned at td from where it should be [degrees]; null where the "
+          "parts do not tell"),
+    Field("reasons", TEXTS),
+    keys.CANDIDATE["position_error_is_lower_bound"]._replace(key="position_is_lower_bound"),
+    later=("position_is_lower_bound",),
 )  # fmt: skip
-SET = (
-    "name", "recommended", "parts", "bodies", "elements", "element_fraction", "mass_fraction", "cost_share",
-    "step_growth", "step_free", "tr", "td", "rigid_fraction", "run_time_share", "saving", "position_error",
-    "position_limit", "position_part", "position_body", "position_assumes", "angle_error", "reasons",
-    "position_is_lower_bound",
-)  # fmt: skip
+_HISTORY: Final = row(
+    Field("source", TEXTS, get=lambda run: run.sources),
+    Field("sha256", TEXTS, get=lambda run: [file.sha256() for file in run.files]),
+    Field("format", TEXT, get=lambda run: " + ".join(one.format for one in run.databases)),
+    Field("notes", TEXTS),
+)
+_DECK: Final = row(
+    *keys.FILES,
+    Field("solver", one_of("ls-dyna", "radioss")),
+    Field("parts", INTEGER, get=lambda deck: len(deck.parts)),
+    Field("elements", INTEGER, get=lambda deck: sum(sum(counts.values()) for counts in deck.counts.values())),
+    Field("complete", FLAG),
+    Field("notes", TEXTS),
+)
+_WEIGHTS: Final = row(
+    *keys.WEIGHTS, Field("element_share", NUMBER), Field("rigid_node", NUMBER), Field("per_element", each(NUMBER))
+)
+_FLIGHT: Final = row(Field("start", NUMBER), Field("end", NUMBER), Field("longest", FLAG))
+
+
+def _flights(found: Parts) -> list[dict[str, Any]]:
+    facts = found.facts
+    return [{"start": one[0], "end": one[1], "longest": at == facts.longest} for at, one in enumerate(facts.flights)]
+
+
+DOCUMENT: Final = Document(
+    "d2rpick/parts/1",
+    "Answer of d2rpick parts; times, masses and energies in the units of the history.",
+    row(
+        keys.WARNINGS,
+        Field("history", _HISTORY, get=lambda found: found.run),
+        Field("deck", maybe(_DECK), get=lambda found: found.inventory),
+        Field("weights", maybe(_WEIGHTS)),
+        Field("step_ratio", NUMBER, get=lambda found: found.settings.step_ratio),
+        Field("flights", many(_FLIGHT), get=_flights),
+        Field("parts", many(row(*PART.fields, Field("flights", many(_IN_FLIGHT)))), get=lambda found: found.rows),
+        Field("sets", many(SET)),
+        Field("recommended", maybe(row(Field("name", TEXT), Field("parts", many(INTEGER))))),
+    ),
+    closed=True,
+)
 _MOST_SHOWN = 6
 
 
@@ -85,120 +193,12 @@ def as_markdown(found: Parts) -> str:
 
 def as_csv(found: Parts) -> str:
     """A row per part, a column for each key of ``parts`` in the JSON output; lists separated by semicolons."""
-    body = ([_cell(value) for value in part(row).values()] for row in found.rows)
-    return tables.as_csv(PART, body).rstrip("\n")
-
-
-def as_json(found: Parts, command: Sequence[str]) -> str:
-    """Everything by schema d2rpick/parts/1."""
-    best, deck, weights = found.recommended, found.inventory, found.weights
-    return tables.as_json(
-        {
-            "schema": SCHEMA,
-            "tool_version": __version__,
-            "command": list(command),
-            "warnings": keys.of_warnings(found.cautions),
-            "history": {
-                "source": list(found.run.sources),
-                "sha256": [file.sha256() for file in found.run.files],
-                "format": " + ".join(one.format for one in found.run.databases),
-                "notes": list(found.run.notes),
-            },
-            "deck": None
-            if deck is None
-            else {
-                **keys.of_files(deck.files),
-                "solver": deck.solver,
-                "parts": len(deck.parts),
-                "elements": sum(sum(counts.values()) for counts in deck.counts.values()),
-                "complete": deck.complete,
-                "notes": list(deck.notes),
-            },
-            "weights": None
-            if weights is None
-            else {
-                **keys.of_weights(weights),
-                "element_share": weights.element_share,
-                "rigid_node": weights.rigid_node,
-                "per_element": dict(weights.per_element),
-            },
-            "step_ratio": found.settings.step_ratio,
-            "flights": [
-                {"start": start, "end": end, "longest": at == found.facts.longest}
-                for at, (start, end) in enumerate(found.facts.flights)
-            ],
-            "parts": [{**part(row), "flights": [in_flight(one) for one in row.flights]} for row in found.rows],
-            "sets": [set_(one) for one in found.sets],
-            "recommended": {"name": best.name, "parts": list(best.parts)} if best else None,
-        }
-    )
+    return csv_of(PART.keys, map(PART.plain, found.rows), ";")
 
 
 def as_value(found: Parts) -> str:
     """Numbers of the recommended set as ``--part`` takes them; nothing where there is none."""
     return ",".join(map(str, found.recommended.parts)) if found.recommended else ""
-
-
-def part(row: PartRow) -> dict[str, Any]:
-    """Keys of one part in JSON; what it does in flight is that of the longest."""
-    told = in_flight(row.flight) if row.flight else dict.fromkeys(_IN_FLIGHT)
-    return {
-        "id": row.id,
-        "title": row.title,
-        "elements": None if row.elements is None else dict(row.elements),
-        "formulations": list(row.formulations),
-        "material": row.material,
-        "kind": row.kind,
-        "mass": row.mass,
-        "mass_source": row.mass_source,
-        **told,
-        "cost_share": row.cost_share,
-        "smallest_step": row.smallest_step,
-        "step_source": row.step_source,
-        "shares_nodes": None if row.shares_nodes is None else list(row.shares_nodes),
-        "verdict": row.verdict,
-        "merge_with": row.merge_with,
-        "reasons": list(row.reasons),
-    }
-
-
-_IN_FLIGHT = ("energy", "energy_change", "energy_scatter", "flies", "deforms")
-
-
-def in_flight(one: InFlight) -> dict[str, Any]:
-    """Keys of a part in one flight."""
-    values = (one.mean, one.change, one.scatter, one.flies, one.deforms)
-    return dict(zip(_IN_FLIGHT, values, strict=True))
-
-
-def set_(one: PartSet) -> dict[str, Any]:
-    """Keys of one set in JSON."""
-    free = one.step_growth is not None and isinf(one.step_growth)
-    return {
-        "name": one.name,
-        "recommended": one.recommended,
-        "parts": list(one.parts),
-        "bodies": [list(body) for body in one.bodies] or None,
-        "elements": one.elements,
-        "element_fraction": one.element_fraction,
-        "mass_fraction": one.mass_fraction,
-        "cost_share": one.cost_share,
-        "step_growth": None if free else one.step_growth,
-        "step_free": None if one.step_growth is None else free,
-        "tr": one.window[0] if one.window else None,
-        "td": one.window[1] if one.window else None,
-        "rigid_fraction": one.rigid_fraction,
-        "run_time_share": one.run_time_share,
-        "saving": one.saving,
-        "position_error": one.position_error,
-        "position_limit": one.position_limit,
-        "position_part": keys.of_parts((one.position_part,)) if one.position_part else None,
-        "position_body": list(one.position_body) if one.position_body else None,
-        "position_assumes": one.position_assumes,
-        "angle_error": one.angle_error,
-        "reasons": list(one.reasons),
-        "position_is_lower_bound": one.position_is_lower_bound,
-    }
 
 
 def heading(found: Parts) -> list[str]:
@@ -330,9 +330,3 @@ def _percent(value: float | None) -> str | None:
 
 def _growth(value: float | None) -> str | None:
     return None if value is None else "free" if isinf(value) else f"{value:.2g}"
-
-
-def _cell(value: Any) -> tables.Cell:
-    if isinstance(value, dict):
-        return ";".join(f"{count} {kind}" for kind, count in value.items())
-    return ";".join(map(str, value)) if isinstance(value, list) else value

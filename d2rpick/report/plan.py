@@ -2,30 +2,94 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.errors import printable
-from d2rpick.report import tables
-from d2rpick.report.situation import frame_of, what_was_read
+from d2rpick.report import keys, tables
+from d2rpick.report.fields import (
+    FLAG,
+    INTEGER,
+    NUMBER,
+    SOME,
+    SOME_FLAG,
+    SOME_TEXT,
+    Document,
+    Field,
+    csv_of,
+    many,
+    maybe,
+    one_of,
+    row,
+)  # fmt: skip
+from d2rpick.report.situation import what_was_read
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable
 
     from d2rpick.choice.plan import Plan, Planned
+    from d2rpick.choice.situation import Situation
 
-SCHEMA = "d2rpick/plan/1"
 HEAD = (
     "", "flight", "from", "to", "margin", "tr", "td", "rigid", "of record", "run time", "error", "out of place",
     "quality", "status",
 )  # fmt: skip
 
-# Keys of a window in JSON, and columns of the csv.
-WINDOW = (
-    "flight", "flight_start", "flight_end", "flight_source", "certain", "status", "reason", "tr", "td", "rigid_time",
-    "rigid_fraction", "run_time_share", "locks_in", "basis", "kind", "level_error", "lock_in_error", "residual",
-    "kinetic_share", "margin", "margin_source", "landing_spread", "landing", "landing_planned", "position_error",
-    "position_error_part", "position_error_body", "position_error_assumes", "quality", "position_error_is_lower_bound",
+
+def _times(row: Planned, at: int) -> float | None:
+    return row.window[at] if row.window else None
+
+
+def _situation(row: Planned) -> Situation | None:
+    return row.answer.situation if row.answer and row.window else None
+
+
+def _margin(key: str) -> Callable[[Planned], Any]:
+    """Take what is known of the margin of a window that is not done."""
+    return lambda row: None if row.done else getattr(row.margin, key)
+
+
+_BEST: Final = row(*keys.CANDIDATE.of_part(lambda planned: planned.candidate))
+_POSITION: Final = ("position_error", "position_error_part", "position_error_body", "position_error_assumes")
+WINDOW: Final = row(
+    Field("flight", INTEGER.within(minimum=1), "number of the flight in the record, from 1", lambda row: row.number),
+    Field("flight_start", NUMBER, get=lambda row: row.start),
+    Field("flight_end", SOME, "the contact that ends it, null where the record ends in flight",
+          lambda row: row.flight.end),
+    Field("flight_source", SOME_TEXT, "what shows it", lambda row: row.flight.source),
+    Field("certain", FLAG, "whether more than the level of the energy shows it", lambda row: row.flight.certain),
+    Field("status", one_of("supported", "re-plan", "done", "left-out")),
+    Field("reason", SOME_TEXT, "why it is not supported, or what became of a window that is done"),
+    Field("tr", SOME, get=lambda row: _times(row, 0)),
+    Field("td", SOME, get=lambda row: _times(row, 1)),
+    Field("rigid_time", SOME),
+    Field("rigid_fraction", SOME, "of the record"),
+    _BEST["run_time_share"]._replace(
+        kind=SOME, meaning="of the reference, with this window alone; null without a cost share"),
+    Field("locks_in", SOME_FLAG, "whether the window locks in energy, so that landings after it move"),
+    Field("basis", maybe(keys.BASIS), get=lambda row: (now := _situation(row)) and now.basis),
+    _BEST["kind"]._replace(kind=maybe(keys.KIND)),
+    *(_BEST[key]._replace(kind=SOME) for key in ("level_error", "lock_in_error", "residual")),
+    Field("kinetic_share", SOME, get=lambda row: (now := _situation(row)) and now.kinetic_share),
+    Field("margin", SOME, "kept clear before the contact, null for a window that is done", _margin("time")),
+    Field("margin_source", maybe(one_of("given", "flight", "landing", "no-contact")),
+          "given, 3 % of the flight, or how far a switch may move the landing", _margin("source")),
+    Field("landing_spread", SOME, "how far a switch may move the landing, null where the files do not tell",
+          _margin("spread")),
+    Field("landing", SOME, "of a window that is done", lambda row: row.done and row.done.landing),
+    Field("landing_planned", SOME, "in the run that it was planned from", lambda row: row.done and row.done.planned),
+    *(_BEST[key] for key in _POSITION),
+    keys.QUALITY[0]._replace(meaning="of the pair; null without one, and for a window that is done"),
+    _BEST["position_error_is_lower_bound"],
+    closed=True, later=("position_error_is_lower_bound",),
 )  # fmt: skip
+DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in the unit of the history.", row(
+    *keys.FRAME,
+    Field("min_rigid", NUMBER, "shorter windows are left out"),
+    Field("windows", many(WINDOW), "a row per flight, in the order of time", lambda plan: plan.rows),
+    Field("rigid_time", NUMBER, "of all supported windows"),
+    Field("rigid_fraction", NUMBER, "of the record, with all supported windows"),
+    Field("run_time_share", SOME, "of the reference, with all supported windows; null without a cost share"),
+))  # fmt: skip
 
 
 def as_table(plan: Plan) -> str:
@@ -46,21 +110,7 @@ def as_markdown(plan: Plan) -> str:
 
 def as_csv(plan: Plan) -> str:
     """A row per flight, a column for each key of ``windows`` in the JSON output."""
-    return tables.as_csv(WINDOW, (list(window(plan, row).values()) for row in plan.rows)).rstrip("\n")
-
-
-def as_json(plan: Plan, command: Sequence[str]) -> str:
-    """The whole plan by schema d2rpick/plan/1."""
-    return tables.as_json(
-        {
-            **frame_of(plan.history, plan.settings, SCHEMA, command, plan.cautions),
-            "min_rigid": plan.min_rigid,
-            "windows": [window(plan, row) for row in plan.rows],
-            "rigid_time": plan.rigid_time,
-            "rigid_fraction": plan.rigid_fraction,
-            "run_time_share": plan.run_time_share,
-        }
-    )
+    return csv_of(WINDOW.keys, map(WINDOW.plain, plan.rows))
 
 
 def as_value(plan: Plan, *, every: bool = False) -> str:
@@ -69,45 +119,6 @@ def as_value(plan: Plan, *, every: bool = False) -> str:
     Those that are done, and the supported ones, or ``every`` new one; nothing where none is new.
     """
     return "\n".join(f"{tr!r} {td!r}" for tr, td in plan.next_run(every=every))
-
-
-def window(plan: Plan, row: Planned) -> dict[str, Any]:
-    """Keys of one flight and its window in JSON."""
-    best, times, done = row.candidate, row.window, row.done
-    situation = row.answer.situation if row.answer and times else None
-    span = float(plan.history.time[-1] - plan.history.time[0])
-    return {
-        "flight": row.number,
-        "flight_start": row.start,
-        "flight_end": row.flight.end,
-        "flight_source": row.flight.source,
-        "certain": row.flight.certain,
-        "status": row.status,
-        "reason": row.reason,
-        "tr": times[0] if times else None,
-        "td": times[1] if times else None,
-        "rigid_time": row.rigid_time,
-        "rigid_fraction": None if row.rigid_time is None else row.rigid_time / span,
-        "run_time_share": best.run_time_share if best else None,
-        "locks_in": row.locks_in,
-        "basis": situation.basis if situation else None,
-        "kind": best.kind if best else None,
-        "level_error": best.level_error if best else None,
-        "lock_in_error": best.lock_in_error if best else None,
-        "residual": best.residual if best else None,
-        "kinetic_share": situation.kinetic_share if situation else None,
-        "margin": None if done else row.margin.time,
-        "margin_source": None if done else row.margin.source,
-        "landing_spread": None if done else row.margin.spread,
-        "landing": done.landing if done else None,
-        "landing_planned": done.planned if done else None,
-        "position_error": best.position_error if best else None,
-        "position_error_part": best.position_error_part if best else None,
-        "position_error_body": best.position_error_body if best else None,
-        "position_error_assumes": best.position_error_assumes if best else None,
-        "quality": row.quality.grade if row.quality else None,
-        "position_error_is_lower_bound": best.position_error_is_lower_bound if best else None,
-    }
 
 
 def heading(plan: Plan) -> str:
@@ -156,7 +167,6 @@ def head(plan: Plan) -> list[str]:
 
 def rows(plan: Plan) -> list[list[tables.Cell]]:
     """Cells of all flights, below ``head``; those of supported windows have a star."""
-    span = float(plan.history.time[-1] - plan.history.time[0])
     return [
         [
             "*" if row.status == "supported" else " ",
@@ -167,7 +177,7 @@ def rows(plan: Plan) -> list[list[tables.Cell]]:
             row.window[0] if row.window else None,
             row.window[1] if row.window else None,
             row.rigid_time,
-            None if row.rigid_time is None else f"{row.rigid_time / span:.0%}",
+            None if row.rigid_fraction is None else f"{row.rigid_fraction:.0%}",
             *([] if plan.settings.cost_share is None else [_run_time(row)]),
             error(row),
             *([_place(row)] if _placed(plan) else []),

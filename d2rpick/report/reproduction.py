@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.models.published import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, pair_at_peak, residual
-from d2rpick.report import tables
+from d2rpick.report import keys, tables
+from d2rpick.report.fields import FLAG, INTEGER, NUMBER, SOME, SOME_FLAG, TEXT, TEXTS, Document, Field, Kind, many, row
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from d2rpick.models.published import PublishedValue
     from d2rpick.models.published_figures import Exhibit
 
-SCHEMA = "d2rpick/reproduce/2"
 MODEL = "k = 660e3 N/m, M = 31.4 kg, beta = 2, alpha = 50 1/s, V0 = 6 m/s"
 _DECIMALS = 12
 HEAD = ("quantity", "unit", "published", "reference", "here", "difference", "agrees", "source")
@@ -26,6 +26,43 @@ class Reproduction(NamedTuple):
     rows: Sequence[PublishedValue]
     exhibits: Sequence[Exhibit]
     files: Sequence[str] = ()
+
+
+_PAIR: Final = Kind(
+    row(*(Field(key, NUMBER) for key in ("tr", "td", "residual"))).schema,
+    lambda pair: {"tr": pair[0], "td": pair[1], "residual": residual(pair)},
+    "pair",
+)
+_ROW: Final = row(
+    Field("what", TEXT), Field("unit", TEXT),
+    Field("published", SOME, "what the paper states; null where it states none"),
+    Field("reference", SOME, "computed in another way, see source"),
+    Field("here", NUMBER),
+    Field("difference", NUMBER, "here less published, or less reference where nothing is published"),
+    Field("tolerance", NUMBER.within(minimum=0)),
+    Field("source", TEXT, "where the published number or the reference value is from"),
+    Field("agrees", FLAG, "the difference is within the tolerance"),
+)  # fmt: skip
+_FIGURE: Final = row(
+    Field("name", TEXT), Field("title", TEXT), Field("section", INTEGER.within(minimum=1, maximum=5)),
+    Field("figure", TEXT, "number in the paper"),
+    Field("paper", TEXT, "what the paper shows"),
+    Field("found", TEXT, "what is found here"),
+    Field("agrees", SOME_FLAG, "null where there is nothing to compare"),
+)  # fmt: skip
+DOCUMENT: Final = Document(
+    "d2rpick/reproduce/2",
+    "Published results of the floating oscillator beside those found here; times of pairs in seconds.",
+    row(
+        keys.WARNINGS._replace(get=lambda _: ()),
+        Field("rows", many(_ROW).within(minItems=1)),
+        Field("published", _PAIR, get=lambda _: PUBLISHED),
+        Field("better", _PAIR, get=lambda _: pair_at_peak()),
+        Field("figures", many(_FIGURE), get=lambda answer: answer.exhibits),
+        Field("misprints", TEXTS, get=lambda _: MISPRINTS),
+        Field("files", TEXTS),
+    ),
+)
 
 
 def as_table(answer: Reproduction) -> str:
@@ -62,39 +99,12 @@ def as_csv(rows: Sequence[PublishedValue]) -> str:
     return tables.as_csv(HEAD, body).rstrip("\n")
 
 
-def as_json(answer: Reproduction, command: Sequence[str]) -> str:
-    """Everything by schema d2rpick/reproduce/2."""
-    rows, exhibits, files = answer
-    keys = ("what", "unit", "published", "reference", "here", "difference", "tolerance", "source", "agrees")
-    return tables.as_json(
-        {
-            "schema": SCHEMA,
-            "tool_version": __version__,
-            "command": list(command),
-            "warnings": [],
-            "rows": [{key: getattr(row, key) for key in keys} for row in rows],
-            "published": _pair(PUBLISHED),
-            "better": _pair(pair_at_peak()),
-            "figures": [
-                {key: getattr(one, key) for key in ("name", "title", "section", "figure", "paper", "found", "agrees")}
-                for one in exhibits
-            ],
-            "misprints": list(MISPRINTS),
-            "files": list(files),
-        }
-    )
-
-
 def cells(row: PublishedValue) -> list[tables.Cell]:
     """Give a row in digits that are the same on every machine."""
     known = (None if value is None else f"{round(value, _DECIMALS):.12g}" for value in (row.published, row.reference))
     here = f"{round(row.here, _DECIMALS):.12g}"
     difference = "0" if abs(row.difference) < MOST_DIFFERENCE * abs(row.expected) else f"{row.difference:.1e}"
     return [row.what, row.unit, *known, here, difference, row.agrees, row.source]
-
-
-def _pair(pair: tuple[float, float]) -> dict[str, Any]:
-    return {"tr": pair[0], "td": pair[1], "residual": residual(pair)}
 
 
 def heading(exhibit: Exhibit) -> str:

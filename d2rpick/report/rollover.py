@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.models.box_run import BOX
-from d2rpick.report import tables
-from d2rpick.report.keys import of_warnings
-from d2rpick.version import __version__
+from d2rpick.report import keys, tables
+from d2rpick.report.fields import NUMBER, SOME, Document, Field, csv_of, many, row
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,10 +16,24 @@ if TYPE_CHECKING:
     from d2rpick.models.box_run import Record
     from d2rpick.models.box_scan import Outcome
 
-SCHEMA = "d2rpick/rollover/1"
-# Of each run, in JSON and as columns: written down, for these names are promised.
-_COLUMNS: Final = (
-    "tr", "energy", "energy_ratio", "roll_error", "x_error", "z_error", "omega_error", "lost_energy", "mean_ratio"
+# Of each run, in JSON and as columns.
+RUN: Final = row(*(Field(key, NUMBER) for key in (
+    "tr", "energy", "energy_ratio", "roll_error", "x_error", "z_error", "omega_error", "lost_energy", "mean_ratio",
+)), closed=True)  # fmt: skip
+DOCUMENT: Final = Document(
+    "d2rpick/rollover/1",
+    "Switched runs of the rollover box against the one without switching; SI units, roll_error in degrees.",
+    row(
+        keys.WARNINGS,
+        Field("released", SOME, "the sled pushed last", lambda scan: scan.reference.released),
+        Field("landed", SOME, "the ground pushed first; null where the run ends before",
+              lambda scan: scan.reference.landed),
+        Field("td", NUMBER, get=lambda scan: scan.answer.situation.td),
+        Field("energy_td", NUMBER, get=lambda scan: _energy(scan.reference, scan.answer.situation.td)),
+        Field("recommended", SOME, "the tr that suggest recommends", lambda scan: _recommended(scan.answer)),
+        Field("runs", many(RUN), get=lambda scan: scan.outcomes),
+        title="d2rpick rollover --scan",
+    ),
 )  # fmt: skip
 
 
@@ -43,7 +56,7 @@ def as_table(scan: Scan) -> str:
         f"td     {td:.6g} s: energy of the box {_energy(reference, td):.6g} J",
         "units  s, J, m, rad/s; roll_error in degrees",
         "",
-        tables.as_text(("", *_COLUMNS), rows),
+        tables.as_text(("", *RUN.keys), rows),
     ]
     chosen = next((one for one in outcomes if one.tr == recommended), None)
     if not chosen:
@@ -60,35 +73,12 @@ def as_table(scan: Scan) -> str:
 
 def as_markdown(outcomes: Sequence[Outcome]) -> str:
     """A row for each tr."""
-    return tables.as_markdown(_COLUMNS, [_short(one) for one in outcomes])
+    return tables.as_markdown(RUN.keys, [_short(one) for one in outcomes])
 
 
 def as_csv(outcomes: Sequence[Outcome]) -> str:
     """A row for each tr, at full precision."""
-    return tables.as_csv(_COLUMNS, [[*_of_outcome(one).values()] for one in outcomes]).rstrip("\n")
-
-
-def as_json(scan: Scan, command: Sequence[str]) -> str:
-    """Everything by schema d2rpick/rollover/1."""
-    reference, outcomes, answer, cautions = scan
-    return tables.as_json(
-        {
-            "schema": SCHEMA,
-            "tool_version": __version__,
-            "command": list(command),
-            "warnings": of_warnings(cautions),
-            "released": reference.released,
-            "landed": reference.landed,
-            "td": answer.situation.td,
-            "energy_td": _energy(reference, answer.situation.td),
-            "recommended": _recommended(answer),
-            "runs": [_of_outcome(one) for one in outcomes],
-        }
-    )
-
-
-def _of_outcome(one: Outcome) -> dict[str, float]:
-    return {key: getattr(one, key) for key in _COLUMNS}
+    return csv_of(RUN.keys, map(RUN.plain, outcomes))
 
 
 def _recommended(answer: Suggestion) -> float | None:
@@ -97,7 +87,7 @@ def _recommended(answer: Suggestion) -> float | None:
 
 def _short(one: Outcome) -> list[tables.Cell]:
     """Four digits are enough to read: runs differ in the second."""
-    return [float(f"{value:.4g}") for value in _of_outcome(one).values()]
+    return [float(f"{value:.4g}") for value in RUN.plain(one).values()]
 
 
 def _time(time: float | None) -> str:

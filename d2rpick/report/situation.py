@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice import health as limits
 from d2rpick.errors import listing, printable
 from d2rpick.flight.flight import MOST_WORK
-from d2rpick.report import keys
 from d2rpick.report.tables import measure
-from d2rpick.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
     from d2rpick.choice.health import Health
-    from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
-    from d2rpick.choice.warnings import Caution
     from d2rpick.histories.history import History
 
 
@@ -85,89 +79,6 @@ def _basis(situation: Situation) -> str:
     oscillator = f"oscillator, {source}" if count == 1 else f"oscillator of {count} modes, {source}"
     front = f"{parts}; " if parts else ""
     return f"{front}{oscillator}: {', '.join(facts)}; tr and energies are refined on it"
-
-
-def frame(situation: Situation, schema: str, command: Sequence[str], cautions: Iterable[Caution]) -> dict[str, Any]:
-    """Keys that every JSON result begins with, and the history, deck and weights it rests on."""
-    return frame_of(situation.history, situation.settings, schema, command, cautions)
-
-
-def frame_of(
-    history: History, settings: Settings, schema: str, command: Sequence[str], cautions: Iterable[Caution]
-) -> dict[str, Any]:
-    """Give the same keys where no td is looked at."""
-    used = settings.by_deck
-    return {
-        "schema": schema,
-        "tool_version": __version__,
-        "command": list(command),
-        "warnings": keys.of_warnings(cautions),
-        "history": {
-            "source": list(history.source),
-            "sha256": [file.sha256() for file in history.files],
-            "format": history.format,
-            "channel": history.channel,
-            "parts": keys.of_parts(history.parts),
-            "states": int(history.time.size),
-            "time_start": float(history.time[0]),
-            "time_end": float(history.time[-1]),
-            "complete": history.complete,
-            "notes": list(history.notes),
-        },
-        "deck": keys.of_files(used.files) if used else None,
-        "weights": keys.of_weights(used.weights) if used and used.weights else None,
-    }
-
-
-def mechanics(situation: Situation) -> dict[str, Any]:
-    """Keys of JSON results that describe the situation at td."""
-    flight, parts = situation.flight, situation.evidence.parts
-    return {
-        "energy_td": situation.energy_td,
-        "kinetic_share": situation.kinetic_share,
-        "kinetic_share_estimated": situation.vibration.estimated is not None,
-        "basis": situation.basis,
-        "flight": {
-            "start": flight.start,
-            "end": flight.end,
-            "source": flight.source,
-            "certain": flight.certain,
-            "parts": keys.of_parts(flight.parts),
-        },
-        "oscillator": _oscillator(situation),
-        "modes": _modes(situation),
-        "unsigned_parts": keys.of_unsigned(parts.unsigned) if parts else None,
-    }
-
-
-def _oscillator(situation: Situation) -> dict[str, Any] | None:
-    """Give the one oscillator that was fitted, or null; where several describe the record, that one does not."""
-    fit = situation.evidence.fit
-    if fit is None:
-        return None
-    several = fit.mode is not None and len(fit.mode.modes) > 1
-    mode = None if several else fit.mode
-    return {
-        "omega": mode.omega if mode else None,
-        "alpha": mode.alpha if mode else None,
-        "energy_plastic": mode.energy_plastic if mode else None,
-        "preload": mode.preload if mode else None,
-        "misfit": fit.misfit,
-        "source": "given" if situation.settings.oscillator else "identified",
-        "describes_record": fit.describes_record and not several,
-        "reason": "several modes describe the record" if several else fit.reason,
-    }
-
-
-def _modes(situation: Situation) -> list[dict[str, float]] | None:
-    """Give the modes whose sum describes the record, or null where one or none does."""
-    modes = situation.vibration.whole.mode.modes if situation.vibration.whole.mode else ()
-    if len(modes) < 2:
-        return None
-    return [
-        {"omega": one.omega, "alpha": one.alpha, "vibration_energy_td": float(one.vibration_energy(situation.td))}
-        for one in modes
-    ]
 
 
 def head(health: Health) -> tuple[str, ...]:

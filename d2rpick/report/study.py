@@ -2,25 +2,108 @@
 
 from __future__ import annotations
 
-import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.study_rows import PLAIN, runs_of
+from d2rpick.choice.study_rows import runs_of
 from d2rpick.errors import printable
 from d2rpick.histories.digits import window_as_read
-from d2rpick.report import tables
-from d2rpick.report.keys import of_warnings
-from d2rpick.version import __version__
+from d2rpick.report import keys, tables
+from d2rpick.report.fields import (
+    INTEGER,
+    NOTHING,
+    NUMBER,
+    SOME,
+    SOME_FLAG,
+    SOME_TEXT,
+    SPAN,
+    TEXT,
+    TEXTS,
+    Document,
+    Field,
+    csv_of,
+    many,
+    maybe,
+    one_of,
+    row,
+)  # fmt: skip
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from d2rpick.choice.study import Study
     from d2rpick.choice.study_rows import StudyRow
 
-SCHEMA = "d2rpick/study/1"
-# Keys of a run in JSON, and columns of the csv.
-RUN = (*PLAIN, "common_error")
+STATUS: Final = one_of("ok", "none", "unreadable", "out-of-range", "failed", "internal-error")
+# What a run has where it is of status ok, and otherwise.
+_JUDGED: Final[dict[str, Any]] = {
+    "description": "One run; null where nothing can be said.",
+    "if": {"properties": {"status": {"const": "ok"}}},
+    "then": {"properties": {**dict.fromkeys(("tr", "tr_low", "tr_high", "energy_td"), NUMBER), "message": NOTHING}},
+    "else": {"properties": {"tr": NOTHING, "message": TEXT}},
+}
+PLAIN: Final = row(
+    Field("source", TEXT),
+    Field("tr", SOME), Field("tr_low", SOME), Field("tr_high", SOME),
+    Field("energy_td", SOME),
+    Field("residual", SOME),
+    Field("status", STATUS),
+    Field("message", SOME_TEXT),
+    Field("basis", maybe(keys.BASIS)),
+    Field("warnings", TEXTS),
+    Field("time_unit", TEXT),
+    Field("td", SOME, "when this run is switched back"),
+)  # fmt: skip
+_ERROR: Final = Field(
+    "common_error", SOME,
+    "error at the common tr: the residual, on basis energy the level error, 0 where nothing vibrates; in -f ndjson "
+    "common_errors of the last line",
+    lambda one: one[1],
+)  # fmt: skip
+# A run in JSON, and a row of the csv; of a run and its error at the common tr.
+RUN: Final = row(*PLAIN.of_part(lambda one: one[0]), _ERROR, **_JUDGED)
+_RUN: Final = row(*RUN.fields, name="run", later=("common_error",), **_JUDGED)
+_SHARED: Final = row(
+    keys.WARNINGS,
+    Field("td", SOME, "null where each run has its own"),
+    Field("td_window", maybe(SPAN), "where each run chose its td"),
+    Field("tr", row(Field("min", SOME), Field("median", SOME), Field("max", SOME)), "Of the runs that have one.",
+          lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
+    Field("agree", SOME_FLAG, "Whether the intervals tr_low to tr_high of these runs have a time in common."),
+    Field("common_tr", SOME,
+          "The earliest tr that is acceptable in every run of status ok or none and within the timing tolerance of "
+          "each, where there is one.", lambda answer: answer.common.tr),
+    Field("common_window", maybe(SPAN), "First and last tr around it that are.", lambda answer: answer.common.window),
+    Field("common_reason", SOME_TEXT, "Why there is no common_tr.", lambda answer: answer.common.reason),
+    Field("common_keeps_timing_tolerance", SOME_FLAG,
+          "Whether no error at common_tr is more than 0.05 above that at the tr of the run; null without common_tr.",
+          lambda answer: answer.common.keeps_tolerance),
+    Field("common_errors", many(SOME), "Errors of the runs at common_tr, in their order; empty without it.",
+          lambda answer: answer.common.errors),
+)  # fmt: skip
+_RUNS: Final = Field("runs", many(RUN), get=lambda answer: list(with_errors(answer)))
+_MEANING: Final = (
+    "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line by $defs/line, the "
+    "last line is by $defs/last."
+)
+# Newline-delimited JSON: a line for each run, as `d2rpick.api.resume_file` writes it, and what follows them.
+_CURVE: Final = many(many(NUMBER)).within(minItems=2, maxItems=2)
+_LINE: Final = row(
+    *RUN.fields,
+    Field("acceptable", many(many(SPAN)),
+          "Windows of acceptable tr, and those in which the error is at most 0.05 above that of tr."),
+    Field("files", many(row(Field("name", TEXT), Field("size", INTEGER), Field("mtime_ns", INTEGER)))),
+    Field("asked", TEXT, "Stands for the options and the version."),
+    Field("curve", _CURVE, "Times and energies of an outline of the record, for a figure."),
+    Field("profile", maybe(_CURVE), "Times and errors of acceptable tr, straight lines between them."),
+    name="line", later=("common_error", "curve"), **_JUDGED,
+)  # fmt: skip
+LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
+DOCUMENT: Final = Document(
+    LAST.name,
+    _MEANING,
+    row(*_SHARED.fields[:3], _RUNS, *_SHARED.fields[3:]),
+    also=(_RUN, _LINE, row(*LAST.whole.fields, name="last")),
+)
 HEAD = ("run", "tr", "+-", "td", "E(td)", "R", "at common", "basis", "status", "message")
 
 
@@ -39,26 +122,11 @@ def as_markdown(answer: Study) -> str:
 
 def as_csv(answer: Study) -> str:
     """One row per run, a column for each key of the JSON output."""
-    cells = ([_joined(value) for value in one.values()] for one in runs(answer))
-    return tables.as_csv(RUN, cells).rstrip("\n")
+    return csv_of(RUN.keys, map(RUN.plain, with_errors(answer)))
 
 
-def as_json(answer: Study, command: Sequence[str]) -> str:
-    """The whole answer by schema d2rpick/study/1."""
-    return tables.as_json({**_front(answer, command), "runs": runs(answer), **_shared(answer)})
-
-
-def as_last_line(answer: Study, command: Sequence[str]) -> str:
-    """The JSON output without the runs, in one line: what follows their lines."""
-    return json.dumps({**_front(answer, command), **_shared(answer)}, allow_nan=False)
-
-
-def runs(answer: Study) -> list[dict[str, Any]]:
-    """Values of each run by their keys in JSON, with its error at the common tr."""
-    return [row.plain | {"common_error": error} for row, error in _with_errors(answer)]
-
-
-def _with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
+def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
+    """Give the runs, each with its error at the common tr."""
     return zip(answer.rows, answer.common.errors or [None] * len(answer.rows), strict=True)
 
 
@@ -77,7 +145,7 @@ def rows(answer: Study) -> list[list[tables.Cell]]:
             row.status,
             row.message or ", ".join(row.warnings),
         ]
-        for row, error in _with_errors(answer)
+        for row, error in with_errors(answer)
     ]
 
 
@@ -106,32 +174,3 @@ def td_of(answer: Study) -> str:
     if answer.td_window:
         return "of each run in {:.6g} to {:.6g}".format(*answer.td_window)
     return f"{answer.td:.6g}"
-
-
-def _front(answer: Study, command: Sequence[str]) -> dict[str, Any]:
-    return {
-        "schema": SCHEMA,
-        "tool_version": __version__,
-        "command": list(command),
-        "warnings": of_warnings(answer.cautions),
-        "td": answer.td,
-        "td_window": answer.td_window,
-    }
-
-
-def _shared(answer: Study) -> dict[str, Any]:
-    spread, common = answer.spread, answer.common
-    return {
-        "tr": dict(zip(("min", "median", "max"), spread or (None, None, None), strict=True)),
-        "agree": answer.agree,
-        "common_tr": common.tr,
-        "common_window": common.window,
-        "common_reason": common.reason,
-        "common_keeps_timing_tolerance": common.keeps_tolerance,
-        "common_errors": list(common.errors),
-    }
-
-
-def _joined(value: Any) -> tables.Cell:
-    cell: tables.Cell = "; ".join(value) if isinstance(value, tuple) else value
-    return cell

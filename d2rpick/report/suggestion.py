@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.choice.candidates import MUCH_HIGHER
 from d2rpick.errors import name_units, printable
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
-from d2rpick.report.situation import frame, heading, mechanics
+from d2rpick.report.fields import FLAG, NUMBER, SPAN, Document, Field, csv_of, many, maybe, row
+from d2rpick.report.situation import heading
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,9 +18,39 @@ if TYPE_CHECKING:
     from d2rpick.choice.ranking import Quality
     from d2rpick.choice.suggest import AcceptableWindow, Pair, Suggestion
 
-SCHEMA = "d2rpick/suggest/1"
 # Windows of acceptable tr that a line names.
 _NAMED = 4
+_WINDOW: Final = row(*keys.WINDOW.fields, Field("recommended", FLAG, "holds the recommended tr"))
+CANDIDATE: Final = row(*keys.CANDIDATE.fields, keys.MATCHES, name="candidate", later=(*keys.LATER, "parts"))
+
+
+def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
+    """Give the windows of acceptable tr, and which of them holds the recommended one."""
+    tr = answer.recommended.tr if answer.recommended else None
+    windows = answer.windows
+    return None if windows is None else [{**one._asdict(), "recommended": holds(one, tr)} for one in windows]
+
+
+DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
+    *keys.FRAME,
+    Field("td", NUMBER, get=lambda answer: answer.situation.td),
+    Field("td_window", maybe(SPAN),
+          "where td was chosen: --td-window, or the longest flight; null where it was given"),
+    Field("longer_pair", maybe(keys.PAIR),
+          "the longest acceptable pair in td_window, where much rigid time was given up for quality",
+          lambda answer: answer.longer),
+    *keys.MECHANICS.of_part(lambda answer: answer.situation),
+    Field("candidates", many(CANDIDATE)),
+    Field("acceptable_windows", maybe(many(_WINDOW)),
+          "on basis energy: windows in which every tr is acceptable, null on another basis", _windows),
+    Field("recommended", maybe(keys.TIMES)),
+    *keys.QUALITY,
+    keys.HEALTH,
+    keys.EXPECTED,
+    Field("better_td", maybe(keys.PAIR), get=lambda answer: answer.better_pair),
+    later=("health", "kinetic_share_estimated", "modes", "unsigned_parts", "td_window", "expected", "quality",
+           "quality_reasons"),
+))  # fmt: skip
 HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")
 
 
@@ -49,50 +80,9 @@ def as_markdown(answer: Suggestion, limit: int) -> str:
 
 def as_csv(answer: Suggestion) -> str:
     """All candidates, a column for each key of the JSON output but ``parts``, and the td they belong to."""
-    names = [name for name in keys.CANDIDATE if name != "notes"]
-    cells = (
-        [*(keys.CANDIDATE[name](c) for name in names), answer.situation.td, "; ".join(c.notes)]
-        for c in answer.candidates
-    )
-    return tables.as_csv([*names, "td", "notes"], cells).rstrip("\n")
-
-
-def as_json(answer: Suggestion, command: Sequence[str]) -> str:
-    """The whole answer by schema d2rpick/suggest/1."""
-    return tables.as_json(_document(answer, command))
-
-
-def as_ndjson(answer: Suggestion, command: Sequence[str]) -> str:
-    """The same in one line, to be appended to those of other runs."""
-    return tables.as_line(_document(answer, command))
-
-
-def _document(answer: Suggestion, command: Sequence[str]) -> dict[str, Any]:
-    recommended = answer.recommended
-    return {
-        **frame(answer.situation, SCHEMA, command, answer.cautions),
-        "td": answer.situation.td,
-        "td_window": list(answer.td_window) if answer.td_window else None,
-        "longer_pair": keys.of_pair(answer.longer),
-        **mechanics(answer.situation),
-        "candidates": [{**keys.of_candidate(c), "parts": keys.of_matches(c.parts)} for c in answer.candidates],
-        "acceptable_windows": None
-        if answer.windows is None
-        else [
-            {
-                "start": w.start,
-                "end": w.end,
-                "share": w.share,
-                "recommended": holds(w, recommended.tr if recommended else None),
-            }
-            for w in answer.windows
-        ],
-        "recommended": {"tr": recommended.tr, "td": recommended.td} if recommended else None,
-        **keys.of_quality(answer.quality),
-        "health": keys.of_health(answer.health),
-        "expected": keys.of_expected(answer.expected),
-        "better_td": keys.of_pair(answer.better_pair),
-    }
+    columns = [*(key for key in keys.CANDIDATE.keys if key != "notes"), "td", "notes"]
+    td = answer.situation.td
+    return csv_of(columns, ({**keys.CANDIDATE.plain(one), "td": td} for one in answer.candidates))
 
 
 def headline(answer: Suggestion) -> str:

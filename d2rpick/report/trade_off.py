@@ -2,19 +2,79 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.situation import frame, mechanics, read_line
+from d2rpick.report.fields import (
+    FLAG,
+    NUMBER,
+    SIZE,
+    SOME,
+    SOME_TEXT,
+    SPAN,
+    TEXT,
+    Document,
+    Field,
+    csv_of,
+    many,
+    maybe,
+    row,
+)  # fmt: skip
+from d2rpick.report.situation import read_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.trade_off import Offer, TradeOff
 
-SCHEMA = "d2rpick/explore/1"
+OFFER: Final = row(
+    Field("td", NUMBER),
+    Field("peak", FLAG, "the energy peaks at td"),
+    Field("tr", SOME, "the tr that suggest recommends for td; null where it recommends none"),
+    Field("error", SIZE,
+          "what offers are compared by: the residual; on basis energy 1 - sqrt(E(td) / (2 mean E)), null above "
+          "2 mean E"),
+    Field("unbeaten", FLAG,
+          "no other offer has less error and as much rigid time, or more rigid time and no more error"),
+    Field("recommended", FLAG, "the pair of suggest where td is chosen too"),
+    *keys.QUALITY,
+    Field("basis", keys.BASIS),
+    Field("energy_td", NUMBER),
+    Field("kinetic_share", maybe(keys.SHARE)),
+    *(field._replace(kind=maybe(field.kind)) for field in keys.CANDIDATE.of_part(
+        lambda offer: offer.best, ("kind", *keys.MEASURES, "tr_low", "tr_high", "same_swing"))),
+    Field("reason", SOME_TEXT, "why no tr is recommended"),
+    Field("acceptable_windows", maybe(many(keys.WINDOW)), "on basis energy: windows in which every tr is acceptable",
+          lambda offer: offer.windows),
+    keys.EXPECTED,
+    later=("position_error_is_lower_bound",),
+)  # fmt: skip
+# Columns of the csv and of a frame.
+COLUMNS: Final = [key for key in OFFER.keys if key not in ("quality_reasons", "acceptable_windows", "expected")]
+
+
+def _answer(found: TradeOff) -> str:
+    return answer(found)
+
+
+DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
+    *keys.FRAME,
+    Field("td", SOME, "the td that was asked for", lambda found: found.asked and found.asked.td),
+    Field("td_window", SPAN,
+          "where td was explored: the window asked for or the longest flight, less the margin before the contact"),
+    *keys.MECHANICS.of_part(lambda found: found.situation, ("flight", "oscillator", "modes")),
+    Field("answer", TEXT, "the shortest sensible answer", _answer),
+    Field("recommended", maybe(keys.TIMES)),
+    Field("start", SOME, "td of the offer that the answer starts from: the one asked for, else the one that saves most",
+          lambda found: found.start and found.start.td),
+    Field("step", SOME,
+          "the nearest unbeaten td with half the error of that, else the recommended one where it has less",
+          lambda found: found.step and found.step.td),
+    Field("offers", many(OFFER),
+          "by ascending td: a grid, the peaks of the energy, the td asked for and the recommended one"),
+))  # fmt: skip
 HEAD = ("", "td", "peak", "tr", "error", "level error", "K", "rigid", "of record", "run time", "tolerance", "quality")
 # A change of the rigid time below this share is none that people read.
 _NO_CHANGE: Final = 5e-4
@@ -40,65 +100,7 @@ def as_markdown(found: TradeOff, limit: int) -> str:
 
 def as_csv(found: TradeOff) -> str:
     """All offers, a column for each key of ``offers`` in the JSON output that is a single value."""
-    return tables.as_csv(COLUMNS, ([offer(one)[name] for name in COLUMNS] for one in found.offers)).rstrip("\n")
-
-
-def as_json(found: TradeOff, command: Sequence[str]) -> str:
-    """Everything by schema d2rpick/explore/1."""
-    return tables.as_json(as_document(found, command))
-
-
-def as_document(found: TradeOff, command: Sequence[str]) -> dict[str, Any]:
-    """Give what the JSON holds."""
-    chosen = found.recommended
-    about = mechanics(found.situation)
-    return {
-        **frame(found.situation, SCHEMA, command, found.cautions),
-        "td": found.asked.td if found.asked else None,
-        "td_window": list(found.td_window),
-        "flight": about["flight"],
-        "oscillator": about["oscillator"],
-        "modes": about["modes"],
-        "answer": answer(found),
-        "recommended": {"tr": chosen.tr, "td": chosen.td} if chosen else None,
-        "start": found.start.td if found.start else None,
-        "step": found.step.td if found.step else None,
-        "offers": [offer(one) for one in found.offers],
-    }
-
-
-def offer(one: Offer) -> dict[str, Any]:
-    """Keys of one offer: its td, and what ``suggest`` says of the recommended tr."""
-    best = keys.of_candidate(one.best) if one.best else dict.fromkeys(keys.CANDIDATE)
-    windows = one.windows
-    return {
-        "td": one.td,
-        "peak": one.peak,
-        "tr": one.tr,
-        "error": one.error,
-        "unbeaten": one.unbeaten,
-        "recommended": one.recommended,
-        **keys.of_quality(one.quality),
-        "basis": one.basis,
-        "energy_td": one.energy_td,
-        "kinetic_share": one.kinetic_share,
-        **{name: best[name] for name in _MEASURES},
-        "reason": one.reason,
-        "acceptable_windows": None
-        if windows is None
-        else [{"start": one.start, "end": one.end, "share": one.share} for one in windows],
-        "expected": keys.of_expected(one.expected),
-    }
-
-
-_MEASURES: Final = ("kind", *keys.MEASURES, "tr_low", "tr_high", "same_swing")
-_LISTS: Final = ("quality_reasons", "acceptable_windows", "expected")
-# Columns of the csv and of a frame.
-COLUMNS: Final = (
-    *("td", "peak", "tr", "error", "unbeaten", "recommended", "quality", "basis", "energy_td", "kinetic_share"),
-    *_MEASURES,
-    "reason",
-)
+    return csv_of(COLUMNS, map(OFFER.plain, found.offers))
 
 
 _NOT_HALVED: Final = "has half of it and keeps half of the rigid time"

@@ -2,26 +2,73 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.situation import frame, heading, mechanics
+from d2rpick.report.fields import (
+    FLAG,
+    NUMBER,
+    SIZE,
+    SOME,
+    SOME_FLAG,
+    TEXTS,
+    Document,
+    Field,
+    Kind,
+    maybe,
+    row,
+)  # fmt: skip
+from d2rpick.report.situation import heading
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.verify import Verdict
 
-SCHEMA = "d2rpick/verify/1"
+# The pair that was judged, its measures and what they come to.
+MEASURES: Final = row(
+    Field("tr", NUMBER, get=lambda answer: answer.candidate.tr),
+    Field("td", NUMBER, get=lambda answer: answer.situation.td),
+    *keys.CANDIDATE.of_part(lambda answer: answer.candidate, keys.MEASURES),
+    Field("tr_ok", SOME_FLAG),
+    Field("td_ok", SOME_FLAG),
+    Field("verified", FLAG),
+)
+SWITCHED: Final = row(
+    Field("source", TEXTS.within(minItems=1)),
+    Field("energy_frozen", NUMBER, "came back at td"),
+    Field("energy_td", NUMBER, "of the reference at td"),
+    Field("energy_ratio", SOME),
+    Field("end", NUMBER, "compared from td to here"),
+    Field("mean_after", NUMBER), Field("mean_after_reference", NUMBER),
+    Field("spread_after", NUMBER.within(minimum=0), "standard deviation"),
+    Field("spread_after_reference", NUMBER.within(minimum=0)),
+    Field("momentum_error", SIZE,
+          "largest deviation after td relative to the largest momentum of the reference there"),
+    Field("displacement", SIZE, "largest distance of the parts' centre from where the reference has it"),
+    Field("rigid_from", SOME), Field("rigid_to", SOME), Field("objections", Kind(TEXTS.schema, tuple)),
+    Field("notes", TEXTS),
+    name="switched", later=("rigid_from", "rigid_to", "objections"),
+)  # fmt: skip
+DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times in the unit of the history.", row(
+    *keys.FRAME,
+    *keys.MECHANICS.of_part(lambda answer: answer.situation),
+    *MEASURES.fields,
+    *keys.QUALITY,
+    keys.MATCHES._replace(get=lambda answer: answer.candidate.parts),
+    keys.HEALTH,
+    Field("reasons", TEXTS),
+    Field("switched", maybe(SWITCHED), "a finished switched run held against the reference, null without --switched"),
+    later=("kinetic_share_estimated", "modes", "unsigned_parts", "health", "quality", "quality_reasons", "parts",
+           *keys.LATER),
+))  # fmt: skip
 COMPARED = ("", "switched", "reference")
 
 
 def as_table(answer: Verdict) -> str:
     """The verdict and its reasons, what it rests on, and the measures of the pair."""
-    width = max(len(name) for name in keys.of_verdict(answer))
-    lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in keys.of_verdict(answer).items()]
+    width = max(len(name) for name in MEASURES.plain(answer))
+    lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in MEASURES.plain(answer).items()]
     reasons = [f"  {printable(reason)}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
@@ -31,38 +78,21 @@ def as_table(answer: Verdict) -> str:
 
 def as_markdown(answer: Verdict) -> str:
     """The measures as a Markdown table of two columns, and the reasons below it."""
-    table = tables.as_markdown(("measure", "value"), list({**keys.of_verdict(answer), **_of_switched(answer)}.items()))
+    table = tables.as_markdown(("measure", "value"), list({**MEASURES.plain(answer), **_of_switched(answer)}.items()))
     return "\n".join([table, *(f"\n* {tables.in_markdown(reason)}" for reason in answer.reasons)])
 
 
-def row(answer: Verdict) -> dict[str, Any]:
+def measures(answer: Verdict) -> dict[str, Any]:
     """Each measure by its key, those of a switched run with ``switched_`` before them, and the reasons as one text."""
     situation = answer.situation
-    measured = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **keys.of_verdict(answer)}
+    measured = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **MEASURES.plain(answer)}
     return {**measured, **_of_switched(answer), "reasons": "; ".join(answer.reasons)}
 
 
 def as_csv(answer: Verdict) -> str:
-    """One row, a column for each key of `row`."""
-    found = row(answer)
+    """One row, a column for each key of `measures`."""
+    found = measures(answer)
     return tables.as_csv(list(found), [list(found.values())]).rstrip("\n")
-
-
-def as_json(answer: Verdict, command: Sequence[str]) -> str:
-    """The whole answer by schema d2rpick/verify/1."""
-    situation = answer.situation
-    return tables.as_json(
-        {
-            **frame(situation, SCHEMA, command, answer.cautions),
-            **mechanics(situation),
-            **keys.of_verdict(answer),
-            **keys.of_quality(answer.quality),
-            "parts": keys.of_matches(answer.candidate.parts),
-            "health": keys.of_health(answer.health),
-            "reasons": list(answer.reasons),
-            "switched": keys.of_comparison(answer.switched) if answer.switched else None,
-        }
-    )
 
 
 def _told(answer: Verdict) -> str:
@@ -104,5 +134,5 @@ def _comparison(switched: Comparison) -> list[str]:
 
 def _of_switched(answer: Verdict) -> dict[str, Any]:
     """Measures of the switched run under names of their own; empty where there is none."""
-    found = keys.of_comparison(answer.switched) if answer.switched else {}
+    found = SWITCHED.plain(answer.switched) if answer.switched else {}
     return {f"switched_{name}": value for name, value in found.items() if name not in ("source", "notes")}

@@ -13,8 +13,8 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.study import Question, ask
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.report.suggestion import as_json
-from d2rpick.report.verdict import as_json as verdict_as_json
+from d2rpick.report import suggestion
+from d2rpick.report import verdict as verdict_report
 from d2rpick.rules.judgement import faults_of
 from tests.command import BOX as T01
 from tests.command import ENERGY, GLSTAT, run
@@ -29,7 +29,7 @@ def test_the_command_line_and_a_study_answer_as_the_library_does(file: str, sele
     parts = [text for part in selection.parts for text in ("--part", part)]
     args = ["suggest", "--td", str(td), *parts, "-f", "json", file]
     answer = suggest_of(read([file], selection), td, PLAIN)
-    assert run(*args).stdout == f"{as_json(answer, args)}\n"
+    assert run(*args).stdout == f"{suggestion.DOCUMENT.as_json(answer, args)}\n"
     row = ask(Question(td, PLAIN, selection), file)
     assert answer.recommended is not None
     assert (row.tr, row.residual) == (answer.recommended.tr, answer.recommended.residual)
@@ -38,7 +38,7 @@ def test_the_command_line_and_a_study_answer_as_the_library_does(file: str, sele
     args = ["verify", "--tr", repr(tr), "--td", str(td), *parts, "-f", "json", file]
     verdict = verify_of(read([file], selection), tr, td, PLAIN)
     assert verdict.verified
-    assert json.loads(run(*args).stdout) == json.loads(verdict_as_json(verdict, args))
+    assert json.loads(run(*args).stdout) == json.loads(verdict_report.DOCUMENT.as_json(verdict, args))
 
 
 def test_the_health_of_the_run_comes_with_every_answer() -> None:

@@ -45,7 +45,7 @@ def test_a_card_without_a_window_is_not_passed_over(tmp_path: Path) -> None:
 
 
 def test_json(results: list[Checked], tmp_path: Path) -> None:
-    content = json.loads(report.as_json(report.Checks(results, tmp_path), ["check", "main.k"]))
+    content = json.loads(report.DOCUMENT.as_json(report.Checks(results, tmp_path), ["check", "main.k"]))
     check_by_schema(content)
     assert content["decks"] == ["main.k", "good/main.k"]
     assert [window["td"] for window in content["windows"]] == [0.5, None, 0.09]
@@ -112,7 +112,7 @@ def test_any_text_makes_a_valid_report(message: str, name: str) -> None:
     ET.fromstring(report.as_junit(report.Checks(result, root)).encode("utf-8", "replace"))
     sarif_is_valid(report.as_sarif(report.Checks(result, root)))
     assert report.as_github(report.Checks(result, root)).count("\n") == 0
-    json.loads(report.as_json(report.Checks(result, root), []))
+    json.loads(report.DOCUMENT.as_json(report.Checks(result, root), []))
 
 
 def test_nothing_found_is_a_report_too(tmp_path: Path) -> None:

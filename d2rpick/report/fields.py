@@ -1,0 +1,180 @@
+"""Fields of results: each key once, with its kind, its meaning and where its value is taken from.
+
+From a row of fields follow the JSON of a thing, its line of csv, the columns of a frame, and what the schemas in
+``d2rpick/schemas`` say of it.  Keys are only ever added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+from d2rpick.report import tables
+from d2rpick.version import __version__
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What values a key has: ``schema`` says it to a validator, ``plain`` makes of one what JSON can hold.
+
+    Within ``schema`` other kinds stand for their schemas; one with a ``name`` is a definition that is referred to.
+    """
+
+    schema: Mapping[str, Any]
+    plain: Callable[[Any], Any] = lambda value: value
+    name: str = ""
+
+    def within(self, **limits: Any) -> Kind:
+        """Limit the values, in the words of JSON schema: ``minimum=0``."""
+        return Kind({**self.schema, **limits}, self.plain, self.name)
+
+
+class Field(NamedTuple):
+    """A key with its kind and meaning; its value is what ``get`` takes from a thing, else what bears its name there."""
+
+    key: str
+    kind: Kind
+    meaning: str = ""
+    get: Callable[[Any], Any] | None = None
+
+    def of(self, thing: Any) -> Any:
+        """Give the value that JSON has of a thing."""
+        return self.kind.plain(self.taken(thing))
+
+    def taken(self, thing: Any) -> Any:
+        """Give the value as the thing has it."""
+        if self.get:
+            return self.get(thing)
+        return thing[self.key] if isinstance(thing, Mapping) else getattr(thing, self.key)
+
+
+@dataclass(frozen=True)
+class Row(Kind):
+    """Kind of an object with these fields, in their order."""
+
+    fields: tuple[Field, ...] = ()
+
+    @property
+    def keys(self) -> list[str]:
+        """Names of the fields: columns of a csv or a frame."""
+        return [field.key for field in self.fields]
+
+    def of_part(self, part: Callable[[Any], Any], keys: Iterable[str] = ()) -> list[Field]:
+        """Take the fields with these ``keys``, or all, into the row of things with such a ``part``."""
+        return [_in_part(self[key], part) for key in (keys or self.keys)]
+
+    def __getitem__(self, key: str) -> Field:
+        """Give a field by its key."""
+        return next(field for field in self.fields if field.key == key)
+
+
+def _in_part(field: Field, part: Callable[[Any], Any]) -> Field:
+    return field._replace(get=lambda thing: None if (found := part(thing)) is None else field.taken(found))
+
+
+def row(*fields: Field, name: str = "", later: Iterable[str] = (), closed: bool = False, **more: Any) -> Row:
+    """Make a row; keys that came ``later`` than its schema may be missing from results, a ``closed`` one has no others.
+
+    ``more`` goes into its schema as it is.
+
+    Examples
+    --------
+    >>> part = row(Field("id", INTEGER), Field("title", TEXT, get=lambda part: part.title.strip()))
+    >>> from types import SimpleNamespace
+    >>> part.plain(SimpleNamespace(id=7, title="door "))
+    {'id': 7, 'title': 'door'}
+    """
+    schema = {
+        "type": "object",
+        "required": [field.key for field in fields if field.key not in later],
+        "properties": {field.key: field for field in fields},
+        **({"additionalProperties": False} if closed else {}),
+        **more,
+    }
+    return Row(schema, lambda thing: {field.key: field.of(thing) for field in fields}, name, fields)
+
+
+def maybe(kind: Kind) -> Kind:
+    """Let values be None where they are not known."""
+    known = kind.schema
+    if None in known.get("enum", ()) or "null" in known.get("type", ()):
+        return kind
+    null = {"enum": [*known["enum"], None]} if "enum" in known else {"type": [known["type"], "null"]}
+    return Kind({**known, **null}, lambda value: None if value is None else kind.plain(value), kind.name)
+
+
+def many(kind: Kind) -> Kind:
+    """Give the kind of an array."""
+    return Kind({"type": "array", "items": kind}, lambda values: [kind.plain(value) for value in values])
+
+
+def each(kind: Kind) -> Kind:
+    """Give the kind of an object with any keys, whose values are of one kind."""
+    return Kind({"type": "object", "additionalProperties": kind}, dict)
+
+
+def one_of(*names: str) -> Kind:
+    """Give the kind of a word among these."""
+    return Kind({"enum": list(names)})
+
+
+NUMBER: Final = Kind({"type": "number"})
+INTEGER: Final = Kind({"type": "integer"})
+TEXT: Final = Kind({"type": "string"})
+FLAG: Final = Kind({"type": "boolean"})
+NOTHING: Final = Kind({"type": "null"})
+TEXTS: Final = many(TEXT)
+SPAN: Final = Kind({"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}, list)
+# What is often not known: a number, one that is not negative, a yes or no, a text.
+SOME: Final = maybe(NUMBER)
+SIZE: Final = SOME.within(minimum=0)
+SOME_FLAG: Final = maybe(FLAG)
+SOME_TEXT: Final = maybe(TEXT)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A result as JSON: the ``name`` of its schema, what it is, and its fields below schema, version and command.
+
+    No object of a ``closed`` one has other keys; its schema defines ``also`` what other forms of the result hold.
+    """
+
+    name: str
+    meaning: str
+    row: Row
+    closed: bool = False
+    also: tuple[Kind, ...] = ()
+
+    @property
+    def whole(self) -> Row:
+        """All its fields."""
+        head = (Field("schema", Kind({"const": self.name})), Field("tool_version", TEXT), Field("command", TEXTS))
+        known = self.row.schema
+        later = {*self.row.keys} - {*known["required"]}
+        more = {key: value for key, value in known.items() if key not in ("type", "required", "properties")}
+        return row(*head, *self.row.fields, later=later, **more)
+
+    def of(self, answer: Any, command: Sequence[str]) -> dict[str, Any]:
+        """Give what the JSON holds; ``command`` are the arguments that repeat the answer."""
+        head = {"schema": self.name, "tool_version": __version__, "command": list(command)}
+        return {**head, **self.row.plain(answer)}
+
+    def as_json(self, answer: Any, command: Sequence[str]) -> str:
+        """Write an answer by its schema."""
+        return tables.as_json(self.of(answer, command))
+
+    def as_line(self, answer: Any, command: Sequence[str]) -> str:
+        """Write the same in one line, to be appended to those of other runs."""
+        return tables.as_line(self.of(answer, command))
+
+
+def csv_of(keys: Sequence[str], rows: Iterable[Mapping[str, Any]], between: str = "; ") -> str:
+    """Write rows as csv with these columns; what is a list in JSON is joined in its cell."""
+    return tables.as_csv(keys, ([_cell(found[key], between) for key in keys] for found in rows)).rstrip("\n")
+
+
+def _cell(value: Any, between: str) -> tables.Cell:
+    if isinstance(value, Mapping):
+        value = [f"{count} {kind}" for kind, count in value.items()]
+    return between.join(map(str, value)) if isinstance(value, (list, tuple)) else value
