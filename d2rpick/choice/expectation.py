@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
@@ -143,14 +142,14 @@ def _flight(situation: Situation) -> tuple[Samples, Samples]:
     return situation.history.between(np.inf if start is None else start, situation.td if end is None else end)
 
 
-def shortfall(energy: float, mean: float) -> float:
+def shortfall(energy: Samples, mean: float) -> Samples:
     """How far a locked-in amplitude stays below that of all vibration energy, 1 - sqrt(E/(2 <E>)) [-].
 
     Infinite above it: more than there is must not be locked in.
 
     Examples
     --------
-    >>> shortfall(0.5, 1.0), shortfall(2.0, 1.0), shortfall(3.0, 1.0)
-    (0.5, 0.0, inf)
+    >>> shortfall(np.array([0.5, 2.0, 3.0]), 1.0)
+    array([0.5, 0. , inf])
     """
-    return 1 - sqrt(max(energy, 0.0) / (2 * mean)) if energy <= 2 * mean else float("inf")
+    return np.where(energy <= 2 * mean, 1 - np.sqrt(np.maximum(energy, 0.0) / (2 * mean)), np.inf)

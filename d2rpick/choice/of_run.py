@@ -81,15 +81,12 @@ def suggest_of(
         If td or the window lies outside the record, no flight is seen, or the run cannot be judged.
     """
     _check(reference.history, td, settings, choosing=True)
-    if td is None:
-        from d2rpick.choice.suggest_td import suggest_in_longest_flight
-
-        return _with_health(suggest_in_longest_flight(reference.history, settings), reference.run)
-    if isinstance(td, tuple):
+    if td is None or isinstance(td, tuple):
         from d2rpick.choice.suggest_td import suggest_in_window
 
-        return _with_health(suggest_in_window(reference.history, td, settings, fits, since), reference.run)
-    answer = suggest_at(examine(reference.history, td, settings, fits), with_better=with_better)
+        answer = suggest_in_window(reference.history, td, settings, fits, since)
+    else:
+        answer = suggest_at(examine(reference.history, td, settings, fits), with_better=with_better)
     return _with_health(answer, reference.run)
 
 

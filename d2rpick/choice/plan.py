@@ -264,8 +264,7 @@ def _asked(
         flight = row.flight._replace(start=known.start, source=known.source)
         row = replace(row, flight=flight, start=known.start)
     if answer.recommended is None:
-        why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
-        return replace(row, reason="; ".join(why))
+        return replace(row, reason=answer.why_none)
     if answer.recommended.rigid_time < shortest:
         return replace(row, reason=_too_short(answer.recommended.rigid_time, shortest, row.margin))
     return replace(row, status="supported")

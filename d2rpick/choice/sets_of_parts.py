@@ -312,8 +312,7 @@ class _Comparison:
         else:
             answer = suggest_of(reference, times, settings, with_better=False)
             if answer.recommended is None:
-                why = [caution.message for caution in answer.cautions if caution.code == "no-candidate"]
-                raise RangeError("; ".join(why) or "no tr can be recommended")
+                raise RangeError(answer.why_none)
             situation, (tr, td) = answer.situation, (answer.recommended.tr, answer.recommended.td)
         time = reference.history.time
         one = replace(one, window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0]))

@@ -74,6 +74,11 @@ class Suggestion:
         return self.candidates.chosen
 
     @property
+    def why_none(self) -> str:
+        """Why nothing is recommended; empty where a pair is."""
+        return "; ".join(one.message for one in self.cautions if one.code == "no-candidate")
+
+    @property
     def acceptable_windows(self) -> tuple[tuple[float, float], ...]:
         """First and last acceptable tr of each window of them, on any basis [time]."""
         if self.windows is not None:

@@ -81,33 +81,28 @@ _MUCH: Final = 0.1
 _HIDDEN: Final = 2.0
 
 
-def suggest_in_longest_flight(history: History, settings: Settings) -> Suggestion:
-    """Choose both times in the longest flight of the record, td up to its end less the margin.
-
-    Raises
-    ------
-    RangeError
-        If nothing in the record shows a flight.
-    """
-    fits = Fits()
-    return suggest_in_window(history, longest_flight(history, settings, fits), settings, fits)
-
-
 def suggest_in_window(
     history: History,
-    window: tuple[float, float],
+    window: tuple[float, float] | None,
     settings: Settings,
     fits: Fits | None = None,
     since: float | None = None,
 ) -> Suggestion:
-    """Choose td in ``window`` and tr for it, not before ``since``; RangeError when the window lies outside the record.
+    """Choose td in ``window``, for None in the longest flight up to the margin, and tr for it, not before ``since``.
 
     Of the pairs of all peaks of the energy those that are alike in quality count, and of these the one with the
     longest rigid window wins.  Where deformations are known, a residual within 0.02 of the smallest is alike; on the
     energy alone, a level within the tolerance of the best one, which is twice the mean energy.  td keeps the margin
     from the contact, unless the whole window lies in it.  Without an acceptable peak the ends of the window are tried.
     Where nothing vibrates, any td is as good, and the last one saves the most.
+
+    Raises
+    ------
+    RangeError
+        If the window lies outside the record, or without one nothing in it shows a flight.
     """
+    fits = fits or Fits()
+    window = window or longest_flight(history, settings, fits)
     look = looking(history, settings, fits, since)
     situation, inside = within_flight(look, history, window)
     choose = _by_level if situation.vibration.unknown else _by_residual
@@ -206,8 +201,9 @@ def _by_level(situation: Situation, window: tuple[float, float], look: Look) -> 
     peaks = situation.peaks(*window)
     if mean is None or not peaks:
         return None, None
-    falls = {td: shortfall(situation.history.energy_at(td), mean) for td in peaks}
-    below = sorted((td for td in peaks if falls[td] < 1), key=lambda td: falls[td])
+    levels = situation.history.energies_at(np.array(peaks))
+    falls = dict(zip(peaks, shortfall(levels, mean).tolist(), strict=True))
+    below = sorted((td for td in peaks if falls[td] < 1), key=falls.__getitem__)
     best = next((td for td in below if _acceptable([situation.at(td)])), None)  # no oscillator is sought again
     if best is None:
         return None, None

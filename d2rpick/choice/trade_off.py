@@ -94,7 +94,7 @@ def _offer(situation: Situation, found: Candidates, peak: bool) -> Offer:
         quality=answer.quality,
         windows=answer.windows,
         expected=answer.expected,
-        reason=None if best else _reason(answer),
+        reason=answer.why_none or None,
     )
 
 
@@ -107,12 +107,8 @@ def _error(situation: Situation, best: Candidate | None) -> float | None:
     if best.residual is not None:
         return best.residual
     mean = mean_in_flight(situation)
-    error = shortfall(situation.energy_td, mean) if mean is not None else float("inf")
-    return error if error < float("inf") else None
-
-
-def _reason(answer: Suggestion) -> str:
-    return "; ".join(one.message for one in answer.cautions if one.code == "no-candidate")
+    error = np.inf if mean is None else float(shortfall(np.array(situation.energy_td), mean))
+    return error if error < np.inf else None
 
 
 # Decimals of an error that people read.

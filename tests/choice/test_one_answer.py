@@ -14,7 +14,7 @@ from d2rpick.choice.of_run import read
 from d2rpick.choice.plan import plan_of
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.choice.suggest_td import suggest_in_longest_flight
+from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.verify import Verdict, verify, verify_at
 from d2rpick.flight.flight import all_seen, seen_flight
 from d2rpick.histories.digits import as_read
@@ -184,7 +184,7 @@ def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does(tmp_path: 
     assert row.flight == flight
     assert row.end == pytest.approx(0.8, abs=0.01)
     assert row.margin.source == "flight"
-    assert suggest_in_longest_flight(reference.history, asked).td_window == (0.1, row.end)
+    assert suggest_in_window(reference.history, None, asked).td_window == (0.1, row.end)
 
 
 def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def test_on_energy_alone_of_levels_alike_the_longest_rigid_window_wins() -> None
     assert found.recommended.rigid_time > 0.27
     assert found.longer is None
     situation = found.situation
-    falls = {td: shortfall(history.energy_at(td), mean) for td in situation.peaks(0.13, 0.38)}
+    falls = {td: float(shortfall(np.array(history.energy_at(td)), mean)) for td in situation.peaks(0.13, 0.38)}
     level = falls[found.recommended.td]
     assert level <= min(falls.values()) + PLAIN.tolerance
     assert found.expected.kinetic_share == pytest.approx(1 - situation.energy_td / (2 * mean))
