@@ -1,10 +1,9 @@
-"""The order of candidates, and the limits that a recommendation keeps."""
+"""The order of candidates, the limits that a recommendation keeps, and how good it is called."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,19 +12,28 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.of_run import read
-from d2rpick.choice.ranking import EQUALLY_GOOD, order, over_limits, rank
+from d2rpick.choice.ranking import (
+    EQUALLY_GOOD,
+    GRADES,
+    Quality,
+    order,
+    over_limits,
+    quality_of,
+    rank,
+    states_per_period,
+)
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
+from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
+from d2rpick.report.suggestion import as_table
 from d2rpick.vibration.span import Fits
 from tests import paper
 from tests.computed import stored
 from tests.energies import codes, rollover
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import History
+from tests.records import ENERGY, TIME, vibration
 
 rows = st.lists(
     st.tuples(
@@ -125,3 +133,211 @@ def test_candidates_are_kept_together_as_one_by_one(history: History, td: float,
     assert [one.acceptable for one in ranked] == ranked.acceptable[ranked.order].tolist()
     assert ranked[1:3] == (ranked[1], ranked[2])
     assert ranked[-1].tr == ranked.tr[ranked.order[-1]]
+
+
+RECORD = History(TIME, ENERGY, ("paper",), "made", "E")
+
+
+def grade(history: History, td: float, **asked: float | bool) -> str | None:
+    """Grade of what is recommended at a td."""
+    found = suggest(history, td, Settings(**asked)).quality  # type: ignore[arg-type]
+    return found.grade if found else None
+
+
+@given(st.floats(0.04, 0.14))
+def test_the_residual_of_a_known_vibration_decides(td: float) -> None:
+    answer = suggest(RECORD, td, Settings())
+    if answer.chosen is None or answer.quality is None:
+        return
+    residual = answer.chosen.residual
+    assert residual is not None
+    assert answer.quality.grade == ("good" if residual <= 0.2 else "fair" if residual <= 0.5 else "poor")
+    assert bool(answer.quality.reasons) == (answer.quality.grade != "good")
+
+
+def test_the_energy_alone_is_fair_at_best() -> None:
+    mode = vibration(np.array([200.0, 2.0, 1.0, 0.0]))
+    record = History(TIME, mode.energy(TIME), ("one",), "made", "E")
+    at_a_peak = float(mode.peaks(0.06, 0.08)[0])
+    assert grade(record, at_a_peak) == "good"
+    assert grade(record, at_a_peak, replay=False, after=0.005) == "fair"
+    answer = suggest(record, at_a_peak, Settings(replay=False, after=0.005))
+    assert answer.quality is not None
+    (reason,) = answer.quality.reasons
+    assert reason.startswith("the sign of the deformation is unknown, and with a wrong one")
+
+
+def test_a_td_near_the_zero_of_the_energy_is_poor_by_the_energy_alone() -> None:
+    assert grade(RECORD, 0.064, replay=False, after=0.005) == "poor"
+
+
+@pytest.mark.parametrize(
+    ("energy", "reason"),
+    [
+        (np.sin(40 * np.linspace(0, 1, 400)), "falls below zero"),
+        (1 + 0.3 * np.sin(np.linspace(0, 1, 400) * 400), "states per period"),
+    ],
+    ids=["a velocity", "a coarse output"],
+)
+def test_a_record_that_no_level_can_be_read_from_is_poor(energy: np.ndarray, reason: str) -> None:
+    history = History(np.linspace(0, 1, 400), energy, ("x",), "made", "E")
+    answers = [suggest(history, td, Settings(after=0.1, replay=False)) for td in np.linspace(0.7, 0.9, 20)]
+    found = [answer.quality for answer in answers if answer.quality]
+    assert found
+    assert all(one.grade == "poor" and any(reason in text for text in one.reasons) for one in found)
+
+
+def test_a_flight_that_is_not_certain_is_no_better_than_fair() -> None:
+    time = np.linspace(0, 1, 500)
+    waves = sum((np.sin(rate * time + rate) ** 2 for rate in (30, 47, 71, 103, 151, 199)), np.zeros(500))
+    energy = np.where(time < 0.2, 50 * (0.2 - time), 0) + waves
+    answer = suggest(History(time, energy, ("x",), "made", "E"), 0.8, Settings())
+    assert answer.situation.flight.source == "energy"
+    assert answer.quality is not None
+    assert answer.quality.grade in ("poor", "fair")
+
+
+def test_rest_is_good() -> None:
+    history = History(TIME, np.full(TIME.size, 3.0), ("x",), "made", "E")
+    assert grade(history, 0.1, after=0.01) == "good"
+
+
+def test_a_pair_is_graded_the_same_whether_it_is_suggested_or_verified() -> None:
+    for td in (0.064, 0.0687534, 0.07):
+        answer = suggest(RECORD, td, Settings())
+        assert answer.recommended is not None
+        verdict = verify(RECORD, answer.recommended.tr, td, Settings())
+        assert verdict.quality is not None
+        assert answer.quality is not None
+        assert verdict.quality.grade == answer.quality.grade
+        assert quality_of(verdict.situation, verdict.candidate, None).grade in GRADES
+    assert verify(RECORD, 0.02, 0.064, Settings()).quality is None
+
+
+@given(st.integers(4, 40), st.integers(3, 30))
+def test_states_per_period_are_counted_over_whole_periods(states: int, periods: int) -> None:
+    wave = 1 + np.sin(2 * np.pi * np.arange(states * periods) / states + 0.4)
+    found = states_per_period(wave)
+    assert found is not None
+    assert found == pytest.approx(states, rel=2 / periods)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(wave.size)
+    noisy = states_per_period(wave + noise)
+    assert noisy == pytest.approx(states, rel=2 / periods)  # noise about the mean is not taken for periods
+
+
+def test_without_a_period_there_are_no_states_of_one() -> None:
+    assert states_per_period(np.ones(10)) is None
+    assert states_per_period(np.linspace(0, 1, 50)) is None
+    assert states_per_period(np.zeros(0)) is None
+
+
+def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
+    time = np.linspace(0, 1, 201)
+    energy = np.where(time < 0.2, 50 * time, 10.0) + 1e-5 * np.random.default_rng(1).random(201)
+    found = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(after=0.25))
+    assert found.situation.at_rest
+    assert found.quality == Quality("good")
+    assert found.chosen is not None
+    guessed = replace(found.situation, flight=found.situation.flight._replace(source="energy"))
+    assert guessed.at_rest
+    assert quality_of(guessed, found.chosen, None) == Quality("fair", ("the flight is not certain",))
+
+
+@pytest.mark.parametrize("vibration", [0.05, 0.5, 2.6])
+def test_plastic_work_hides_no_vibration(vibration: float) -> None:
+    """Of 100 J of which little vibrates, the level says nothing: a frozen tr may be wrong by all of the vibration."""
+    time = np.linspace(0, 1, 401)
+    swinging = sum(np.sin(rate * time + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
+    energy = 100 * np.minimum(time / 0.1, 1) ** 2 + vibration * np.where(time > 0.1, swinging, 0)
+    found = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(after=0.15))
+    assert not found.situation.at_rest
+    assert found.quality is None or found.quality.grade != "good"
+    still = suggest(
+        History(time, energy - energy * (time > 0.1) + 100.0 * (time > 0.1), ("made",), "made", "E"),
+        0.9,
+        Settings(after=0.15),
+    )
+    assert still.situation.at_rest
+
+
+def test_a_vibration_that_was_damped_out_is_rest() -> None:
+    time = np.linspace(0, 1, 2001)
+    energy = 100 + 2.6 * np.exp(-40 * time) * (1 + np.cos(150 * time) * np.cos(97 * time))
+    record = History(time, energy, ("made",), "made", "E")
+    assert suggest(record, 0.9, Settings(after=0.5)).situation.at_rest
+    assert not suggest(record, 0.9, Settings(after=0.05)).situation.at_rest
+
+
+def test_what_a_wrong_sign_would_cost_is_told() -> None:
+    """Of sqrt((4 E + T)/(E + T)): twice the vibration at most, what moves at td less."""
+    time = np.linspace(0, 1, 801)
+    energy = np.sum([np.sin(rate * time + rate) ** 2 for rate in (31.0, 47.0, 66.0)], axis=0)
+    answer = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(replay=False, after=0.0))
+    assert answer.quality is not None
+    assert answer.expected is not None
+    cost = f"{(4 - 3 * answer.expected.kinetic_share) ** 0.5:.0%}"
+    told = f"the sign of the deformation is unknown, and with a wrong one the vibration after td is off by {cost}"
+    assert answer.quality.reasons == (told,)
+
+
+def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
+    """Late in a damped record the level is so low that the misfit of the oscillator moves the crossing by much."""
+    history = read([stored("oscillator_referenceT01.gz")]).history
+    early, late = (suggest(history, td, Settings()) for td in (0.068753, 0.144191))
+    for answer, wanted in ((early, "good"), (late, "fair")):
+        best, quality = answer.chosen, answer.quality
+        assert best is not None
+        assert quality is not None
+        assert best.tr_high is not None
+        assert best.timing_tolerance is not None
+        assert best.residual == pytest.approx(0, abs=1e-3)
+        assert quality.grade == wanted
+        assert (best.tr_high - best.tr > 4 * best.timing_tolerance) is (wanted == "fair")
+        verdict = verify(history, best.tr, answer.situation.td, Settings()).quality
+        assert verdict == quality
+    assert "further mode" not in as_table(early, 1)
+    assert "up to 46% if the record hides a further mode" in as_table(late, 1)
+
+
+def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
+    """A structure that rings in many modes is quiet for moments; free flight excites nothing anew."""
+    time = np.linspace(0, 1, 201)
+    energy = np.where(time < 0.2, 50 * time, 10.0) + 1.5 * (time > 0.5) * np.sin(200 * time) ** 2
+    quiet = suggest(History(time, energy, ("made",), "made", "E"), 0.4, Settings(after=0.25)).situation
+    assert quiet.at_rest  # of what comes after td nothing is known
+    assert not replace(quiet, flight=quiet.flight._replace(end=0.9)).at_rest
+    assert replace(quiet, flight=quiet.flight._replace(end=0.5)).at_rest
+
+
+def test_between_few_states_nothing_is_called_at_rest() -> None:
+    """One state and td in the same output interval say nothing of what happens between them."""
+    energy = np.tile([1.5, 2.5, 1.0, 2.5], 10)
+    record = History(np.linspace(0, 3.9, 40), energy, ("coarse",), "made", "E")
+    found = suggest(record, 2.2, Settings(after=2.15))
+    assert not found.situation.at_rest
+    assert found.quality is None or found.quality.grade != "good"
+
+
+def test_between_few_states_not_even_round_off_is_called_rest() -> None:
+    energy = np.where(np.arange(400) < 12, 1e-12, 1.0 + np.sin(np.arange(400)) ** 2)
+    record = History(np.linspace(0, 39.9, 400), energy, ("early",), "made", "E")
+    early, later = (suggest(record, td, Settings(after=0.0)).situation for td in (0.85, 1.05))
+    assert not early.at_rest
+    assert later.at_rest
+
+
+def test_where_nothing_vibrates_there_is_no_residual() -> None:
+    """What is left of a vibration when its energy is round-off is described by the oscillator, and is nothing."""
+    time = np.linspace(0, 1, 4001)
+    energy = (np.exp(-25 * time) * np.sin(120 * time)) ** 2
+    found = suggest(History(time, energy, ("decayed",), "made", "E"), 0.95, Settings(after=0.6))
+    assert found.situation.vibration.unknown is None
+    assert found.situation.at_rest
+    assert found.situation.kinetic_share is None
+    best = found.chosen
+    assert best is not None
+    assert (best.residual, best.sign_match, best.notes) == (None, None, ())
+    assert found.quality == Quality("good")
+    verdict = verify(found.situation.history, 0.7, 0.95, Settings(after=0.6))
+    assert verdict.verified
+    assert verdict.candidate.residual is None

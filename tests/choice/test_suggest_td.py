@@ -1,4 +1,4 @@
-"""Choosing both times, on every basis, and what is said when td is missing."""
+"""Choosing both times, on every basis, what is said when td is missing, and the bound by which a window is searched."""
 
 from __future__ import annotations
 
@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.expectation import expectation, shortfall
 from d2rpick.choice.of_run import read
+from d2rpick.choice.ranking import rank
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest, suggest_at
-from d2rpick.choice.suggest_td import suggest_in_window
+from d2rpick.choice.suggest_td import longest_rigid_times, suggest_in_window
 from d2rpick.errors import RangeError
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
@@ -26,8 +30,10 @@ from tests import chain, paper
 from tests.command import ENERGY, ROLLOVER, answer, run
 from tests.computed import results, stored
 from tests.counted_fits import CountedFits
+from tests.energies import of
 
 if TYPE_CHECKING:
+    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
 
 PLAIN = Settings()
@@ -280,3 +286,55 @@ def test_the_expected_run_time_is_told_by_suggest_and_verify() -> None:
     assert judged["run_time_share"] == pytest.approx(best["run_time_share"])
     assert "rigid for 34% of the record" in run("suggest", "--td", "0.064", *saving, ENERGY).stdout
     assert answer("suggest", "--td", "0.064", ENERGY)["candidates"][0]["run_time_share"] is None
+
+
+def rigid_time(situation: Situation) -> float:
+    best = rank(find_candidates(situation)).chosen
+    return best.rigid_time if best and not best.same_swing else 0.0
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.floats(0.0, 0.05),
+    st.floats(0.0, 3.0),
+    st.sampled_from([0.0, 1e-4, 0.02, 0.2, 1.0]),
+    st.sampled_from([0.0, 0.05, 0.333]),
+)
+def test_no_recommended_tr_lies_further_back_than_the_bound(
+    seed: int, noise: float, decay: float, tolerance: float, after: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0.0, 1.0, 120)
+    rates, phases = rng.uniform(5, 60, 4), rng.uniform(0, 3, 4)
+    energy = np.exp(-decay * time) * (np.sin(time[:, np.newaxis] * rates + phases) ** 2).sum(axis=1)
+    energy += noise * rng.standard_normal(time.size)
+    start = examine(of(energy, time), 0.8, Settings(tolerance=tolerance, after=after, replay=False))
+    tds = rng.choice(time[1:], 12)
+    bounds = longest_rigid_times(start, tds)
+    for td, bound in zip(tds.tolist(), bounds.tolist(), strict=True):
+        assert rigid_time(start.at(td)) <= bound
+
+
+def test_the_bound_is_near_where_the_energy_passes_the_level() -> None:
+    time = np.linspace(0.0, 10.0, 4001)
+    energy = np.exp(-time / 10) * np.sin(3 * time) ** 2
+    situation = examine(of(energy, time), 9.0, Settings(after=0.5, replay=False))
+    tds = time[(time > 3) & (energy > 0.05)][::50]
+    found = np.array([rigid_time(situation.at(td)) for td in tds.tolist()])
+    bounds = longest_rigid_times(situation, tds)
+    assert found.all()
+    assert (bounds - found).max() < 0.1
+    assert (bounds < tds - 0.5).mean() > 0.5
+
+
+def test_where_a_model_decides_the_flight_alone_is_the_bound() -> None:
+    history = paper.history()
+    situation = examine(history, 0.064, Settings(after=0.01))
+    assert longest_rigid_times(situation, np.array([0.05, 0.064])).tolist() == [0.04, 0.054]
+
+
+def test_without_a_start_of_the_flight_nothing_is_rigid() -> None:
+    time = np.linspace(0.0, 1.0, 50)
+    situation = examine(of(1 + time, time), 0.5, Settings(replay=False))
+    assert situation.earliest_tr is None
+    assert longest_rigid_times(situation, time).tolist() == [0.0] * 50

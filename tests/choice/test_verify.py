@@ -1,22 +1,25 @@
-"""Judging one pair of times."""
+"""Judging one pair; over random histories and options what is recommended, and what is named as better, is verified."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from d2rpick.choice.of_run import read
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
-from d2rpick.choice.suggest import suggest
+from d2rpick.choice.suggest import Pair, suggest
+from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.verify import verify, verify_at
 from d2rpick.errors import RangeError
+from d2rpick.histories.history import History
 from tests import paper
+from tests.computed import stored
 from tests.energies import codes, of, rollover
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import History
 
 PLAIN = Settings()
 
@@ -79,3 +82,78 @@ def test_verify_remarks_what_suggest_remarks_on_every_tr() -> None:
 def test_pairs_that_are_none_are_refused(tr: float, td: float) -> None:
     with pytest.raises(RangeError):
         verify(paper.history(), tr, td, PLAIN)
+
+
+LIMITS = st.none() | st.floats(0.0, 1.2)
+OPTIONS = st.builds(
+    Settings,
+    after=st.none() | st.floats(2.0, 5.0),
+    margin=st.sampled_from([0.0, 0.1]),
+    tolerance=st.floats(0.0, 1.0),
+    max_kinetic_share=LIMITS,
+    max_residual=LIMITS,
+    replay=st.booleans(),
+)
+
+
+@st.composite
+def histories(draw: st.DrawFn) -> History:
+    """A load that falls, then one or two modes, damped or not, with noise, sampled finely or coarsely."""
+    count, rng = draw(st.integers(12, 90)), np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    steps = rng.uniform(0.2, 1.8, count) if draw(st.booleans()) else np.ones(count)
+    time = np.cumsum(steps) * 10 / steps.sum()
+    omega, alpha, second = draw(st.floats(1.0, 12.0)), draw(st.floats(0.0, 0.4)), draw(st.sampled_from([0.0, 0.5]))
+    decay = np.exp(-alpha * time)
+    energy = decay * np.sin(omega * time) ** 2 + second * decay * np.cos(1.7 * omega * time) ** 2
+    energy += draw(st.sampled_from([0.0, 3.0])) * np.exp(-(((time - 1.5) / 0.6) ** 2))
+    energy += draw(st.sampled_from([0.0, 0.01, 0.2])) * np.abs(rng.standard_normal(count))
+    return History(time, energy, ("made",), "made", "energy")
+
+
+def holds(history: History, pair: Pair | None, asked: Settings) -> bool:
+    """Whether a pair is verified; none is."""
+    if pair is None:
+        return True
+    return verify(history, pair.tr, pair.td, asked).verified
+
+
+@settings(max_examples=30)
+@given(histories(), st.floats(3.0, 9.9), OPTIONS)
+def test_what_is_chosen_for_a_td_is_verified(history: History, td: float, asked: Settings) -> None:
+    td = min(td, float(history.time[-1]))
+    answer = suggest(history, td, asked)
+    assert holds(history, answer.recommended, asked)
+    assert holds(history, answer.better_pair, asked)
+
+
+@settings(max_examples=10)
+@given(histories(), st.floats(3.0, 8.0), OPTIONS)
+def test_what_is_chosen_in_a_window_is_verified(history: History, low: float, asked: Settings) -> None:
+    answer = suggest_in_window(history, (low, min(low + 1.5, float(history.time[-1]))), asked)
+    assert holds(history, answer.recommended, asked)
+    assert holds(history, answer.better_pair, asked)
+
+
+@pytest.mark.parametrize("td", [0.72, 0.8, 0.87])
+def test_a_better_td_that_does_not_verify_is_not_named(td: float) -> None:
+    history = read([stored("faults/better_td_unverified.csv")]).history
+    assert holds(history, suggest(history, td, Settings()).better_pair, Settings())
+
+
+@pytest.mark.parametrize("limit", [{"max_kinetic_share": 0.3}, {"max_residual": 0.3}])
+def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(limit: dict[str, Any]) -> None:
+    time = np.linspace(0, 10, 60)
+    energy = 3 * np.exp(-(((time - 1.5) / 0.6) ** 2)) + np.sin(3 * time) ** 2 + 0.6 * np.cos(5.1 * time) ** 2
+    history = History(time, energy, ("made",), "made", "energy")
+    free = suggest_in_window(history, (6.0, 9.0), Settings(replay=False))
+    assert free.recommended
+    assert suggest_in_window(history, (6.0, 9.0), Settings(replay=False, **limit)).recommended is None
+
+
+def test_too_few_states_per_period_recommend_nothing() -> None:
+    time = np.linspace(0, 10, 141)
+    history = History(time, np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, ("made",), "made", "energy")
+    answer = suggest(history, 8.0, Settings())  # six states in each period of the energy
+    assert answer.situation.basis == "energy"
+    assert answer.recommended is None
+    assert any("states per period" in note for note in answer.candidates[0].notes)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.report.parts import HEAD, SET_HEAD
-from tests.choice.test_calibrate import run_folder
+from tests.choice.test_calibration import run_folder
 from tests.command import ROOT, answer, run
 from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
