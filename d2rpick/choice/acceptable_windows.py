@@ -12,7 +12,7 @@ import numpy as np
 
 from d2rpick.choice.candidates import judge
 from d2rpick.choice.expectation import most_energy
-from d2rpick.histories.samples import passages
+from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.roots import narrow
 
@@ -149,7 +149,7 @@ def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
     # what may be locked in at most is passed between the samples, and is just kept there in doubles too
-    most = passages(history.time, history.energy, (1 - _BELOW) * most_energy(situation))[0]
+    most = find_crossings(history.time, history.energy, (1 - _BELOW) * most_energy(situation))[0]
     times = np.concatenate([history.time, candidates.tr, most, situation.vibration.knots(), ends])
     return np.unique(times[(times >= max(start, history.time[0])) & (times < td)])
 

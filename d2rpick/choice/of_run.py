@@ -146,7 +146,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
     """
     answer = replace(answer, cautions=(*answer.cautions, *cautions_of_engine(run.sources)))
     history, td = answer.situation.history, answer.situation.td
-    balance = balance_of(run, history.parts, td)
+    balance = balance_of(run.databases, history.parts, td)
     if balance is None:
         return answer
     if isinstance(answer, Verdict):

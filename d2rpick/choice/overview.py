@@ -187,7 +187,7 @@ def _highest(run: Run, part: Part) -> float | None:
 
 
 def _health(run: Run, flights: Sequence[FreeFlight]) -> Health | None:
-    balance = balance_of(run, run.parts)
+    balance = balance_of(run.databases, run.parts)
     if balance is None:
         return None
     longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)

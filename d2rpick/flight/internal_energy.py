@@ -107,8 +107,8 @@ def end_of_load(history: History, td: float) -> float | None:
         return None
     values = np.append(earlier, latest)
     level = float(values.max() + _BAND_RESERVE * np.ptp(values))
-    falling = [c.time for c in find_crossings(history.time[before], history.energy[before], level) if not c.rising]
-    return falling[-1] if falling else None
+    times, rising = find_crossings(history.time[before], history.energy[before], level)
+    return float(times[~rising][-1]) if not rising.all() else None
 
 
 def _last_excursion(history: History, start: float, td: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -45,36 +45,28 @@ _VELOCITIES: Final = (
 )
 
 
-class Files(Protocol):
-    """The files of a run."""
-
-    @property
-    def databases(self) -> tuple[Legs, ...]:
-        """One for each format."""
-
-
-def balance_of(run: Files, parts: Sequence[Part] | None, until: float = np.inf) -> Balance | None:
+def balance_of(databases: Sequence[Legs], parts: Sequence[Part] | None, until: float = np.inf) -> Balance | None:
     """Read the balance of the whole model, and the hourglass energy of ``parts``, up to a time [time].
 
     None where the files have nothing of it that can be judged, or leave open which columns are meant.
     """
-    whole = _whole(run)
-    of_parts = _hourglass_of(run, parts, until) if parts else ()
+    whole = _whole(databases)
+    of_parts = _hourglass_of(databases, parts, until) if parts else ()
     judged = whole is not None and not _JUDGED.isdisjoint(map(normalised, (*whole.channels, *whole.quantities)))
     if not (judged or of_parts):
         return None
     if whole is None:
-        return Balance(run.databases[0].part_time, hourglass_of_parts=of_parts)
+        return Balance(databases[0].part_time, hourglass_of_parts=of_parts)
     terms = _terms(whole, until)
     return terms and replace(terms, hourglass_of_parts=of_parts)
 
 
-def terms_of(run: Files) -> Balance | None:
+def terms_of(databases: Sequence[Legs]) -> Balance | None:
     """Read the balance of the whole model, be it enough to judge the health of the run or not.
 
     None where the files have no energy beside the internal one, or leave open which columns are meant.
     """
-    whole = _whole(run)
+    whole = _whole(databases)
     known = {name for names in _NAMES.values() for name in names}
     return None if whole is None or known.isdisjoint(map(normalised, whole.channels)) else _terms(whole, np.inf)
 
@@ -106,8 +98,8 @@ def velocity_of(database: Legs) -> Velocity | None:
     return Velocity(values, precision, columns.mass(values) if columns.momentum else None)
 
 
-def _whole(run: Files) -> Legs | None:
-    return next((database for database in run.databases if database.channels), None)
+def _whole(databases: Sequence[Legs]) -> Legs | None:
+    return next((database for database in databases if database.channels), None)
 
 
 def _terms(whole: Legs, until: float) -> Balance | None:
@@ -187,10 +179,12 @@ class _Columns:
         return values
 
 
-def _hourglass_of(run: Files, parts: Sequence[Part], until: float) -> tuple[tuple[Part, float, float], ...]:
+def _hourglass_of(
+    databases: Sequence[Legs], parts: Sequence[Part], until: float
+) -> tuple[tuple[Part, float, float], ...]:
     """Highest hourglass and internal energy of each part, where they are written."""
     ids = [part.id for part in parts]
-    for database in run.databases:
+    for database in databases:
         try:
             hourglass, internal = (database.part_channel(name, ids) for name in ("hourglass_energy", "internal_energy"))
         except FormatError:

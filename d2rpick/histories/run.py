@@ -347,7 +347,7 @@ class _Written:
         """Energies of the whole model."""
         from d2rpick.histories.balance import terms_of
 
-        return terms_of(self._run)
+        return terms_of(self._run.databases)
 
 
 def _left_out(springs: str) -> str:

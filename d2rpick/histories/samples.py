@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -92,28 +92,15 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     return keep, tuple(notes)
 
 
-class Crossing(NamedTuple):
-    """The energy passes a level at ``time`` [time], upwards when ``rising``."""
+def find_crossings(time: Samples, energy: Samples, level: float) -> tuple[Samples, NDArray[np.bool_]]:
+    """Times of all passages of ``energy`` through ``level``, ascending, and which of them rise, both of shape (k,).
 
-    time: float
-    rising: bool
-
-
-class Extremum(NamedTuple):
-    """The energy turns at ``time`` [time] with the value ``energy``; a ``peak`` or a valley."""
-
-    time: float
-    energy: float
-    peak: bool
-
-
-def find_crossings(time: Samples, energy: Samples, level: float) -> tuple[Crossing, ...]:
-    """All passages of ``energy`` through ``level``, ascending in time.
+    Between samples the energy is taken as linear: on piecewise linear data the answer is exact to rounding.
 
     What counts is that the energy lies on different sides before and after:
 
     * a sample exactly on the level is passed once, at that sample; a plateau on the level once, at its first;
-    * touching the level and turning back is no crossing (``find_extrema`` gives such points);
+    * touching the level and turning back is no crossing (``find_turns`` gives such points);
     * a record that begins on the level has a crossing at its first sample, one that ends on it has one where
       it arrives; ``rising`` then tells the one side there is.  A record that stays on the level has none.
 
@@ -126,18 +113,9 @@ def find_crossings(time: Samples, energy: Samples, level: float) -> tuple[Crossi
 
     Examples
     --------
-    >>> import numpy as np
     >>> find_crossings(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 4.0, 1.0, 2.0]), 1.0)
-    (Crossing(time=0.25, rising=True),)
-    >>> find_crossings(np.array([0.0, 1.0, 2.0]), np.array([3.0, 1.0, 0.0]), 1.0)
-    (Crossing(time=1.0, rising=False),)
+    (array([0.25]), array([ True]))
     """
-    times, rising = passages(time, energy, level)
-    return tuple(map(Crossing, times.tolist(), rising.tolist()))
-
-
-def passages(time: Samples, energy: Samples, level: float) -> tuple[Samples, NDArray[np.bool_]]:
-    """Times of the crossings by the rule of ``find_crossings``, and which of them rise, both of shape (k,)."""
     side = np.sign(energy - level)
     off = np.flatnonzero(side)
     if not off.size:
@@ -156,26 +134,16 @@ def passages(time: Samples, energy: Samples, level: float) -> tuple[Samples, NDA
     return at, rising
 
 
-def find_extrema(time: Samples, energy: Samples) -> tuple[Extremum, ...]:
-    """Samples where the energy turns; a flat top or bottom counts once, at its first sample, the ends never.
+def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Places of the samples (n,) where the energy turns, and which of them are peaks, both of shape (k,).
 
-    Parameters
-    ----------
-    time, energy : array of shape (n,)
-        Increasing times [time] and energies [energy].
+    A flat top or bottom counts once, at its first sample, the ends never.
 
     Examples
     --------
-    >>> import numpy as np
-    >>> find_extrema(np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 4.0, 4.0, 2.0]))
-    (Extremum(time=1.0, energy=4.0, peak=True),)
+    >>> find_turns(np.array([0.0, 4.0, 4.0, 2.0]))
+    (array([1]), array([ True]))
     """
-    at, peak = find_turns(energy)
-    return tuple(map(Extremum, time[at].tolist(), energy[at].tolist(), peak.tolist()))
-
-
-def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Places of the extrema among the samples, by the rule of ``find_extrema``, and which of them are peaks."""
     slope = np.sign(np.diff(energy))
     moving = np.flatnonzero(slope)
     turn = np.flatnonzero(slope[moving[:-1]] != slope[moving[1:]])

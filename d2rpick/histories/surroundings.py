@@ -4,18 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-
-class _Numbered(Protocol):
-    """A part."""
-
-    @property
-    def id(self) -> int:
-        """Number."""
+    from d2rpick.histories.names import Part
 
 
 class Support(NamedTuple):
@@ -38,16 +32,16 @@ class Surroundings:
     supports: Mapping[int | None, tuple[Support, ...]] = field(default_factory=dict)
     bodies: Callable[[], tuple[tuple[int, ...], ...]] = tuple
 
-    def gravity_on(self, parts: Iterable[_Numbered] | None) -> tuple[float, ...] | None:
+    def gravity_on(self, parts: Iterable[Part] | None) -> tuple[float, ...] | None:
         """Accelerations that gravity may have for some parts together, or the model; None where they are not known."""
         known = {self.gravity.get(number) for number in _numbers(parts)}
         return known.pop() if len(known) == 1 else None
 
-    def supports_of(self, parts: Iterable[_Numbered] | None) -> tuple[Support, ...]:
+    def supports_of(self, parts: Iterable[Part] | None) -> tuple[Support, ...]:
         """What holds some of these parts, or the model."""
         return tuple(one for number in _numbers(parts) for one in self.supports.get(number, ()))
 
-    def held(self, parts: Iterable[_Numbered] | None, time: float) -> str | None:
+    def held(self, parts: Iterable[Part] | None, time: float) -> str | None:
         """Say what holds some of these parts, or the model, at a time; None where nothing does."""
         for number in _numbers(parts):
             for one in self.supports.get(number, ()):
@@ -56,7 +50,7 @@ class Surroundings:
                     return f"{who} is held or moved by {one.name}: it does not fly"
         return None
 
-    def free(self, parts: Iterable[_Numbered] | None, time: float) -> tuple[float, float] | None:
+    def free(self, parts: Iterable[Part] | None, time: float) -> tuple[float, float] | None:
         """Give the time around ``time`` in which nothing holds these parts, or the model; None where something does."""
         start, end = -inf, inf
         for one in self.supports_of(parts):
@@ -69,5 +63,5 @@ class Surroundings:
 UNKNOWN = Surroundings()
 
 
-def _numbers(parts: Iterable[_Numbered] | None) -> tuple[int | None, ...]:
+def _numbers(parts: Iterable[Part] | None) -> tuple[int | None, ...]:
     return (None,) if parts is None else tuple(part.id for part in parts)

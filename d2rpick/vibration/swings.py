@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.histories.samples import find_extrema, find_turns
+from d2rpick.histories.samples import find_turns
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
@@ -225,9 +225,10 @@ def upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
     >>> f"{found.rate:.2f}", f"{found.vibration_energy(0.0):.2f}"
     ('0.50', '1.00')
     """
-    turns = [turn for turn in find_extrema(time, energy) if turn.peak]
+    at, is_peak = find_turns(energy)
     floor = max(SOLVER_FLOOR * float(np.max(energy)), 0.0)
-    peaks = [(turn.time, float(np.log(turn.energy))) for turn in turns if turn.energy > floor]
+    high = at[is_peak & (energy[at] > floor)]
+    peaks = list(zip(time[high].tolist(), np.log(energy[high]).tolist(), strict=True))
     if not peaks:
         return None
     middle = float(np.mean([t for t, _ in peaks]))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.histories.samples import find_turns, passages
+from d2rpick.histories.samples import find_crossings, find_turns
 from d2rpick.vibration import measures
 from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
@@ -61,7 +61,7 @@ class SampledEnergy:
         ``passed``: when modes pass the level, where that is known [time].
         """
         time, energy = self._sampled_before()
-        times, rising = passages(time, energy, energy[-1])
+        times, rising = find_crossings(time, energy, energy[-1])
         asked = (since <= times) & (times < self.td)
         return times[asked], rising[asked]
 

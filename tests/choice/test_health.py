@@ -102,7 +102,7 @@ def test_a_term_with_a_state_that_is_no_number_is_unknown(tmp_path: Path) -> Non
     for name, content in (("whole", bytes(t01(8).data)), ("damaged", bytes(t01(8).data).replace(written, nan))):
         (tmp_path / f"{name}T01").write_bytes(content)
         run_of = open_run([str(tmp_path / f"{name}T01")])
-        balance = balance_of(run_of, run_of.parts)
+        balance = balance_of(run_of.databases, run_of.parts)
         assert balance is not None
         assert (balance.hourglass is None, balance.kinetic is None) == (name == "damaged", False)
 
@@ -160,18 +160,18 @@ def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> 
     run_of = open_run([ROLLOVER_T01])
     box = [part for part in run_of.parts if part.title == "box"]
     flight = (0.0886, 0.37)
-    before = assess(balance_of(run_of, box, until=0.37) or Balance(TIME), flight, locked=1.75)
+    before = assess(balance_of(run_of.databases, box, until=0.37) or Balance(TIME), flight, locked=1.75)
     assert not list(cautions_of_health(before))
     assert before.energy_ratio_min == pytest.approx(1.0, abs=1e-3)
     for window, code in (((0.06, 0.37), "work-in-window"), ((0.0886, 0.4), "contact-in-window")):
-        whole = assess(balance_of(run_of, box) or Balance(TIME), window, locked=1.75)
+        whole = assess(balance_of(run_of.databases, box) or Balance(TIME), window, locked=1.75)
         assert code in {caution.code for caution in cautions_of_health(whole)}
 
 
 @pytest.mark.parametrize("name", ["oscillator_referenceT01.gz", "chain_referenceT01.gz"])
 def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
     run_of = open_run([stored(name)])
-    health = assess(balance_of(run_of, run_of.parts) or Balance(TIME), (0.013, 0.064))
+    health = assess(balance_of(run_of.databases, run_of.parts) or Balance(TIME), (0.013, 0.064))
     assert health.window_work is not None
     assert health.window_work < 1e-3
     assert not list(cautions_of_health(health))

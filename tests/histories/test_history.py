@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from d2rpick.errors import RangeError
 from d2rpick.histories.history import History, Precision, Samples
-from d2rpick.histories.samples import find_extrema
+from d2rpick.histories.samples import find_turns
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -55,9 +55,9 @@ def test_many_energies_are_those_of_single_times(energy: list[float], shares: li
 @given(st.lists(st.integers(-2, 2), min_size=2, max_size=20))
 def test_turns_and_peaks_are_the_extrema(energy: list[int]) -> None:
     found = history(energy)
-    extrema = find_extrema(found.time, found.energy)
-    assert found.turns.tolist() == [one.time for one in extrema]
-    assert found.peaks.tolist() == [one.time for one in extrema if one.peak]
+    at, peak = find_turns(found.energy)
+    assert found.turns.tolist() == found.time[at].tolist()
+    assert found.peaks.tolist() == found.time[at[peak]].tolist()
 
 
 @pytest.mark.parametrize("precision", [Precision(6), Precision(decimals=4), Precision()])

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.histories.samples import find_crossings, find_extrema, outline
+from d2rpick.histories.samples import find_crossings, find_turns, outline
 
 # small integers hit every coincidence: samples on the level, plateaus, touching
 levels = st.integers(-3, 3)
@@ -33,8 +33,8 @@ CONVENTIONS = {
 
 
 def crossings(energy: list[int], level: float) -> list[tuple[float, bool]]:
-    time = np.arange(len(energy), dtype=float)
-    return [(c.time, c.rising) for c in find_crossings(time, np.array(energy, dtype=float), level)]
+    times, rising = find_crossings(np.arange(len(energy), dtype=float), np.array(energy, dtype=float), level)
+    return list(zip(times.tolist(), rising.tolist(), strict=True))
 
 
 @pytest.mark.parametrize("name", CONVENTIONS)
@@ -77,10 +77,10 @@ def test_shifting_and_scaling_shift_and_scale_the_answer(
     energy: list[int], level: int, shift: int, stretch: float, gain: float
 ) -> None:
     time, values = np.arange(len(energy), dtype=float), np.array(energy, dtype=float)
-    plain = find_crossings(time, values, level)
-    moved = find_crossings(stretch * (time + shift), gain * (values + shift), gain * (level + shift))
-    assert [c.rising for c in moved] == [c.rising for c in plain]
-    assert [c.time for c in moved] == pytest.approx([stretch * (c.time + shift) for c in plain], rel=1e-14, abs=1e-14)
+    plain, rising = find_crossings(time, values, level)
+    moved, still_rising = find_crossings(stretch * (time + shift), gain * (values + shift), gain * (level + shift))
+    assert still_rising.tolist() == rising.tolist()
+    assert moved.tolist() == pytest.approx((stretch * (plain + shift)).tolist(), rel=1e-14, abs=1e-14)
 
 
 @given(energies, levels)
@@ -93,24 +93,22 @@ def test_crossings_alternate_and_mirror(energy: list[int], level: int) -> None:
 @given(energies)
 def test_extrema_are_where_the_slope_changes_sign(energy: list[int]) -> None:
     values = np.array(energy, dtype=float)
-    found = find_extrema(np.arange(len(energy), dtype=float), values)
-    for one in found:
-        i = int(one.time)
-        assert one.energy == values[i]
+    at, peaks = find_turns(values)
+    for i, peak in zip(at.tolist(), peaks.tolist(), strict=True):
         before = next((v for v in values[:i][::-1] if v != values[i]), values[i])
         after = next((v for v in values[i:] if v != values[i]), values[i])
-        assert (before < values[i] > after) if one.peak else (before > values[i] < after)
-    assert all(a.peak != b.peak for a, b in pairwise(found))
+        assert (before < values[i] > after) if peak else (before > values[i] < after)
+    assert (peaks[1:] != peaks[:-1]).all()
     monotone = np.all(np.diff(values) >= 0) or np.all(np.diff(values) <= 0)
-    assert (not found) == bool(monotone)
+    assert (not at.size) == bool(monotone)
 
 
 @settings(max_examples=30)
 @given(st.floats(1e-3, 1e3), st.floats(-1e3, 1e3))
 def test_a_straight_line_is_crossed_where_it_is(slope: float, offset: float) -> None:
     time = np.linspace(0, 1, 11)
-    (one,) = find_crossings(time, offset + slope * time, offset + 0.437 * slope)
-    assert one.time == pytest.approx(0.437, abs=1e-12 + 1e-15 * abs(offset) / slope * 4)
+    (one,) = find_crossings(time, offset + slope * time, offset + 0.437 * slope)[0].tolist()
+    assert one == pytest.approx(0.437, abs=1e-12 + 1e-15 * abs(offset) / slope * 4)
 
 
 @given(st.integers(3, 3000), st.integers(0, 100), st.integers(1, 200))

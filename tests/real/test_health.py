@@ -29,7 +29,7 @@ TIME = np.linspace(0.0, 1.0, 201)
 )
 def test_each_solver_s_names_are_found(name: str, known: dict[str, float | None], expected: set[str]) -> None:
     run_of = open_run([real(f"histories/{name}")])
-    health = assess(balance_of(run_of, run_of.parts) or Balance(TIME))
+    health = assess(balance_of(run_of.databases, run_of.parts) or Balance(TIME))
     for key, value in known.items():
         assert getattr(health, key) == (value and pytest.approx(value, rel=1e-4))
     assert {caution.code for caution in cautions_of_health(health)} == expected

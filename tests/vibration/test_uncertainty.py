@@ -42,15 +42,14 @@ def covered(samples_per_period: int, digits: int, *, jitter: float, runs: int) -
             rounded(time, digits), rounded(mode.energy(time), digits), source=("test",), format="csv", channel="E",
             time_precision=printed, energy_precision=printed,
         )  # fmt: skip
-        found = [c for c in find_crossings(history.time, history.energy, history.energy_at(td)) if c.time < td - step]
-        if not found:
+        times, rises = find_crossings(history.time, history.energy, history.energy_at(td))
+        times = times[times < td - step]
+        if not times.size:
             continue
-        times = np.array([c.time for c in found])
         rising = np.array([float(mode.deformation(t) * mode.velocity(t)) > 0 for t in true])
         half = sampled_reach(history, times, td, history.energy_at(td))
-        for one, width in zip(found, half, strict=True):
-            same = np.array(true)[rising == one.rising]
-            distance = np.abs(same - one.time).min()
+        for one, rises_there, width in zip(times, rises, half, strict=False):
+            distance = np.abs(np.array(true)[rising == rises_there] - one).min()
             if distance < 0.25 / 2:  # a true crossing that the samples show
                 inside.append(distance <= width)
         widths += (2 * half / step).tolist()

@@ -12,10 +12,9 @@ from d2rpick.errors import FormatError, listing
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.curves import Curves, find_curves
-from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, split
+from d2rpick.histories.formats.layout import UTF16, Layout, Text, find_layout, is_skipped, split
 from d2rpick.histories.formats.printed import of_one_run
 from d2rpick.histories.formats.table_values import checked_values, line_of, plain_values
-from d2rpick.histories.formats.text import UTF16, Text
 from d2rpick.histories.names import internal_energies, is_time, meant, near_miss, quantity_of, refuse_other_quantity
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.formats.layout import Layout
-    from d2rpick.histories.formats.text import Text
+    from d2rpick.histories.formats.layout import Layout, Text
     from d2rpick.histories.history import Samples
 
 

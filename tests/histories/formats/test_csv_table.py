@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from d2rpick.errors import FormatError
 from d2rpick.histories.formats import csv_table
-from d2rpick.histories.formats.text import Portions, Text
+from d2rpick.histories.formats.layout import Portions, Text
 from d2rpick.histories.history import EXACT, Precision
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
