@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.report.fields import Field, Kind
+from d2rpick.report.fields import Field, Kind, kind_of
 from d2rpick.report.formats import FORMATS
 from tests.command import ROOT
 
@@ -47,8 +47,8 @@ def schema_of(document: Document) -> dict[str, Any]:
 def _plain(schema: Any, defined: dict[str, Any], closed: bool) -> Any:
     """Put schemas in the place of kinds and fields; what has a name is defined once and referred to."""
     if isinstance(schema, Field):
-        found = _plain(schema.kind, defined, closed)
-        described = defined[schema.kind.name] if schema.kind.name else found
+        found = _plain(kind_of(schema.kind), defined, closed)
+        described = defined[kind_of(schema.kind).name] if kind_of(schema.kind).name else found
         described.update({"description": schema.meaning} if schema.meaning else {})
         return found
     if isinstance(schema, Kind):

@@ -8,26 +8,26 @@ from d2rpick.choice.cost import MEASURED
 from d2rpick.choice.weights_file import written
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import NUMBER, SOME, TEXT, TEXTS, Document, Field, each, many, row
+from d2rpick.report.fields import Document, Field, each, many, row
 
 if TYPE_CHECKING:
     from d2rpick.choice.calibration import Calibration
 
 _LEG: Final = row(
-    Field("name", TEXT),
-    Field("counts", each(NUMBER)),
-    Field("rigid_nodes", NUMBER),
-    Field("step_time", NUMBER, get=lambda leg: leg.total),
-    Field("element_time", SOME, get=lambda leg: leg.elements),
+    Field("name", "text"),
+    Field("counts", each("number")),
+    Field("rigid_nodes", "number"),
+    Field("step_time", "number", get=lambda leg: leg.total),
+    Field("element_time", "number?", get=lambda leg: leg.elements),
 )
 DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; times in us per cycle.", row(
     keys.WARNINGS,
-    Field("element_share", NUMBER, "share of the elements in a deformable step",
+    Field("element_share", "number", "share of the elements in a deformable step",
           lambda ours: ours.weights.element_share),
-    Field("rigid_node", NUMBER, "cost of a node of a rigid body", lambda ours: ours.weights.rigid_node),
-    Field("per_element", each(NUMBER), "cost of an element by formulation", lambda ours: ours.weights.per_element),
-    Field("told", TEXTS, "what the legs decide; the others keep the measured ratio"),
-    Field("misfit", NUMBER),
+    Field("rigid_node", "number", "cost of a node of a rigid body", lambda ours: ours.weights.rigid_node),
+    Field("per_element", each("number"), "cost of an element by formulation", lambda ours: ours.weights.per_element),
+    Field("told", "texts", "what the legs decide; the others keep the measured ratio"),
+    Field("misfit", "number"),
     Field("legs", many(_LEG), get=lambda ours: ours.observations),
 ), closed=True)  # fmt: skip
 HEAD = ("formulation", "weight", "measured with OpenRadioss", "by")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from d2rpick.report import tables
 from d2rpick.version import __version__
@@ -25,22 +25,25 @@ class Kind:
     plain: Callable[[Any], Any] = lambda value: value
     name: str = ""
 
-    def within(self, **limits: Any) -> Kind:
-        """Limit the values, in the words of JSON schema: ``minimum=0``."""
-        return Kind({**self.schema, **limits}, self.plain, self.name)
+
+# Kinds that many fields have; with a question mark they may be None.  A size is a number that is not negative.
+Name = Literal[
+    "number", "number?", "size?", "integer", "integer?", "text", "text?", "texts", "texts?", "flag", "flag?", "span",
+    "span?",
+]  # fmt: skip
 
 
 class Field(NamedTuple):
     """A key with its kind and meaning; its value is what ``get`` takes from a thing, else what bears its name there."""
 
     key: str
-    kind: Kind
+    kind: Kind | Name
     meaning: str = ""
     get: Callable[[Any], Any] | None = None
 
     def of(self, thing: Any) -> Any:
         """Give the value that JSON has of a thing."""
-        return self.kind.plain(self.taken(thing))
+        return kind_of(self.kind).plain(self.taken(thing))
 
     def taken(self, thing: Any) -> Any:
         """Give the value as the thing has it."""
@@ -80,7 +83,7 @@ def row(*fields: Field, name: str = "", later: Iterable[str] = (), closed: bool 
 
     Examples
     --------
-    >>> part = row(Field("id", INTEGER), Field("title", TEXT, get=lambda part: part.title.strip()))
+    >>> part = row(Field("id", "integer"), Field("title", "text", get=lambda part: part.title.strip()))
     >>> from types import SimpleNamespace
     >>> part.plain(SimpleNamespace(id=7, title="door "))
     {'id': 7, 'title': 'door'}
@@ -95,8 +98,15 @@ def row(*fields: Field, name: str = "", later: Iterable[str] = (), closed: bool 
     return Row(schema, lambda thing: {field.key: field.of(thing) for field in fields}, name, fields)
 
 
-def maybe(kind: Kind) -> Kind:
+def kind_of(kind: Kind | Name, **limits: Any) -> Kind:
+    """Give a kind by its name, within limits in the words of JSON schema: ``minimum=0``."""
+    known = _KINDS[kind] if isinstance(kind, str) else kind
+    return Kind({**known.schema, **limits}, known.plain, known.name) if limits else known
+
+
+def maybe(kind: Kind | Name) -> Kind:
     """Let values be None where they are not known."""
+    kind = kind_of(kind)
     known = kind.schema
     if None in known.get("enum", ()) or "null" in known.get("type", ()):
         return kind
@@ -104,14 +114,15 @@ def maybe(kind: Kind) -> Kind:
     return Kind({**known, **null}, lambda value: None if value is None else kind.plain(value), kind.name)
 
 
-def many(kind: Kind) -> Kind:
+def many(kind: Kind | Name) -> Kind:
     """Give the kind of an array."""
-    return Kind({"type": "array", "items": kind}, lambda values: [kind.plain(value) for value in values])
+    one = kind_of(kind)
+    return Kind({"type": "array", "items": one}, lambda values: [one.plain(value) for value in values])
 
 
-def each(kind: Kind) -> Kind:
+def each(kind: Name) -> Kind:
     """Give the kind of an object with any keys, whose values are of one kind."""
-    return Kind({"type": "object", "additionalProperties": kind}, dict)
+    return Kind({"type": "object", "additionalProperties": kind_of(kind)}, dict)
 
 
 def one_of(*names: str) -> Kind:
@@ -119,18 +130,18 @@ def one_of(*names: str) -> Kind:
     return Kind({"enum": list(names)})
 
 
-NUMBER: Final = Kind({"type": "number"})
-INTEGER: Final = Kind({"type": "integer"})
-TEXT: Final = Kind({"type": "string"})
-FLAG: Final = Kind({"type": "boolean"})
-NOTHING: Final = Kind({"type": "null"})
-TEXTS: Final = many(TEXT)
-SPAN: Final = Kind({"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}, list)
-# What is often not known: a number, one that is not negative, a yes or no, a text.
-SOME: Final = maybe(NUMBER)
-SIZE: Final = SOME.within(minimum=0)
-SOME_FLAG: Final = maybe(FLAG)
-SOME_TEXT: Final = maybe(TEXT)
+_NUMBER: Final = Kind({"type": "number"})
+_TEXT: Final = Kind({"type": "string"})
+_KNOWN: Final = {
+    "number": _NUMBER,
+    "size": Kind({"type": "number", "minimum": 0}),
+    "integer": Kind({"type": "integer"}),
+    "text": _TEXT,
+    "texts": Kind({"type": "array", "items": _TEXT}, list),
+    "flag": Kind({"type": "boolean"}),
+    "span": Kind({"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}, list),
+}
+_KINDS: Final = {**_KNOWN, **{f"{name}?": maybe(kind) for name, kind in _KNOWN.items()}}
 
 
 @dataclass(frozen=True)
@@ -149,7 +160,7 @@ class Document:
     @property
     def whole(self) -> Row:
         """All its fields."""
-        head = (Field("schema", Kind({"const": self.name})), Field("tool_version", TEXT), Field("command", TEXTS))
+        head = (Field("schema", Kind({"const": self.name})), Field("tool_version", "text"), Field("command", "texts"))
         known = self.row.schema
         later = {*self.row.keys} - {*known["required"]}
         more = {key: value for key, value in known.items() if key not in ("type", "required", "properties")}

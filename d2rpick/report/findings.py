@@ -16,7 +16,7 @@ from d2rpick.choice.warnings import Caution
 from d2rpick.deck.source import STDIN
 from d2rpick.errors import name_units, printable
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import INTEGER, NUMBER, SOME, TEXT, TEXTS, Document, Field, many, maybe, one_of, row
+from d2rpick.report.fields import Document, Field, kind_of, many, one_of, row
 from d2rpick.rules import RULES, Example, Severity
 from d2rpick.version import __version__
 
@@ -49,24 +49,24 @@ class Checks:
     fail_on: Severity = Severity.ERROR
 
 
-_LINE: Final = INTEGER.within(minimum=1)
+_LINE: Final = kind_of("integer", minimum=1)
 _COUNTS: Final = ("errors", "warnings", "infos", "decks")
 FINDING: Final = row(
-    Field("rule", TEXT.within(pattern="^D2R[0-9]{3}$")),
+    Field("rule", kind_of("text", pattern="^D2R[0-9]{3}$")),
     Field("severity", one_of(*map(str, Severity)), get=lambda finding: str(finding["severity"])),
-    Field("message", TEXT),
-    Field("file", TEXT),
+    Field("message", "text"),
+    Field("file", "text"),
     Field("line", _LINE),
     Field("column", _LINE),
-    Field("deck", TEXT),
+    Field("deck", "text"),
 )
 _WINDOW: Final = row(
-    *(Field(key, maybe(INTEGER)) for key in ("part", "part_set", "node")),
-    Field("tr", NUMBER),
-    Field("td", SOME),
-    Field("file", TEXT),
+    *(Field(key, "integer?") for key in ("part", "part_set", "node")),
+    Field("tr", "number"),
+    Field("td", "number?"),
+    Field("file", "text"),
     Field("line", _LINE),
-    Field("deck", TEXT),
+    Field("deck", "text"),
 )
 
 
@@ -237,12 +237,12 @@ DOCUMENT: Final = Document(
     "Answer of d2rpick check; times in the unit of the deck, lines and columns from 1.",
     row(
         keys.WARNINGS._replace(get=_warnings),
-        Field("decks", TEXTS, get=lambda checks: [_shown(result.deck, checks.root) for result in checks.results]),
-        Field("history", maybe(TEXTS),
+        Field("decks", "texts", get=lambda checks: [_shown(result.deck, checks.root) for result in checks.results]),
+        Field("history", "texts?",
               get=lambda checks: checks.history and [_shown(name, checks.root) for name in checks.history]),
         Field("windows", many(_WINDOW), get=_windows),
         Field("findings", many(FINDING), get=_findings),
-        Field("summary", row(*(Field(key, INTEGER.within(minimum=0)) for key in _COUNTS)),
+        Field("summary", row(*(Field(key, kind_of("integer", minimum=0)) for key in _COUNTS)),
               get=lambda checks: {**_counts(checks.results), "decks": len(checks.results)}),
     ),
 )  # fmt: skip

@@ -6,21 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import (
-    FLAG,
-    INTEGER,
-    NUMBER,
-    SOME,
-    SOME_TEXT,
-    TEXT,
-    TEXTS,
-    Document,
-    Field,
-    many,
-    maybe,
-    one_of,
-    row,
-)  # fmt: skip
+from d2rpick.report.fields import Document, Field, kind_of, many, maybe, one_of, row
 from d2rpick.report.situation import head, measures_of, spoken
 
 if TYPE_CHECKING:
@@ -29,36 +15,38 @@ if TYPE_CHECKING:
 
 _EVIDENCE: Final = one_of("momentum", "contact-energy", "energy-balance", "oscillator", "energy")
 _FLIGHT: Final = row(
-    Field("start", NUMBER, get=lambda seen: seen[1].start),
-    Field("end", SOME, "null where the record ends in flight", lambda seen: seen[1].end if seen[1].end_seen else None),
+    Field("start", "number", get=lambda seen: seen[1].start),
+    Field("end", "number?", "null where the record ends in flight",
+          lambda seen: seen[1].end if seen[1].end_seen else None),
     Field("parts", maybe(many(keys.PART)), "that fly together, null for the whole model",
           lambda seen: seen[1].parts or None),
     Field("source", _EVIDENCE, get=lambda seen: seen[0]),
 )  # fmt: skip
 _PART: Final = row(
     *keys.PART.of_part(lambda one: one.part),
-    Field("energy_max", SOME, "null where not written in every state"),
+    Field("energy_max", "number?", "null where not written in every state"),
 )
+_SAMPLING: Final = row(*(Field(key, kind_of("number", exclusiveMinimum=0)) for key in ("min", "median", "max")))
 DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in the unit of the history.", row(
     keys.WARNINGS,
-    Field("source", TEXTS.within(minItems=1)),
-    Field("format", TEXT, "formats of companions joined by ' + '"),
-    Field("version", TEXT, "of the solver, empty where no file names it"),
-    Field("title", TEXT),
-    Field("states", maybe(INTEGER.within(minimum=0)),
+    Field("source", kind_of("texts", minItems=1)),
+    Field("format", "text", "formats of companions joined by ' + '"),
+    Field("version", "text", "of the solver, empty where no file names it"),
+    Field("title", "text"),
+    Field("states", maybe(kind_of("integer", minimum=0)),
           "null where several columns may be the time; then, and at 0, the times are null"),
-    Field("time_start", SOME), Field("time_end", SOME),
-    Field("time_unit", TEXT, "empty where no file names it"),
-    Field("sampling", maybe(row(*(Field(key, NUMBER.within(exclusiveMinimum=0)) for key in ("min", "median", "max")))),
+    Field("time_start", "number?"), Field("time_end", "number?"),
+    Field("time_unit", "text", "empty where no file names it"),
+    Field("sampling", maybe(_SAMPLING),
           "output intervals, null with a single state"),
-    Field("complete", FLAG, "false when the input ends within a state"),
-    Field("channels", TEXTS),
+    Field("complete", "flag", "false when the input ends within a state"),
+    Field("channels", "texts"),
     Field("parts", many(_PART)),
     Field("flights", many(_FLIGHT), "windows of free flight, by the best evidence that the files hold"),
-    Field("should_write", SOME_TEXT,
+    Field("should_write", "text?",
           "output of the solver that would show the flights for sure, null where the files have it"),
     keys.HEALTH,
-    Field("notes", TEXTS),
+    Field("notes", "texts"),
 ))  # fmt: skip
 _PARTS_HEAD = ("part", "title", "highest internal energy")
 # Keys of the JSON output with a single value.

@@ -7,24 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.errors import in_rows, listing, printable
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import (
-    FLAG,
-    INTEGER,
-    NUMBER,
-    SOME,
-    SOME_FLAG,
-    SOME_TEXT,
-    TEXT,
-    TEXTS,
-    Document,
-    Field,
-    csv_of,
-    each,
-    many,
-    maybe,
-    one_of,
-    row,
-)  # fmt: skip
+from d2rpick.report.fields import Document, Field, csv_of, each, many, maybe, one_of, row
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,31 +31,31 @@ TABLES = {
 }
 _WIDTH = 110  # of a table, as screens hold side by side with other things
 
-_COUNTS: Final = maybe(each(INTEGER))
+_COUNTS: Final = maybe(each("integer"))
 _IN_FLIGHT: Final = row(
-    Field("energy", SOME, "mean internal energy in the flight", lambda one: one.mean),
-    Field("energy_change", SOME, "at its end less at its start", lambda one: one.change),
-    Field("energy_scatter", SOME, "standard deviation over mean", lambda one: one.scatter),
-    Field("flies", SOME_FLAG, "whether the part flies with the rest"),
-    Field("deforms", SOME_FLAG, "whether its energy still scatters by a tenth of its mean or more"),
+    Field("energy", "number?", "mean internal energy in the flight", lambda one: one.mean),
+    Field("energy_change", "number?", "at its end less at its start", lambda one: one.change),
+    Field("energy_scatter", "number?", "standard deviation over mean", lambda one: one.scatter),
+    Field("flies", "flag?", "whether the part flies with the rest"),
+    Field("deforms", "flag?", "whether its energy still scatters by a tenth of its mean or more"),
 )
 # What it does in flight is that of the longest.
 PART: Final = row(
     *keys.PART.fields,
     Field("elements", _COUNTS, "numbers by kind; null without a deck"),
-    Field("formulations", TEXTS),
-    Field("material", SOME_TEXT),
+    Field("formulations", "texts"),
+    Field("material", "text?"),
     Field("kind", maybe(one_of("deformable", "rigid", "spring", "airbag", "void", "particles"))),
-    Field("mass", SOME),
+    Field("mass", "number?"),
     Field("mass_source", maybe(one_of("history", "deck"))),
     *_IN_FLIGHT.of_part(lambda part: part.flight),
-    Field("cost_share", SOME, "share of its elements in the cost of all elements"),
-    Field("smallest_step", SOME, "smallest stable time step"),
+    Field("cost_share", "number?", "share of its elements in the cost of all elements"),
+    Field("smallest_step", "number?", "smallest stable time step"),
     Field("step_source", maybe(one_of("deck", "glstat", "d3hsp"))),
-    Field("shares_nodes", maybe(many(INTEGER)), "parts that share nodes with it; null without a deck"),
+    Field("shares_nodes", maybe(many("integer")), "parts that share nodes with it; null without a deck"),
     Field("verdict", one_of("switch", "merge", "keep", "unknown")),
-    Field("merge_with", maybe(INTEGER)),
-    Field("reasons", TEXTS),
+    Field("merge_with", "integer?"),
+    Field("reasons", "texts"),
 )
 
 
@@ -82,54 +65,54 @@ def _free(one: PartSet) -> bool | None:
 
 
 SET: Final = row(
-    Field("name", TEXT),
-    Field("recommended", FLAG),
-    Field("parts", many(INTEGER)),
-    Field("bodies", maybe(many(many(INTEGER))), "the rigid bodies that its parts make; null without a deck",
+    Field("name", "text"),
+    Field("recommended", "flag"),
+    Field("parts", many("integer")),
+    Field("bodies", maybe(many(many("integer"))), "the rigid bodies that its parts make; null without a deck",
           lambda one: one.bodies or None),
-    Field("elements", maybe(INTEGER), "elements that are rigid with it"),
-    Field("element_fraction", SOME),
-    Field("mass_fraction", SOME),
-    Field("cost_share", SOME, "share of a step that is saved while it is rigid"),
-    Field("step_growth", SOME, "how much the step may at least grow while it is rigid",
+    Field("elements", "integer?", "elements that are rigid with it"),
+    Field("element_fraction", "number?"),
+    Field("mass_fraction", "number?"),
+    Field("cost_share", "number?", "share of a step that is saved while it is rigid"),
+    Field("step_growth", "number?", "how much the step may at least grow while it is rigid",
           lambda one: None if _free(one) else one.step_growth),
-    Field("step_free", SOME_FLAG, "whether nothing deformable keeps the step", _free),
-    Field("tr", SOME, get=lambda one: one.window and one.window[0]),
-    Field("td", SOME, get=lambda one: one.window and one.window[1]),
-    Field("rigid_fraction", SOME),
-    Field("run_time_share", SOME),
-    Field("saving", SOME),
-    keys.CANDIDATE["position_error"]._replace(kind=SOME),
-    Field("position_limit", SOME),
+    Field("step_free", "flag?", "whether nothing deformable keeps the step", _free),
+    Field("tr", "number?", get=lambda one: one.window and one.window[0]),
+    Field("td", "number?", get=lambda one: one.window and one.window[1]),
+    Field("rigid_fraction", "number?"),
+    Field("run_time_share", "number?"),
+    Field("saving", "number?"),
+    keys.CANDIDATE["position_error"]._replace(kind="number?"),
+    Field("position_limit", "number?"),
     Field("position_part", maybe(many(keys.PART)), get=lambda one: one.position_part and (one.position_part,)),
-    Field("position_body", maybe(many(INTEGER)),
+    Field("position_body", maybe(many("integer")),
           "parts of the rigid body that is off, where there are several; else null",
           lambda one: one.position_body or None),
     keys.CANDIDATE["position_error_assumes"]._replace(key="position_assumes"),
-    Field("angle_error", SOME, "by how much the body is turned at td from where it should be [degrees]; null where the "
-          "parts do not tell"),
-    Field("reasons", TEXTS),
+    Field("angle_error", "number?",
+          "by how much the body is turned at td from where it should be [degrees]; null where the parts do not tell"),
+    Field("reasons", "texts"),
     keys.CANDIDATE["position_error_is_lower_bound"]._replace(key="position_is_lower_bound"),
     later=("position_is_lower_bound",),
 )  # fmt: skip
 _HISTORY: Final = row(
-    Field("source", TEXTS, get=lambda run: run.sources),
-    Field("sha256", TEXTS, get=lambda run: [file.sha256() for file in run.files]),
-    Field("format", TEXT, get=lambda run: " + ".join(one.format for one in run.databases)),
-    Field("notes", TEXTS),
+    Field("source", "texts", get=lambda run: run.sources),
+    Field("sha256", "texts", get=lambda run: [file.sha256() for file in run.files]),
+    Field("format", "text", get=lambda run: " + ".join(one.format for one in run.databases)),
+    Field("notes", "texts"),
 )
 _DECK: Final = row(
     *keys.FILES,
     Field("solver", one_of("ls-dyna", "radioss")),
-    Field("parts", INTEGER, get=lambda deck: len(deck.parts)),
-    Field("elements", INTEGER, get=lambda deck: sum(sum(counts.values()) for counts in deck.counts.values())),
-    Field("complete", FLAG),
-    Field("notes", TEXTS),
+    Field("parts", "integer", get=lambda deck: len(deck.parts)),
+    Field("elements", "integer", get=lambda deck: sum(sum(counts.values()) for counts in deck.counts.values())),
+    Field("complete", "flag"),
+    Field("notes", "texts"),
 )
 _WEIGHTS: Final = row(
-    *keys.WEIGHTS, Field("element_share", NUMBER), Field("rigid_node", NUMBER), Field("per_element", each(NUMBER))
+    *keys.WEIGHTS, Field("element_share", "number"), Field("rigid_node", "number"), Field("per_element", each("number"))
 )
-_FLIGHT: Final = row(Field("start", NUMBER), Field("end", NUMBER), Field("longest", FLAG))
+_FLIGHT: Final = row(Field("start", "number"), Field("end", "number"), Field("longest", "flag"))
 
 
 def _flights(found: Parts) -> list[dict[str, Any]]:
@@ -145,11 +128,11 @@ DOCUMENT: Final = Document(
         Field("history", _HISTORY, get=lambda found: found.run),
         Field("deck", maybe(_DECK), get=lambda found: found.inventory),
         Field("weights", maybe(_WEIGHTS)),
-        Field("step_ratio", NUMBER, get=lambda found: found.settings.step_ratio),
+        Field("step_ratio", "number", get=lambda found: found.settings.step_ratio),
         Field("flights", many(_FLIGHT), get=_flights),
         Field("parts", many(row(*PART.fields, Field("flights", many(_IN_FLIGHT)))), get=lambda found: found.rows),
         Field("sets", many(SET)),
-        Field("recommended", maybe(row(Field("name", TEXT), Field("parts", many(INTEGER))))),
+        Field("recommended", maybe(row(Field("name", "text"), Field("parts", many("integer"))))),
     ),
     closed=True,
 )

@@ -6,21 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import (
-    FLAG,
-    INTEGER,
-    NUMBER,
-    SOME,
-    SOME_FLAG,
-    SOME_TEXT,
-    Document,
-    Field,
-    csv_of,
-    many,
-    maybe,
-    one_of,
-    row,
-)  # fmt: skip
+from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe, one_of, row
 from d2rpick.report.situation import what_was_read
 
 if TYPE_CHECKING:
@@ -51,32 +37,34 @@ def _margin(key: str) -> Callable[[Planned], Any]:
 _BEST: Final = row(*keys.CANDIDATE.of_part(lambda planned: planned.candidate))
 _POSITION: Final = ("position_error", "position_error_part", "position_error_body", "position_error_assumes")
 WINDOW: Final = row(
-    Field("flight", INTEGER.within(minimum=1), "number of the flight in the record, from 1", lambda row: row.number),
-    Field("flight_start", NUMBER, get=lambda row: row.start),
-    Field("flight_end", SOME, "the contact that ends it, null where the record ends in flight",
+    Field("flight", kind_of("integer", minimum=1), "number of the flight in the record, from 1",
+          lambda row: row.number),
+    Field("flight_start", "number", get=lambda row: row.start),
+    Field("flight_end", "number?", "the contact that ends it, null where the record ends in flight",
           lambda row: row.flight.end),
-    Field("flight_source", SOME_TEXT, "what shows it", lambda row: row.flight.source),
-    Field("certain", FLAG, "whether more than the level of the energy shows it", lambda row: row.flight.certain),
+    Field("flight_source", "text?", "what shows it", lambda row: row.flight.source),
+    Field("certain", "flag", "whether more than the level of the energy shows it", lambda row: row.flight.certain),
     Field("status", one_of("supported", "re-plan", "done", "left-out")),
-    Field("reason", SOME_TEXT, "why it is not supported, or what became of a window that is done"),
-    Field("tr", SOME, get=lambda row: _times(row, 0)),
-    Field("td", SOME, get=lambda row: _times(row, 1)),
-    Field("rigid_time", SOME),
-    Field("rigid_fraction", SOME, "of the record"),
+    Field("reason", "text?", "why it is not supported, or what became of a window that is done"),
+    Field("tr", "number?", get=lambda row: _times(row, 0)),
+    Field("td", "number?", get=lambda row: _times(row, 1)),
+    Field("rigid_time", "number?"),
+    Field("rigid_fraction", "number?", "of the record"),
     _BEST["run_time_share"]._replace(
-        kind=SOME, meaning="of the reference, with this window alone; null without a cost share"),
-    Field("locks_in", SOME_FLAG, "whether the window locks in energy, so that landings after it move"),
+        kind="number?", meaning="of the reference, with this window alone; null without a cost share"),
+    Field("locks_in", "flag?", "whether the window locks in energy, so that landings after it move"),
     Field("basis", maybe(keys.BASIS), get=lambda row: (now := _situation(row)) and now.basis),
     _BEST["kind"]._replace(kind=maybe(keys.KIND)),
-    *(_BEST[key]._replace(kind=SOME) for key in ("level_error", "lock_in_error", "residual")),
-    Field("kinetic_share", SOME, get=lambda row: (now := _situation(row)) and now.kinetic_share),
-    Field("margin", SOME, "kept clear before the contact, null for a window that is done", _margin("time")),
+    *(_BEST[key]._replace(kind="number?") for key in ("level_error", "lock_in_error", "residual")),
+    Field("kinetic_share", "number?", get=lambda row: (now := _situation(row)) and now.kinetic_share),
+    Field("margin", "number?", "kept clear before the contact, null for a window that is done", _margin("time")),
     Field("margin_source", maybe(one_of("given", "flight", "landing", "no-contact")),
           "given, 3 % of the flight, or how far a switch may move the landing", _margin("source")),
-    Field("landing_spread", SOME, "how far a switch may move the landing, null where the files do not tell",
+    Field("landing_spread", "number?", "how far a switch may move the landing, null where the files do not tell",
           _margin("spread")),
-    Field("landing", SOME, "of a window that is done", lambda row: row.done and row.done.landing),
-    Field("landing_planned", SOME, "in the run that it was planned from", lambda row: row.done and row.done.planned),
+    Field("landing", "number?", "of a window that is done", lambda row: row.done and row.done.landing),
+    Field("landing_planned", "number?", "in the run that it was planned from",
+          lambda row: row.done and row.done.planned),
     *(_BEST[key] for key in _POSITION),
     keys.QUALITY[0]._replace(meaning="of the pair; null without one, and for a window that is done"),
     _BEST["position_error_is_lower_bound"],
@@ -84,11 +72,11 @@ WINDOW: Final = row(
 )  # fmt: skip
 DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in the unit of the history.", row(
     *keys.FRAME,
-    Field("min_rigid", NUMBER, "shorter windows are left out"),
+    Field("min_rigid", "number", "shorter windows are left out"),
     Field("windows", many(WINDOW), "a row per flight, in the order of time", lambda plan: plan.rows),
-    Field("rigid_time", NUMBER, "of all supported windows"),
-    Field("rigid_fraction", NUMBER, "of the record, with all supported windows"),
-    Field("run_time_share", SOME, "of the reference, with all supported windows; null without a cost share"),
+    Field("rigid_time", "number", "of all supported windows"),
+    Field("rigid_fraction", "number", "of the record, with all supported windows"),
+    Field("run_time_share", "number?", "of the reference, with all supported windows; null without a cost share"),
 ))  # fmt: skip
 
 

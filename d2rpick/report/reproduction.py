@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.models.published import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, pair_at_peak, residual
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import FLAG, INTEGER, NUMBER, SOME, SOME_FLAG, TEXT, TEXTS, Document, Field, Kind, many, row
+from d2rpick.report.fields import Document, Field, Kind, kind_of, many, row
 from d2rpick.version import __version__
 
 if TYPE_CHECKING:
@@ -29,38 +29,38 @@ class Reproduction(NamedTuple):
 
 
 _PAIR: Final = Kind(
-    row(*(Field(key, NUMBER) for key in ("tr", "td", "residual"))).schema,
+    row(*(Field(key, "number") for key in ("tr", "td", "residual"))).schema,
     lambda pair: {"tr": pair[0], "td": pair[1], "residual": residual(pair)},
     "pair",
 )
 _ROW: Final = row(
-    Field("what", TEXT), Field("unit", TEXT),
-    Field("published", SOME, "what the paper states; null where it states none"),
-    Field("reference", SOME, "computed in another way, see source"),
-    Field("here", NUMBER),
-    Field("difference", NUMBER, "here less published, or less reference where nothing is published"),
-    Field("tolerance", NUMBER.within(minimum=0)),
-    Field("source", TEXT, "where the published number or the reference value is from"),
-    Field("agrees", FLAG, "the difference is within the tolerance"),
+    Field("what", "text"), Field("unit", "text"),
+    Field("published", "number?", "what the paper states; null where it states none"),
+    Field("reference", "number?", "computed in another way, see source"),
+    Field("here", "number"),
+    Field("difference", "number", "here less published, or less reference where nothing is published"),
+    Field("tolerance", kind_of("number", minimum=0)),
+    Field("source", "text", "where the published number or the reference value is from"),
+    Field("agrees", "flag", "the difference is within the tolerance"),
 )  # fmt: skip
 _FIGURE: Final = row(
-    Field("name", TEXT), Field("title", TEXT), Field("section", INTEGER.within(minimum=1, maximum=5)),
-    Field("figure", TEXT, "number in the paper"),
-    Field("paper", TEXT, "what the paper shows"),
-    Field("found", TEXT, "what is found here"),
-    Field("agrees", SOME_FLAG, "null where there is nothing to compare"),
+    Field("name", "text"), Field("title", "text"), Field("section", kind_of("integer", minimum=1, maximum=5)),
+    Field("figure", "text", "number in the paper"),
+    Field("paper", "text", "what the paper shows"),
+    Field("found", "text", "what is found here"),
+    Field("agrees", "flag?", "null where there is nothing to compare"),
 )  # fmt: skip
 DOCUMENT: Final = Document(
     "d2rpick/reproduce/2",
     "Published results of the floating oscillator beside those found here; times of pairs in seconds.",
     row(
         keys.WARNINGS._replace(get=lambda _: ()),
-        Field("rows", many(_ROW).within(minItems=1)),
+        Field("rows", kind_of(many(_ROW), minItems=1)),
         Field("published", _PAIR, get=lambda _: PUBLISHED),
         Field("better", _PAIR, get=lambda _: pair_at_peak()),
         Field("figures", many(_FIGURE), get=lambda answer: answer.exhibits),
-        Field("misprints", TEXTS, get=lambda _: MISPRINTS),
-        Field("files", TEXTS),
+        Field("misprints", "texts", get=lambda _: MISPRINTS),
+        Field("files", "texts"),
     ),
 )
 

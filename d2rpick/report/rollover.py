@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.models.box_run import BOX
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import NUMBER, SOME, Document, Field, csv_of, many, row
+from d2rpick.report.fields import Document, Field, csv_of, many, row
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.models.box_scan import Outcome
 
 # Of each run, in JSON and as columns.
-RUN: Final = row(*(Field(key, NUMBER) for key in (
+RUN: Final = row(*(Field(key, "number") for key in (
     "tr", "energy", "energy_ratio", "roll_error", "x_error", "z_error", "omega_error", "lost_energy", "mean_ratio",
 )), closed=True)  # fmt: skip
 DOCUMENT: Final = Document(
@@ -25,12 +25,12 @@ DOCUMENT: Final = Document(
     "Switched runs of the rollover box against the one without switching; SI units, roll_error in degrees.",
     row(
         keys.WARNINGS,
-        Field("released", SOME, "the sled pushed last", lambda scan: scan.reference.released),
-        Field("landed", SOME, "the ground pushed first; null where the run ends before",
+        Field("released", "number?", "the sled pushed last", lambda scan: scan.reference.released),
+        Field("landed", "number?", "the ground pushed first; null where the run ends before",
               lambda scan: scan.reference.landed),
-        Field("td", NUMBER, get=lambda scan: scan.answer.situation.td),
-        Field("energy_td", NUMBER, get=lambda scan: _energy(scan.reference, scan.answer.situation.td)),
-        Field("recommended", SOME, "the tr that suggest recommends", lambda scan: _recommended(scan.answer)),
+        Field("td", "number", get=lambda scan: scan.answer.situation.td),
+        Field("energy_td", "number", get=lambda scan: _energy(scan.reference, scan.answer.situation.td)),
+        Field("recommended", "number?", "the tr that suggest recommends", lambda scan: _recommended(scan.answer)),
         Field("runs", many(RUN), get=lambda scan: scan.outcomes),
         title="d2rpick rollover --scan",
     ),

@@ -8,24 +8,7 @@ from d2rpick.choice.study_rows import runs_of
 from d2rpick.errors import printable
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import (
-    INTEGER,
-    NOTHING,
-    NUMBER,
-    SOME,
-    SOME_FLAG,
-    SOME_TEXT,
-    SPAN,
-    TEXT,
-    TEXTS,
-    Document,
-    Field,
-    csv_of,
-    many,
-    maybe,
-    one_of,
-    row,
-)  # fmt: skip
+from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe, one_of, row
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,27 +17,28 @@ if TYPE_CHECKING:
     from d2rpick.choice.study_rows import StudyRow
 
 STATUS: Final = one_of("ok", "none", "unreadable", "out-of-range", "failed", "internal-error")
+_A_NUMBER, _NULL = {"type": "number"}, {"type": "null"}
 # What a run has where it is of status ok, and otherwise.
 _JUDGED: Final[dict[str, Any]] = {
     "description": "One run; null where nothing can be said.",
     "if": {"properties": {"status": {"const": "ok"}}},
-    "then": {"properties": {**dict.fromkeys(("tr", "tr_low", "tr_high", "energy_td"), NUMBER), "message": NOTHING}},
-    "else": {"properties": {"tr": NOTHING, "message": TEXT}},
+    "then": {"properties": {**dict.fromkeys(("tr", "tr_low", "tr_high", "energy_td"), _A_NUMBER), "message": _NULL}},
+    "else": {"properties": {"tr": _NULL, "message": {"type": "string"}}},
 }
 PLAIN: Final = row(
-    Field("source", TEXT),
-    Field("tr", SOME), Field("tr_low", SOME), Field("tr_high", SOME),
-    Field("energy_td", SOME),
-    Field("residual", SOME),
+    Field("source", "text"),
+    Field("tr", "number?"), Field("tr_low", "number?"), Field("tr_high", "number?"),
+    Field("energy_td", "number?"),
+    Field("residual", "number?"),
     Field("status", STATUS),
-    Field("message", SOME_TEXT),
+    Field("message", "text?"),
     Field("basis", maybe(keys.BASIS)),
-    Field("warnings", TEXTS),
-    Field("time_unit", TEXT),
-    Field("td", SOME, "when this run is switched back"),
+    Field("warnings", "texts"),
+    Field("time_unit", "text"),
+    Field("td", "number?", "when this run is switched back"),
 )  # fmt: skip
 _ERROR: Final = Field(
-    "common_error", SOME,
+    "common_error", "number?",
     "error at the common tr: the residual, on basis energy the level error, 0 where nothing vibrates; in -f ndjson "
     "common_errors of the last line",
     lambda one: one[1],
@@ -64,20 +48,20 @@ RUN: Final = row(*PLAIN.of_part(lambda one: one[0]), _ERROR, **_JUDGED)
 _RUN: Final = row(*RUN.fields, name="run", later=("common_error",), **_JUDGED)
 _SHARED: Final = row(
     keys.WARNINGS,
-    Field("td", SOME, "null where each run has its own"),
-    Field("td_window", maybe(SPAN), "where each run chose its td"),
-    Field("tr", row(Field("min", SOME), Field("median", SOME), Field("max", SOME)), "Of the runs that have one.",
+    Field("td", "number?", "null where each run has its own"),
+    Field("td_window", "span?", "where each run chose its td"),
+    Field("tr", row(*(Field(key, "number?") for key in ("min", "median", "max"))), "Of the runs that have one.",
           lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
-    Field("agree", SOME_FLAG, "Whether the intervals tr_low to tr_high of these runs have a time in common."),
-    Field("common_tr", SOME,
+    Field("agree", "flag?", "Whether the intervals tr_low to tr_high of these runs have a time in common."),
+    Field("common_tr", "number?",
           "The earliest tr that is acceptable in every run of status ok or none and within the timing tolerance of "
           "each, where there is one.", lambda answer: answer.common.tr),
-    Field("common_window", maybe(SPAN), "First and last tr around it that are.", lambda answer: answer.common.window),
-    Field("common_reason", SOME_TEXT, "Why there is no common_tr.", lambda answer: answer.common.reason),
-    Field("common_keeps_timing_tolerance", SOME_FLAG,
+    Field("common_window", "span?", "First and last tr around it that are.", lambda answer: answer.common.window),
+    Field("common_reason", "text?", "Why there is no common_tr.", lambda answer: answer.common.reason),
+    Field("common_keeps_timing_tolerance", "flag?",
           "Whether no error at common_tr is more than 0.05 above that at the tr of the run; null without common_tr.",
           lambda answer: answer.common.keeps_tolerance),
-    Field("common_errors", many(SOME), "Errors of the runs at common_tr, in their order; empty without it.",
+    Field("common_errors", many("number?"), "Errors of the runs at common_tr, in their order; empty without it.",
           lambda answer: answer.common.errors),
 )  # fmt: skip
 _RUNS: Final = Field("runs", many(RUN), get=lambda answer: list(with_errors(answer)))
@@ -86,13 +70,13 @@ _MEANING: Final = (
     "last line is by $defs/last."
 )
 # Newline-delimited JSON: a line for each run, as `d2rpick.api.resume_file` writes it, and what follows them.
-_CURVE: Final = many(many(NUMBER)).within(minItems=2, maxItems=2)
+_CURVE: Final = kind_of(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,
-    Field("acceptable", many(many(SPAN)),
+    Field("acceptable", many(many("span")),
           "Windows of acceptable tr, and those in which the error is at most 0.05 above that of tr."),
-    Field("files", many(row(Field("name", TEXT), Field("size", INTEGER), Field("mtime_ns", INTEGER)))),
-    Field("asked", TEXT, "Stands for the options and the version."),
+    Field("files", many(row(Field("name", "text"), Field("size", "integer"), Field("mtime_ns", "integer")))),
+    Field("asked", "text", "Stands for the options and the version."),
     Field("curve", _CURVE, "Times and energies of an outline of the record, for a figure."),
     Field("profile", maybe(_CURVE), "Times and errors of acceptable tr, straight lines between them."),
     name="line", later=("common_error", "curve"), **_JUDGED,

@@ -8,7 +8,7 @@ from d2rpick.choice.candidates import MUCH_HIGHER
 from d2rpick.errors import name_units, printable
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import FLAG, NUMBER, SPAN, Document, Field, csv_of, many, maybe, row
+from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
 from d2rpick.report.situation import heading
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # Windows of acceptable tr that a line names.
 _NAMED = 4
-_WINDOW: Final = row(*keys.WINDOW.fields, Field("recommended", FLAG, "holds the recommended tr"))
+_WINDOW: Final = row(*keys.WINDOW.fields, Field("recommended", "flag", "holds the recommended tr"))
 CANDIDATE: Final = row(*keys.CANDIDATE.fields, keys.MATCHES, name="candidate", later=(*keys.LATER, "parts"))
 
 
@@ -33,8 +33,8 @@ def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
 
 DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
     *keys.FRAME,
-    Field("td", NUMBER, get=lambda answer: answer.situation.td),
-    Field("td_window", maybe(SPAN),
+    Field("td", "number", get=lambda answer: answer.situation.td),
+    Field("td_window", "span?",
           "where td was chosen: --td-window, or the longest flight; null where it was given"),
     Field("longer_pair", maybe(keys.PAIR),
           "the longest acceptable pair in td_window, where much rigid time was given up for quality",

@@ -7,21 +7,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import (
-    FLAG,
-    NUMBER,
-    SIZE,
-    SOME,
-    SOME_TEXT,
-    SPAN,
-    TEXT,
-    Document,
-    Field,
-    csv_of,
-    many,
-    maybe,
-    row,
-)  # fmt: skip
+from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
 from d2rpick.report.situation import read_line
 
 if TYPE_CHECKING:
@@ -30,22 +16,22 @@ if TYPE_CHECKING:
     from d2rpick.choice.trade_off import Offer, TradeOff
 
 OFFER: Final = row(
-    Field("td", NUMBER),
-    Field("peak", FLAG, "the energy peaks at td"),
-    Field("tr", SOME, "the tr that suggest recommends for td; null where it recommends none"),
-    Field("error", SIZE,
+    Field("td", "number"),
+    Field("peak", "flag", "the energy peaks at td"),
+    Field("tr", "number?", "the tr that suggest recommends for td; null where it recommends none"),
+    Field("error", "size?",
           "what offers are compared by: the residual; on basis energy 1 - sqrt(E(td) / (2 mean E)), null above "
           "2 mean E"),
-    Field("unbeaten", FLAG,
+    Field("unbeaten", "flag",
           "no other offer has less error and as much rigid time, or more rigid time and no more error"),
-    Field("recommended", FLAG, "the pair of suggest where td is chosen too"),
+    Field("recommended", "flag", "the pair of suggest where td is chosen too"),
     *keys.QUALITY,
     Field("basis", keys.BASIS),
-    Field("energy_td", NUMBER),
+    Field("energy_td", "number"),
     Field("kinetic_share", maybe(keys.SHARE)),
     *(field._replace(kind=maybe(field.kind)) for field in keys.CANDIDATE.of_part(
         lambda offer: offer.best, ("kind", *keys.MEASURES, "tr_low", "tr_high", "same_swing"))),
-    Field("reason", SOME_TEXT, "why no tr is recommended"),
+    Field("reason", "text?", "why no tr is recommended"),
     Field("acceptable_windows", maybe(many(keys.WINDOW)), "on basis energy: windows in which every tr is acceptable",
           lambda offer: offer.windows),
     keys.EXPECTED,
@@ -61,15 +47,16 @@ def _answer(found: TradeOff) -> str:
 
 DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
     *keys.FRAME,
-    Field("td", SOME, "the td that was asked for", lambda found: found.asked and found.asked.td),
-    Field("td_window", SPAN,
+    Field("td", "number?", "the td that was asked for", lambda found: found.asked and found.asked.td),
+    Field("td_window", "span",
           "where td was explored: the window asked for or the longest flight, less the margin before the contact"),
     *keys.MECHANICS.of_part(lambda found: found.situation, ("flight", "oscillator", "modes")),
-    Field("answer", TEXT, "the shortest sensible answer", _answer),
+    Field("answer", "text", "the shortest sensible answer", _answer),
     Field("recommended", maybe(keys.TIMES)),
-    Field("start", SOME, "td of the offer that the answer starts from: the one asked for, else the one that saves most",
+    Field("start", "number?",
+          "td of the offer that the answer starts from: the one asked for, else the one that saves most",
           lambda found: found.start and found.start.td),
-    Field("step", SOME,
+    Field("step", "number?",
           "the nearest unbeaten td with half the error of that, else the recommended one where it has less",
           lambda found: found.step and found.step.td),
     Field("offers", many(OFFER),

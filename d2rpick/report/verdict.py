@@ -6,19 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import (
-    FLAG,
-    NUMBER,
-    SIZE,
-    SOME,
-    SOME_FLAG,
-    TEXTS,
-    Document,
-    Field,
-    Kind,
-    maybe,
-    row,
-)  # fmt: skip
+from d2rpick.report.fields import Document, Field, Kind, kind_of, maybe, row
 from d2rpick.report.situation import heading
 
 if TYPE_CHECKING:
@@ -27,27 +15,28 @@ if TYPE_CHECKING:
 
 # The pair that was judged, its measures and what they come to.
 MEASURES: Final = row(
-    Field("tr", NUMBER, get=lambda answer: answer.candidate.tr),
-    Field("td", NUMBER, get=lambda answer: answer.situation.td),
+    Field("tr", "number", get=lambda answer: answer.candidate.tr),
+    Field("td", "number", get=lambda answer: answer.situation.td),
     *keys.CANDIDATE.of_part(lambda answer: answer.candidate, keys.MEASURES),
-    Field("tr_ok", SOME_FLAG),
-    Field("td_ok", SOME_FLAG),
-    Field("verified", FLAG),
+    Field("tr_ok", "flag?"),
+    Field("td_ok", "flag?"),
+    Field("verified", "flag"),
 )
+_OBJECTIONS: Final = Kind({"type": "array", "items": {"type": "string"}}, tuple)
 SWITCHED: Final = row(
-    Field("source", TEXTS.within(minItems=1)),
-    Field("energy_frozen", NUMBER, "came back at td"),
-    Field("energy_td", NUMBER, "of the reference at td"),
-    Field("energy_ratio", SOME),
-    Field("end", NUMBER, "compared from td to here"),
-    Field("mean_after", NUMBER), Field("mean_after_reference", NUMBER),
-    Field("spread_after", NUMBER.within(minimum=0), "standard deviation"),
-    Field("spread_after_reference", NUMBER.within(minimum=0)),
-    Field("momentum_error", SIZE,
+    Field("source", kind_of("texts", minItems=1)),
+    Field("energy_frozen", "number", "came back at td"),
+    Field("energy_td", "number", "of the reference at td"),
+    Field("energy_ratio", "number?"),
+    Field("end", "number", "compared from td to here"),
+    Field("mean_after", "number"), Field("mean_after_reference", "number"),
+    Field("spread_after", kind_of("number", minimum=0), "standard deviation"),
+    Field("spread_after_reference", kind_of("number", minimum=0)),
+    Field("momentum_error", "size?",
           "largest deviation after td relative to the largest momentum of the reference there"),
-    Field("displacement", SIZE, "largest distance of the parts' centre from where the reference has it"),
-    Field("rigid_from", SOME), Field("rigid_to", SOME), Field("objections", Kind(TEXTS.schema, tuple)),
-    Field("notes", TEXTS),
+    Field("displacement", "size?", "largest distance of the parts' centre from where the reference has it"),
+    Field("rigid_from", "number?"), Field("rigid_to", "number?"), Field("objections", _OBJECTIONS),
+    Field("notes", "texts"),
     name="switched", later=("rigid_from", "rigid_to", "objections"),
 )  # fmt: skip
 DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times in the unit of the history.", row(
@@ -57,7 +46,7 @@ DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times 
     *keys.QUALITY,
     keys.MATCHES._replace(get=lambda answer: answer.candidate.parts),
     keys.HEALTH,
-    Field("reasons", TEXTS),
+    Field("reasons", "texts"),
     Field("switched", maybe(SWITCHED), "a finished switched run held against the reference, null without --switched"),
     later=("kinetic_share_estimated", "modes", "unsigned_parts", "health", "quality", "quality_reasons", "parts",
            *keys.LATER),
