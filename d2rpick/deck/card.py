@@ -341,6 +341,25 @@ class Card:
         """All data lines, blank ones too; comments are left out."""
         return tuple(Row(self.block, distance, text, self.width) for distance, text in self.block.lines())
 
+    @cached_property
+    def lines(self) -> tuple[Row, ...]:
+        """All data lines that are not blank."""
+        return tuple(row for row in self.rows if not row.blank)
+
+    @cached_property
+    def data(self) -> tuple[Row, ...]:
+        """Lines that are not blank, below that of the title where the keyword has one (``_TITLE``)."""
+        return tuple(row for row in self.rows[1:] if not row.blank) if "TITLE" in self.name else self.lines
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Words of the keyword of Radioss."""
+        return tuple(self.name.split("/"))
+
+    def options(self, keyword: str) -> frozenset[str]:
+        """Words of the name behind a keyword."""
+        return frozenset(self.name.removeprefix(keyword).split("_")) - {""}
+
     @property
     def here(self) -> Field:
         """The keyword itself, as a place to point at."""
@@ -366,6 +385,11 @@ class Card:
             problem = f"{found.field.text!r} is not an integer"
             return Value(default, found.field, problem, found.parameters)
         return Value(int(found.value), found.field, "", found.parameters)
+
+    def positive(self, row: Row, position: int) -> float | None:
+        """Read a positive number, or None; of an include in other units none is known."""
+        found = self.real(row, position)
+        return None if self.transform.scaled or found.problem or found.value <= 0 else found.value
 
     def word(self, row: Row, position: int, default: str = "") -> Value[str]:
         """Read a word, in upper case."""

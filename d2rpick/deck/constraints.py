@@ -7,17 +7,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
+from d2rpick.deck.parts import node_sets
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from d2rpick.deck.card import Card, Field, Row
     from d2rpick.deck.reader import Deck
 
 
 Kind = Literal["nodal rigid body", "extra nodes", "joint", "spotweld", "rivet", "generalized weld"]
-_PER_LINE = 8
+_BODY, _EXTRA = "CONSTRAINED_NODAL_RIGID_BODY", "CONSTRAINED_EXTRA_NODES"
 _JOINT_NODES = 6
-_LISTS = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 
 
 class Constraint(NamedTuple):
@@ -33,44 +34,42 @@ class Constraint(NamedTuple):
 def read_constraints(deck: Deck) -> list[Constraint]:
     """Collect the constraints of a deck; one whose nodes cannot be known has none."""
     sets = node_sets(deck)
-    found: list[Constraint] = []
-    for card in deck.named("CONSTRAINED_NODAL_RIGID_BODY"):
-        found += _nodal_rigid_bodies(card, sets)
-    for card in deck.named("CONSTRAINED_EXTRA_NODES"):
-        found += _extra_nodes(card, sets)
-    for card in deck.named("CONSTRAINED_JOINT"):
-        found += _joints(card)
-    return found
+    bodies = (one for card in deck.named(_BODY) for one in _nodal_rigid_bodies(card, sets))
+    extra = (one for card in deck.named(_EXTRA) for one in _extra_nodes(card, sets))
+    joints = (one for card in deck.named("CONSTRAINED_JOINT") for one in _joints(card))
+    return [*bodies, *extra, *joints]
 
 
 def read_welds(deck: Deck) -> Iterator[Constraint]:
     """Collect spotwelds, rivets and generalized welds; one whose nodes cannot be known has none."""
     kinds: tuple[tuple[str, Kind], ...] = (("CONSTRAINED_SPOTWELD", "spotweld"), ("CONSTRAINED_RIVET", "rivet"))
     for name, kind in kinds:
-        for card in deck.named(name):
-            yield from _pairs(card, kind, name)
-    sets = node_sets(deck) if any(True for _ in deck.named("CONSTRAINED_GENERALIZED_WELD")) else {}
-    for card in deck.named("CONSTRAINED_GENERALIZED_WELD"):
-        rows = [row for row in card.rows if not row.blank]
-        for row in rows[1:2] if card.name.endswith("_ID") else rows[:1]:
+        for card in deck.named(name):  # two nodes on a line, on each where no option adds lines
+            rows = _first(card) if card.name != name else card.lines
+            yield from (_of_nodes(card, row, kind, 2) for row in rows)
+    welds = deck.named("CONSTRAINED_GENERALIZED_WELD")
+    sets = node_sets(deck) if welds else {}
+    for card in welds:
+        for row in _first(card):
             members = card.integer(row, 0)
             nodes = sets.get(members.value + card.transform.set_, frozenset())
             yield Constraint("generalized weld", members.field, 0, nodes)
 
 
-def _pairs(card: Card, kind: Kind, name: str) -> Iterator[Constraint]:
-    """Two nodes on a line, on each where no option adds lines."""
-    rows, options = [row for row in card.rows if not row.blank], card.name.removeprefix(name)
-    first = int(options.endswith("_ID"))
-    for row in rows[first : first + 1] if options else rows:
-        nodes = [card.integer(row, at) for at in range(2)]
-        ids = frozenset(node.value + card.transform.node for node in nodes if node.value > 0)
-        yield Constraint(kind, nodes[0].field, 0, ids)
+def _first(card: Card) -> tuple[Row, ...]:
+    """The first line, below that of an id (``_ID``)."""
+    return card.lines[1:2] if card.name.endswith("_ID") else card.lines[:1]
+
+
+def _of_nodes(card: Card, row: Row, kind: Kind, most: int, number: int = 0) -> Constraint:
+    """Read a constraint whose line lists its nodes."""
+    nodes = [card.integer(row, at) for at in range(most)]
+    ids = frozenset(node.value + card.transform.node for node in nodes if node.value > 0)
+    return Constraint(kind, nodes[0].field, number, ids)
 
 
 def _nodal_rigid_bodies(card: Card, sets: dict[int, frozenset[int]]) -> Iterator[Constraint]:
-    options = set(card.name.removeprefix("CONSTRAINED_NODAL_RIGID_BODY").split("_")) - {""}
-    rows = [row for row in card.rows if not row.blank]
+    options, rows = card.options(_BODY), card.lines
     if options - {"TITLE"}:  # further lines follow the first: one body per keyword
         rows = rows[:2] if "TITLE" in options else rows[:1]
     for row in rows[1::2] if "TITLE" in options else rows:
@@ -94,33 +93,9 @@ def _extra_nodes(card: Card, sets: dict[int, frozenset[int]]) -> Iterator[Constr
 def _joints(card: Card) -> Iterator[Constraint]:
     if card.name.startswith(("CONSTRAINED_JOINT_STIFFNESS", "CONSTRAINED_JOINT_COOR", "CONSTRAINED_JOINT_USER_FORCE")):
         return
-    rows = [row for row in card.rows if not row.blank]
-    number = card.integer(rows[0], 0).value if rows and card.name.endswith("_ID") else 0
-    for row in rows[1:2] if card.name.endswith("_ID") else rows[:1]:
-        values = [card.integer(row, at) for at in range(_JOINT_NODES)]
-        nodes = frozenset(value.value + card.transform.node for value in values if value.value > 0)
-        yield Constraint("joint", values[0].field, number, nodes)
-
-
-def node_sets(deck: Deck) -> dict[int, frozenset[int]]:
-    """Members of the node sets whose lines are followed."""
-    found: dict[int, frozenset[int]] = {}
-    for card in deck.named("SET_NODE"):
-        options = set(card.name.split("_")[2:])
-        rows = [row for row in (card.rows[1:] if "TITLE" in options else card.rows) if not row.blank]
-        if rows and options <= _LISTS:
-            members = _members(card, rows[1:], options)
-            found[card.integer(rows[0], 0).value + card.transform.set_] = members
-    return found
-
-
-def _members(card: Card, rows: Sequence[Row], options: set[str]) -> frozenset[int]:
-    per_line = 1 if "COLUMN" in options else _PER_LINE
-    ids = [card.integer(row, at).value for row in rows for at in range(per_line)]
-    ids = [number + card.transform.node for number in ids if number > 0]
-    if "GENERATE" not in options:
-        return frozenset(ids)
-    return frozenset(node for low, high in zip(ids[::2], ids[1::2], strict=False) for node in range(low, high + 1))
+    for row in _first(card):
+        number = card.integer(card.lines[0], 0).value if card.name.endswith("_ID") else 0
+        yield _of_nodes(card, row, "joint", _JOINT_NODES, number)
 
 
 _NO_CONTACTS: Final = {"ADD", "AUTO", "COUPLING", "EXCLUDE", "GEBOD", "GUIDED"}  # first words of their names

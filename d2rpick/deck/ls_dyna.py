@@ -12,21 +12,18 @@ import numpy as np
 
 from d2rpick.deck import formulations, ls_dyna_loads
 from d2rpick.deck.card import LONG
-from d2rpick.deck.columns import layout, lines_of, placed, places_of
-from d2rpick.deck.model import Elements, Inventory, Material, PartData, Section, placed_joints
-from d2rpick.deck.parts import read_parts
-from d2rpick.deck.pieces import placed_boundary
+from d2rpick.deck.mesh import Mesh, layout, lines_of
+from d2rpick.deck.model import Inventory, Material, PartData, Section, placed
+from d2rpick.deck.parts import material_of, read_parts, read_sections
 from d2rpick.deck.reader import cuts, holds_mesh
-from d2rpick.deck.sections import NOT_TURNED
-from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
-    from d2rpick.deck.card import Card, Row
-    from d2rpick.deck.columns import Integers, Layout, Lines, Reals
+    from d2rpick.deck.card import Card
+    from d2rpick.deck.mesh import Integers, Layout, Lines, Reals
     from d2rpick.deck.model import Formulation
-    from d2rpick.deck.parts import Parts
+    from d2rpick.deck.parts import Parts, SectionCard
     from d2rpick.deck.reader import Deck
 
 
@@ -81,24 +78,57 @@ def read(deck: Deck) -> Inventory:
     """Collect the parts and elements of a deck that was read."""
     parts = read_parts(deck)
     cards = list(_element_cards(deck))
-    raw = [one for card in cards if _followed(card) for one in _elements(card)]
     ids, coordinates, codes = _nodes(deck)
-    kinds = sorted({kind for kind, _, _ in raw})
-    table, places = placed(ids, [_joined([n for name, _, n in raw if name == kind]) for kind in kinds])
-    elements = tuple(
-        Elements(kind, np.concatenate([part for name, part, _ in raw if name == kind]), nodes)
-        for kind, nodes in zip(kinds, places, strict=True)
-    )
-    beyond = np.full((table.size - ids.size, 3), np.nan)
-    notes = tuple(_notes(deck, cards, elements, parts, lost=len(beyond)))
-    held = ls_dyna_loads.joints_of(deck)
-    boundary = ls_dyna_loads.read(deck, parts, (ids, coordinates, codes))
+    mesh = Mesh.of([one for card in cards if _followed(card) for one in _elements(card)], ids, coordinates)
+    notes = (*_notes(deck, cards), *mesh.doubts(parts.materials.keys(), "*"))
+    joints = ls_dyna_loads.joints_of(deck)
     return Inventory(
-        "ls-dyna", _parts(deck, parts, elements), elements, np.concatenate([coordinates, beyond]), notes,
-        parts.all_known and not notes, joints=placed_joints(held.found, table), ties=held.unknown,
-        watched=places_of(_watched(deck), table), moved=_moves_nodes(deck), files=tuple(deck.sources),
-        boundary=placed_boundary(boundary, table),
+        "ls-dyna", _parts(deck, parts, mesh), mesh.elements, mesh.coordinates, notes, parts.all_known and not notes,
+        joints=placed(joints.found, mesh.table), ties=joints.unknown, watched=mesh.table.known(_watched(deck)),
+        moved=_moves_nodes(deck), files=tuple(deck.sources),
+        boundary=ls_dyna_loads.read(deck, parts, (ids, coordinates, codes)).placed(mesh.table),
     )  # fmt: skip
+
+
+def first_shared_nodes(cards: Sequence[Card], bodies: Mapping[int, int]) -> dict[tuple[int, int], int]:
+    """Find a node for every two parts of different bodies that share one.
+
+    Parameters
+    ----------
+    cards : sequence of Card
+        The *ELEMENT cards that are read.
+    bodies : mapping
+        Body of every part in question; parts of one body may share nodes.
+
+    Returns
+    -------
+    dict
+        The first node found for each pair of parts (lower id first).
+    """
+    owner: dict[int, int] = {}
+    shared: dict[tuple[int, int], int] = {}
+    for part, node in _nodes_of(cards, bodies):
+        other = owner.setdefault(node, part)
+        if other != part and bodies[other] != bodies[part]:
+            shared.setdefault((min(part, other), max(part, other)), node)
+    return shared
+
+
+def first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]:
+    """Nodes of some parts, each with the first of these parts that has it."""
+    found: dict[int, int] = {}
+    for part, node in _nodes_of(cards, parts):
+        found.setdefault(node, part)
+    return found
+
+
+def _nodes_of(cards: Sequence[Card], parts: Collection[int]) -> Iterator[tuple[int, int]]:
+    """Part and node, for the nodes of each element of some parts, in the order of the deck."""
+    for card in cards:
+        for _, owners, nodes in _elements(card, _TEN):
+            rows = np.isin(owners, [*parts])
+            for part, own in zip(owners[rows].tolist(), nodes[rows].tolist(), strict=True):
+                yield from ((part, node) for node in {node for node in own if node})
 
 
 def _watched(deck: Deck) -> Integers:
@@ -119,21 +149,13 @@ def _moves_nodes(deck: Deck) -> bool:
     return bool(moving) or any(card.transform.moved for card in deck.named("NODE"))
 
 
-def _notes(deck: Deck, cards: Sequence[Card], elements: Sequence[Elements], parts: Parts, lost: int) -> Iterator[str]:
+def _notes(deck: Deck, cards: Sequence[Card]) -> Iterator[str]:
     """Say what may be missing."""
-    for card in cards:
-        if not _followed(card):
-            yield f"{card.at}: elements of *{card.name} are not followed"
-    for unread in deck.unread:
-        yield f"{unread.name.at}: {unread.name.text} was not read: {unread.reason}"
+    yield from (f"{card.at}: elements of *{card.name} are not followed" for card in cards if not _followed(card))
+    yield from (f"{one.name.at}: {one.name.text} was not read: {one.reason}" for one in deck.unread)
     for block in deck.encrypted:
         yield f"{block.source.name}:{block.line}: elements may hide in an encrypted block"
     yield from (f"{block.source.name}: {told}" for block, told in cuts(deck) if holds_mesh(block))
-    unknown = sorted({int(part) for one in elements for part in np.unique(one.part)} - parts.materials.keys())
-    if unknown:
-        yield f"elements of {name_units(unknown)}, which no *PART of the deck defines"
-    if lost:
-        yield f"{lost} nodes of elements are not in any *NODE of the deck"
 
 
 def _element_cards(deck: Deck) -> Iterator[Card]:
@@ -151,15 +173,15 @@ def _followed(card: Card) -> bool:
 
 def _width(card: Card) -> int:
     """Columns of an id."""
-    return LONG if card.width == LONG else 10 if "%" in card.block.head.split(maxsplit=1)[0] or _percent(card) else 8
+    words = card.block.head.split()
+    return LONG if card.width == LONG else 10 if "%" in words[0] or words[1:2] == ["%"] else 8
 
 
-def _percent(card: Card) -> bool:
-    return card.block.head.split()[1:2] == ["%"]
+def _elements(card: Card, most: int | None = None) -> Iterator[tuple[str, Integers, Integers]]:
+    """Kind, parts and node ids of the elements of a card, piece by piece; ids with their offsets.
 
-
-def _elements(card: Card) -> Iterator[tuple[str, Integers, Integers]]:
-    """Kind, parts and node ids of the elements of a card, piece by piece; ids with their offsets."""
+    ``most`` nodes of each, by default those that give it its size.
+    """
     kind = _KINDS[card.name.split("_")[1]]
     width = _width(card)
     left: Integers | None = None
@@ -167,22 +189,17 @@ def _elements(card: Card) -> Iterator[tuple[str, Integers, Integers]]:
         if not len(lines):
             continue
         if kind.name == "particle":
-            ids, mesh = lines.integers(layout(width, width)), None
+            ids = lines.integers(layout(width, width))
             rows = ids[(ids > 0).all(axis=1)]
             yield kind.name, rows[:, 1] + card.transform.part, rows[:, :1] + card.transform.node
             continue
         values = lines.integers(layout(*[width] * (2 + (_TEN if kind.name == "solid" else kind.most))))
         if kind.name == "solid":
             values, left = _of_two_lines(values if left is None else np.concatenate([left, values]))
-        mesh = values[_real_elements(values, kind)]
-        nodes = np.maximum(mesh[:, 2 : 2 + kind.most], 0)
+        # rows that name an element, its part and enough nodes: not those of further options
+        mesh = values[(values[:, : 2 + kind.fewest] > 0).all(axis=1)]
+        nodes = np.maximum(mesh[:, 2 : 2 + (most or kind.most)], 0)
         yield kind.name, mesh[:, 1] + card.transform.part, np.where(nodes > 0, nodes + card.transform.node, 0)
-
-
-def _real_elements(values: Integers, kind: _Kind) -> Integers:
-    """Rows that name an element, its part and enough nodes: not those of further options."""
-    good = (values[:, :2] > 0).all(axis=1) & (values[:, 2 : 2 + kind.fewest] > 0).all(axis=1)
-    return np.flatnonzero(good)
 
 
 def _of_two_lines(values: Integers) -> tuple[Integers, Integers | None]:
@@ -198,10 +215,6 @@ def _of_two_lines(values: Integers) -> tuple[Integers, Integers | None]:
     return joined, waiting
 
 
-def _joined(blocks: Sequence[Integers]) -> Integers:
-    return np.concatenate(blocks)
-
-
 def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
     """Ids and coordinates of all nodes, and the codes of their translations that are fixed."""
     ids, places, codes = [np.empty(0, np.int64)], [np.empty((0, 3))], [np.empty(0, np.int64)]
@@ -215,7 +228,8 @@ def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
                 numbers = lines.integers(fields[:1])[:, 0]
                 good = numbers > 0
                 ids.append(numbers[good] + card.transform.node)
-                places.append(_moved(lines, fields, card)[good])
+                found = lines.reals(fields, slice(1, 4))[good]
+                places.append(np.full_like(found, np.nan) if card.transform.scaled else found)
                 codes.append(_codes(lines, [*fields, (sum(fields[-1]), width)])[good])
     return np.concatenate(ids), np.concatenate(places), np.concatenate(codes)
 
@@ -228,87 +242,39 @@ def _codes(lines: Lines, fields: Layout) -> Integers:
     return lines.integers(fields)[:, -1]
 
 
-def _moved(lines: Lines, fields: Layout, card: Card) -> Reals:
-    """Coordinates; unknown in an include whose lengths are scaled."""
-    found = lines.reals(fields, slice(1, 4))
-    return np.full_like(found, np.nan) if card.transform.scaled else found
+def _parts(deck: Deck, parts: Parts, mesh: Mesh) -> dict[int, PartData]:
+    kinds, sections, materials = mesh.kinds, read_sections(deck), dict(_materials(deck, parts))
+    found: dict[int, PartData] = {}
+    for part, name in parts.materials.items():
+        material = materials.get(name)
+        section = _section(sections.get(parts.sections.get(part, 0)), kinds.get(part, set()), material)
+        found[part] = PartData(part, parts.titles.get(part, ""), material, section)
+    return found
 
 
-def _parts(deck: Deck, parts: Parts, elements: Sequence[Elements]) -> dict[int, PartData]:
-    kinds: dict[int, set[str]] = {}
-    for one in elements:
-        for part in np.unique(one.part).tolist():
-            kinds.setdefault(part, set()).add(one.kind)
-    sections, materials = dict(_sections(deck)), dict(_materials(deck, parts))
-    return {
-        part: PartData(
-            part,
-            parts.titles.get(part, ""),
-            materials.get(name),
-            _section(sections.get(parts.sections.get(part, 0)), kinds.get(part, set()), materials.get(name)),
-        )
-        for part, name in parts.materials.items()
-    }
-
-
-class _Raw(NamedTuple):
-    """A *SECTION as written: its kind, ELFORM, the first number of its second line, points through the thickness."""
-
-    kind: str
-    elform: int
-    first: float | None
-    layers: int | None
-
-
-def _sections(deck: Deck) -> Iterator[tuple[int, _Raw]]:
-    for card in deck.named("SECTION"):
-        _, kind, *options = card.name.split("_")
-        rows = [row for row in card.rows if not row.blank]
-        per_section = {"SOLID": 1, "DISCRETE": 2, "SHELL": 2, "BEAM": 2, "TSHELL": 2}.get(kind)
-        titled = "TITLE" in options
-        if per_section is None or set(options) - {"TITLE"}:
-            rows = rows[int(titled) :][:2]
-            per_section, titled = 2, False
-        step = per_section + titled
-        for at in range(titled, len(rows), step):
-            number, elform = card.integer(rows[at], 0), card.integer(rows[at], 1, 1 if kind == "SOLID" else 2)
-            if not number.problem:
-                second = rows[at + 1] if per_section > 1 and at + 1 < len(rows) else None
-                layers = card.integer(rows[at], 3, 2) if kind == "SHELL" else None
-                through = (layers.value or 2) if layers and not layers.problem else None
-                raw = _Raw(kind, 0 if elform.problem else elform.value, _number(card, second, 0), through)
-                yield number.value + card.transform.rest, raw
-
-
-def _section(raw: _Raw | None, kinds: set[str], material: Material | None) -> Section:
+def _section(card: SectionCard | None, kinds: set[str], material: Material | None) -> Section:
     found: dict[str, Formulation] = {}
     for kind in sorted(kinds):
-        one = formulations.ls_dyna(kind, raw.elform if raw else 0)
-        if one and (raw or kind == "spring"):
+        one = formulations.ls_dyna(kind, card.elform if card else 0)
+        if one and (card or kind == "spring"):
             found[kind] = one
     damped = None if material is None or material.kind != "spring" else material.name.startswith(_DAMPERS)
-    if raw is None:
+    if card is None:
         return Section(found, damped=damped)
-    area = raw.first if raw.kind == "BEAM" and raw.elform in (2, 3, 12) else None
-    turns = not (raw.kind == "SOLID" and raw.elform in NOT_TURNED)
-    return Section(found, raw.first if raw.kind == "SHELL" else None, area, damped, None, turns, raw.layers)
+    area = card.first if card.kind == "BEAM" and card.elform in (2, 3, 12) else None
+    thickness = card.first if card.kind == "SHELL" else None
+    return Section(found, thickness, area, damped, None, not card.unturned, card.layers)
 
 
 def _materials(deck: Deck, parts: Parts) -> Iterator[tuple[str, Material]]:
     for card in deck.named("MAT"):
-        rows = [row for row in (card.rows[1:] if card.name.endswith("_TITLE") else card.rows) if not row.blank]
-        if not rows or card.name.startswith("MAT_ADD"):
+        if not card.data or card.name.startswith("MAT_ADD"):
             continue
-        value = card.integer(rows[0], 0)
-        number = value.field.text.upper() if value.problem else str(value.value + card.transform.material)
+        row, number = card.data[0], material_of(card, card.data[0], 0)
         name = card.name.removesuffix("_TITLE")
-        short = name.removeprefix("MAT_")
-        density, modulus, poisson = (_number(card, rows[0], at) for at in (1, 2, 3))
-        known = short in _ELASTIC
-        yield number, Material(
-            name, _kind(name, number, parts), density if known else None, modulus if known else None,
-            poisson if known else None,
-        )  # fmt: skip
+        known = name.removeprefix("MAT_") in _ELASTIC
+        density, modulus, poisson = (card.positive(row, at) if known else None for at in (1, 2, 3))
+        yield number, Material(name, _kind(name, number, parts), density, modulus, poisson)
 
 
 def _kind(name: str, number: str, parts: Parts) -> str:
@@ -319,11 +285,3 @@ def _kind(name: str, number: str, parts: Parts) -> str:
     if name.startswith(_AIRBAG):
         return "airbag"
     return "void" if name.startswith(_VOID) else "deformable"
-
-
-def _number(card: Card, row: Row | None, position: int) -> float | None:
-    """Read a positive number, or None; of an include in other units none is known."""
-    if row is None or card.transform.scaled:
-        return None
-    value = card.real(row, position)
-    return None if value.problem or value.value <= 0 else value.value

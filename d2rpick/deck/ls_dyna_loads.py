@@ -15,15 +15,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.deck.columns import layout, lines_of
-from d2rpick.deck.constraints import node_sets, read_constraints, read_welds
-from d2rpick.deck.model import Boundary, Gravity, Held, Hold, Joints, ids, plateaus
+from d2rpick.deck.constraints import read_constraints, read_welds
+from d2rpick.deck.mesh import layout, lines_of
+from d2rpick.deck.model import Boundary, Gravity, Hold, Joint, Joints, ids, plateaus
+from d2rpick.deck.parts import material_of, node_sets, rigid_materials
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from d2rpick.deck.card import Card, Row
-    from d2rpick.deck.columns import Reals
+    from d2rpick.deck.mesh import Reals
     from d2rpick.deck.model import Places
     from d2rpick.deck.parts import Parts
     from d2rpick.deck.reader import Deck
@@ -56,11 +57,7 @@ def read(deck: Deck, parts: Parts, nodes: tuple[Places, Reals, Places]) -> Bound
     numbers, places, codes = nodes
     found = [*_supports(deck, sets), *_motions(deck, sets), *_of_nodes(numbers, codes), *_of_materials(deck, parts)]
     found += [_of_plane(card, numbers, places) for card in deck.named("CONSTRAINED_GLOBAL")]
-    pulls = [*_gravity(deck, parts)]
-    gravity = tuple(one for one in pulls if isinstance(one, Gravity))
-    known = len(gravity) == len(pulls) and not deck.unread and not deck.encrypted
-    notes = tuple(one for one in (*found, *pulls) if isinstance(one, str))
-    return Boundary(tuple(one for one in found if isinstance(one, Hold)), gravity if known else None, notes)
+    return Boundary.of(found, [*_gravity(deck, parts)], whole=not deck.unread and not deck.encrypted)
 
 
 def _name(card: Card) -> str:
@@ -71,26 +68,21 @@ def _not_followed(card: Card) -> str:
     return f"{_name(card)}: the nodes that it holds are not followed"
 
 
-def _rows(card: Card) -> list[Row]:
-    return [row for row in card.rows if not row.blank]
-
-
 # Supports.
 
 
 def _supports(deck: Deck, sets: Sets) -> Iterator[Hold | str]:
     for card in deck.named(_SPC):
-        options = set(card.name.removeprefix(_SPC).split("_")) - {""}
+        options = card.options(_SPC)
         if card.name.startswith(_SYMMETRY):
             continue
         if not options <= {"NODE", "SET", "ID", "BIRTH", "DEATH"}:
             yield _not_followed(card)
             continue
         step = 1 + ("ID" in options) + ("BIRTH" in options)
-        rows = _rows(card)
-        for at in range("ID" in options, len(rows), step):
-            times = rows[at + 1] if "BIRTH" in options and at + 1 < len(rows) else None
-            yield _spc(card, rows[at], times, sets if "SET" in options else None)
+        for at in range("ID" in options, len(card.lines), step):
+            times = card.lines[at + 1] if "BIRTH" in options and at + 1 < len(card.lines) else None
+            yield _spc(card, card.lines[at], times, sets if "SET" in options else None)
 
 
 def _spc(card: Card, row: Row, times: Row | None, sets: Sets | None) -> Hold | str:
@@ -129,7 +121,7 @@ def _of_nodes(numbers: Places, codes: Places) -> Iterator[Hold]:
 
 def _of_plane(card: Card, numbers: Places, places: Reals) -> Hold | str:
     """Nodes on a plane, which a *CONSTRAINED_GLOBAL fixes."""
-    rows = _rows(card)
+    rows = card.lines
     code, normal = (card.integer(rows[0], at).value for at in (0, 2)) if rows else (0, 0)
     if not 0 < code < len(CODES) or normal not in (1, 2, 3) or not numbers.size:
         return _not_followed(card)
@@ -140,15 +132,13 @@ def _of_plane(card: Card, numbers: Places, places: Reals) -> Hold | str:
 
 def _of_materials(deck: Deck, parts: Parts) -> Iterator[Hold]:
     """What *MAT_RIGID fixes."""
-    for card in deck.named("MAT_RIGID", "MAT_020", "MAT_20"):
-        rows = _rows(card)["TITLE" in card.name :]
-        if card.name.split("_")[2:3] == ["DISCRETE"] or len(rows) < 2:
+    for card in rigid_materials(deck):
+        if len(card.data) < 2:
             continue
-        kind, code = card.real(rows[1], 0).value, card.integer(rows[1], 1).value
+        name, row = material_of(card, card.data[0], 0), card.data[1]
+        kind, code = card.real(row, 0).value, card.integer(row, 1).value
         axes = frozenset(CODES[code] if kind > 0 and 0 < code < len(CODES) else ())
-        own = kind < 0 and bool(card.integer(rows[1], 2).value)
-        number = card.integer(rows[0], 0)
-        name = number.field.text.upper() if number.problem else str(number.value + card.transform.material)
+        own = kind < 0 and bool(card.integer(row, 2).value)
         held = frozenset(part for part, material in parts.materials.items() if material == name)
         if held and (axes or own):
             yield Hold(_name(card), ids(()), held, axes, counts=own)
@@ -159,11 +149,11 @@ def _of_materials(deck: Deck, parts: Parts) -> Iterator[Hold]:
 
 def _motions(deck: Deck, sets: Sets) -> Iterator[Hold | str]:
     for card in deck.named(_MOTION):
-        options = set(card.name.removeprefix(_MOTION).split("_")) - {""}
+        options = card.options(_MOTION)
         if not options & {"NODE", "SET", "RIGID"} or options - {"NODE", "SET", "RIGID", "LOCAL", "ID"}:
             yield _not_followed(card)
             continue
-        rows = _rows(card)
+        rows = card.lines
         while len(rows) > ("ID" in options):
             rows = rows["ID" in options :]
             row = rows[0]
@@ -172,7 +162,7 @@ def _motions(deck: Deck, sets: Sets) -> Iterator[Hold | str]:
             rows = rows[1 + further :]
 
 
-def _motion(card: Card, row: Row, options: set[str], sets: Sets) -> Hold | str:
+def _motion(card: Card, row: Row, options: frozenset[str], sets: Sets) -> Hold | str:
     part = frozenset({card.integer(row, 0).value + card.transform.part}) if "RIGID" in options else frozenset[int]()
     nodes = ids(()) if part else _members(card, row, sets if "SET" in options else None)
     if nodes is None:
@@ -190,7 +180,7 @@ def _gravity(deck: Deck, parts: Parts) -> Iterator[Gravity | str]:
     for card in deck.named("LOAD_BODY", "LOAD_GRAVITY"):
         if card.name == "LOAD_BODY_PARTS":
             continue
-        found = [_of_row(card, row, curves) for row in _rows(card)[:1]] if card.name in _ALONG else [None]
+        found = [_of_row(card, row, curves) for row in card.lines[:1]] if card.name in _ALONG else [None]
         for one in found:
             if one is None or None in limits:
                 yield f"{_name(card)} is not followed: whether gravity acts is seen in the run alone"
@@ -199,8 +189,7 @@ def _gravity(deck: Deck, parts: Parts) -> Iterator[Gravity | str]:
 
 
 def _limited(card: Card, parts: Parts) -> frozenset[int] | None:
-    rows = _rows(card)
-    members = parts.members(card.integer(rows[0], 0).value + card.transform.set_) if rows else None
+    members = parts.members(card.integer(card.lines[0], 0).value + card.transform.set_) if card.lines else None
     return None if members is None else frozenset(members)
 
 
@@ -220,11 +209,12 @@ def _of_row(card: Card, row: Row, curves: Mapping[int, tuple[float, ...]]) -> Gr
 def _curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
     """Ordinates of the curves."""
     for card in deck.named("DEFINE_CURVE"):
-        rows = _rows(card)["TITLE" in card.name :]
-        if rows and set(card.name.split("_")[2:]) <= {"TITLE"}:
-            number, factor, offset = card.integer(rows[0], 0), card.real(rows[0], 3), card.real(rows[0], 5)
+        if card.data and card.options("DEFINE_CURVE") <= {"TITLE"}:
+            row = card.data[0]
+            number, factor, offset = card.integer(row, 0), card.real(row, 3), card.real(row, 5)
             points = np.concatenate([lines.reals(_POINT, slice(1, 2))[:, 0] for lines in lines_of(card) if len(lines)])
-            scaled = (factor.value or 1.0) * (points["TITLE" in card.name :][1:] + offset.value)
+            ordinates = points[len(card.lines) - len(card.data) + 1 :]
+            scaled = (factor.value or 1.0) * (ordinates + offset.value)
             yield number.value + card.transform.rest, tuple(scaled.tolist())
 
 
@@ -237,7 +227,7 @@ def joints_of(deck: Deck) -> Joints:
     constraints = read_constraints(deck) if deck.named(*_CONSTRAINTS) else []
     for one in (*constraints, *read_welds(deck)):
         if one.kind != "joint" and one.nodes:
-            found.append(Held(one.kind, one.nodes, frozenset([one.part] if one.part else [])))
+            found.append(Joint(one.kind, ids(one.nodes), frozenset([one.part] if one.part else [])))
         elif one.kind != "joint":
             unknown.append(f"{one.kind} ({one.place.at})")
     sets = cache(partial(node_sets, deck))
@@ -249,10 +239,10 @@ def joints_of(deck: Deck) -> Joints:
     return Joints(tuple(found), tuple(unknown))
 
 
-def _of_contact(card: Card, sets: Callable[[], dict[int, frozenset[int]]]) -> Held | None:
+def _of_contact(card: Card, sets: Callable[[], dict[int, frozenset[int]]]) -> Joint | None:
     """Parts that a tied contact of two parts, or of nodes and a part, holds together; None for any other."""
-    options = set(card.name.split("_"))
-    rows = [row for row in card.rows if not row.blank][int(bool({"ID", "TITLE"} & options)) :]
+    options = card.options("CONTACT")
+    rows = card.lines[int(bool({"ID", "TITLE"} & options)) :]
     if not rows or "MPP" in options:
         return None
     values = [card.integer(rows[0], at) for at in range(4)]
@@ -263,6 +253,6 @@ def _of_contact(card: Card, sets: Callable[[], dict[int, frozenset[int]]]) -> He
     if main != _PART_ID or kind not in (_PART_ID, _NODE_SET):
         return None
     if kind == _PART_ID:
-        return Held("tied contact", parts=frozenset({one + moved.part, other + moved.part}))
+        return Joint("tied contact", ids(()), frozenset({one + moved.part, other + moved.part}))
     nodes = sets().get(one + moved.set_)
-    return Held("tied contact", nodes, frozenset({other + moved.part})) if nodes else None
+    return Joint("tied contact", ids(nodes), frozenset({other + moved.part})) if nodes else None

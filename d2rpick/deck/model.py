@@ -8,19 +8,20 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain, pairwise
+from itertools import pairwise
 from math import inf
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from d2rpick.deck.columns import NO_NODE, distinct
+from d2rpick.deck.mesh import NO_NODE, distinct
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from d2rpick.deck.mesh import Elements, NodeTable
     from d2rpick.deck.radioss_run import Flaw, LeftRigid
     from d2rpick.deck.source import SourceFile
 
@@ -61,6 +62,25 @@ class Gravity(NamedTuple):
     parts: frozenset[int] = frozenset()
 
 
+class Joint(NamedTuple):
+    """A weld, tie or rigid body: ``kind`` is what to call it; its nodes (ids, or places), and parts that it names."""
+
+    kind: str
+    nodes: Places
+    parts: frozenset[int] = frozenset()
+
+
+class Joints(NamedTuple):
+    """Joints that are followed, and names and places of ties of which it is not known which parts they hold.
+
+    ``switched`` are rigid bodies that are there to be switched.
+    """
+
+    found: tuple[Joint, ...]
+    unknown: tuple[str, ...]
+    switched: tuple[Joint, ...] = ()
+
+
 class Boundary(NamedTuple):
     """All that a deck has of them; ``gravity`` is None where it is not known.  ``notes`` say what is not followed."""
 
@@ -68,8 +88,28 @@ class Boundary(NamedTuple):
     gravity: tuple[Gravity, ...] | None = None
     notes: tuple[str, ...] = ()
 
+    @classmethod
+    def of(cls, holds: Sequence[Hold | str], pulls: Sequence[Gravity | str], *, whole: bool) -> Boundary:
+        """Sort what was found from what is not followed; without the ``whole`` of a deck gravity is not known."""
+        gravity = tuple(one for one in pulls if isinstance(one, Gravity))
+        known = whole and len(gravity) == len(pulls)
+        notes = tuple(one for one in (*holds, *pulls) if isinstance(one, str))
+        return cls(tuple(one for one in holds if isinstance(one, Hold)), gravity if known else None, notes)
+
+    def placed(self, table: NodeTable) -> Boundary:
+        """Give it with the places of its nodes in a table of ids."""
+        return Boundary(placed(self.holds, table), self.gravity and placed(self.gravity, table), self.notes)
+
 
 NO_BOUNDARY: Final = Boundary()
+
+
+Acting = TypeVar("Acting", Hold, Gravity, Joint)
+
+
+def placed(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
+    """Put places of nodes for their ids; nodes that are not in the table are left out."""
+    return tuple(one if one.nodes is None else one._replace(nodes=table.known(one.nodes)) for one in acting)
 
 
 def ids(numbers: Iterable[int]) -> Places:
@@ -144,59 +184,6 @@ class PartData:
 
 
 @dataclass(frozen=True, eq=False)
-class Elements:
-    """Elements of one kind: the id of the part, shape (n,), and the places of the nodes, shape (n, nodes)."""
-
-    kind: str
-    part: Places
-    nodes: Places
-
-    def of(self, part: int) -> Places:
-        """Nodes of the elements of a part."""
-        return np.asarray(self.nodes[self.part == part])
-
-
-class Joint(NamedTuple):
-    """A weld, tie or rigid body: ``kind`` is what to call it; places of its nodes, and parts that it names."""
-
-    kind: str
-    nodes: Places
-    parts: frozenset[int]
-
-
-class Held(NamedTuple):
-    """What joins the parts that are named and those that have one of the nodes, by id; ``kind`` is what to call it."""
-
-    kind: str
-    nodes: frozenset[int] = frozenset()
-    parts: frozenset[int] = frozenset()
-
-
-class Joints(NamedTuple):
-    """Joints that are followed, and names and places of ties of which it is not known which parts they hold.
-
-    ``switched`` are rigid bodies that are there to be switched.
-    """
-
-    found: tuple[Held, ...]
-    unknown: tuple[str, ...]
-    switched: tuple[Held, ...] = ()
-
-
-def placed_joints(held: Sequence[Held], table: Places) -> tuple[Joint, ...]:
-    """Give joints with the places of their nodes in a table of ids; nodes that are not in it are left out."""
-    if not held:
-        return ()
-    ends = np.cumsum([len(one.nodes) for one in held])
-    ids = np.fromiter(chain.from_iterable(one.nodes for one in held), np.int64, int(ends[-1]))
-    order = np.argsort(table, kind="stable")
-    at = np.minimum(np.searchsorted(table, ids, sorter=order), table.size - 1)
-    places = np.where(table[order[at]] == ids, order[at], NO_NODE) if table.size else np.full(ids.size, NO_NODE)
-    split = np.split(places, ends[:-1])
-    return tuple(Joint(one.kind, at[at != NO_NODE], one.parts) for one, at in zip(held, split, strict=True))
-
-
-@dataclass(frozen=True, eq=False)
 class Inventory:
     """All parts and elements of a deck; ``solver`` is "ls-dyna" or "radioss".
 
@@ -233,8 +220,7 @@ class Inventory:
         """Numbers of elements by part and kind."""
         found: dict[int, Counter[str]] = {}
         for elements in self.elements:
-            for part, count in zip(*np.unique(elements.part, return_counts=True), strict=True):
-                found.setdefault(int(part), Counter())[elements.kind] += int(count)
+            _count(elements.kind, elements.part, found)
         return found
 
     def formulation(self, part: int, kind: str) -> Formulation:
@@ -373,9 +359,7 @@ class Inventory:
         inside = np.append(self._mask(parts), True)  # the last stands for NO_NODE
         found: dict[int, Counter[str]] = {}
         for elements in self.elements:
-            rigid = inside[elements.nodes].all(axis=1)
-            for part, count in zip(*np.unique(elements.part[rigid], return_counts=True), strict=True):
-                found.setdefault(int(part), Counter())[elements.kind] += int(count)
+            _count(elements.kind, elements.part[inside[elements.nodes].all(axis=1)], found)
         return found
 
     def _mask(self, parts: Iterable[int]) -> NDArray[np.bool_]:
@@ -383,6 +367,12 @@ class Inventory:
         for part in parts:
             mask[self.nodes_by_part.get(part, np.empty(0, np.int64))] = True
         return mask
+
+
+def _count(kind: str, parts: Places, counts: dict[int, Counter[str]]) -> None:
+    """Add elements of a kind to the counts of their parts."""
+    for part, count in zip(*(one.tolist() for one in np.unique(parts, return_counts=True)), strict=True):
+        counts.setdefault(part, Counter())[kind] += count
 
 
 def _together(parts: Collection[int], linked: Callable[[int], Iterable[int]]) -> tuple[tuple[int, ...], ...]:

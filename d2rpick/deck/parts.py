@@ -1,16 +1,17 @@
-"""Parts, part sets and rigid materials of a deck: what the ids on switching cards refer to."""
+"""Parts, sections, sets and rigid materials of a deck: what the ids on switching cards refer to.
+
+Columns: the vendor's keyword data as published in its Python library.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
-
-from d2rpick.deck.card import Value
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
-    from d2rpick.deck.card import Card, Problem, Row
+    from d2rpick.deck.card import Card, Problem, Row, Value
     from d2rpick.deck.reader import Deck
 
 _EXTRA_LINES: Final = {"CONTACT": 1, "REPOSITION": 1, "PRINT": 1, "FIELD": 1, "INERTIA": 3}
@@ -18,7 +19,28 @@ _WITHOUT_LINES: Final = {"AVERAGED", "TITLE"}
 _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNEAL"}
 _ROTATED = 1  # IRCS of *PART_INERTIA: one more line follows
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
+_NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 _PER_LINE = 8
+# Solid formulations that keep their stresses in global axes, by ELFORM; 0 and 9 co-rotate.
+NOT_TURNED: Final = {
+    -2: "8 points, selectively reduced, for poor aspect ratios",
+    -1: "8 points, selectively reduced, for poor aspect ratios",
+    1: "constant stress",
+    2: "8 points, selectively reduced",
+    3: "8 nodes with rotations",
+    4: "4 nodes with rotations",
+    10: "tetrahedron with 1 point",
+    13: "tetrahedron with nodal pressure",
+    15: "pentahedron with 2 points",
+    16: "tetrahedron with 10 nodes",
+    17: "tetrahedron with 10 nodes",
+}
+_LINES: Final = {"SOLID": 1, "DISCRETE": 2, "SHELL": 2, "BEAM": 2, "TSHELL": 2}  # of one section
+_SEARCHED: Final = ("ELEMENT_SHELL", "ELEMENT_SOLID", "ELEMENT_TSHELL", "ELEMENT_BEAM")
+_ELEMENT_OPTIONS: Final = {  # their lines hold reals or words, or a single integer
+    *("THICKNESS", "BETA", "MCID", "OFFSET", "ORTHO", "ORIENTATION", "COMPOSITE", "LONG", "SCALAR", "SECTION"),
+    "ELFORM",
+}
 
 
 @dataclass(frozen=True)
@@ -91,12 +113,7 @@ class Parts:
 def read_parts(deck: Deck) -> Parts:
     """Collect the parts, part sets and rigid materials of a deck."""
     parts = Parts(problems=list(deck.problems), all_known=not deck.unread and not deck.encrypted)
-    for card in deck.named("MAT_RIGID", "MAT_020", "MAT_20"):
-        if card.name.split("_")[2:3] == ["DISCRETE"]:
-            continue
-        rows = card.rows[1:] if card.name.endswith("_TITLE") else card.rows
-        if rows:
-            parts.rigid_materials.add(_material(card, rows[0], 0))
+    parts.rigid_materials.update(material_of(card, card.data[0], 0) for card in rigid_materials(deck))
     for card in deck.named("PART"):
         _take_parts(card, parts)
     for card in deck.named("SET_PART"):
@@ -105,14 +122,20 @@ def read_parts(deck: Deck) -> Parts:
     return parts
 
 
-def _material(card: Card, row: Row, position: int) -> str:
+def rigid_materials(deck: Deck) -> Iterator[Card]:
+    """Cards of rigid materials."""
+    cards = deck.named("MAT_RIGID", "MAT_020", "MAT_20")
+    return (card for card in cards if card.data and card.name.split("_")[2:3] != ["DISCRETE"])
+
+
+def material_of(card: Card, row: Row, position: int) -> str:
     """Id of a material with its offset, or its name where the deck uses names."""
     value = card.integer(row, position)
     return value.field.text.upper() if value.problem else str(value.value + card.transform.material)
 
 
 def _take_parts(card: Card, parts: Parts) -> None:
-    options = set(card.name.split("_")[1:])
+    options = card.options("PART")
     if options & _NO_DEFINITION:
         return
     if "ATTACHMENT" in options:
@@ -127,7 +150,7 @@ def _take_parts(card: Card, parts: Parts) -> None:
     rows = list(card.rows)
     while len(rows) > 1:  # a title, the ids, and what the options add
         _, ids, *rest = rows
-        _add(card, rows[:2], _material(card, ids, 2), parts)
+        _add(card, rows[:2], material_of(card, ids, 2), parts)
         skip = sum(_EXTRA_LINES.get(option, 0) for option in options)
         if "INERTIA" in options and rest and card.integer(rest[0], 4).value == _ROTATED:
             skip += 1
@@ -148,8 +171,7 @@ def _add(card: Card, lines: Sequence[Row], material: str, parts: Parts) -> None:
 
 
 def _take_set(card: Card, parts: Parts) -> None:
-    options = set(card.name.split("_")[2:])
-    rows = [row for row in (card.rows[1:] if "TITLE" in options else card.rows) if not row.blank]
+    options, rows = card.options("SET_PART"), card.data
     if not rows:
         return
     first = card.integer(rows[0], 0)
@@ -157,30 +179,88 @@ def _take_set(card: Card, parts: Parts) -> None:
         parts.problems.append((first.field, first.problem))
         return
     set_id = first.value + card.transform.set_
-    ranges = "ADD" in options and any(_id(card, row, at).value < 0 for row in rows[1:] for at in range(_PER_LINE))
+    values = _listed(card, options)
+    ranges = "ADD" in options and any(value.value < 0 for value in values)
     if ranges or not options <= _SET_OPTIONS:
         parts.sets[set_id] = None
         return
-    content = _content(card, options, rows[1:])
+    content = _content(card, options, values)
     known = parts.sets.get(set_id)
     parts.sets[set_id] = known.joined(content) if known and "COLLECT" in options else content
 
 
-def _content(card: Card, options: set[str], rows: list[Row]) -> PartSet:
+def _content(card: Card, options: Collection[str], values: Sequence[Value[int]]) -> PartSet:
     offset = card.transform.set_ if "ADD" in options else card.transform.part
-    per_line = 1 if "COLUMN" in options else _PER_LINE
-    values = [value for row in rows for position in range(per_line) if (value := _id(card, row, position)).field.text]
-    problems = tuple((value.field, value.problem) for value in values if value.problem)
+    unread = ((one.field, one.problem or _negative(one)) for one in values)
+    problems = tuple((place, problem) for place, problem in unread if problem)
     ids = tuple(value.value + offset for value in values if value.value > 0)
     if "GENERATE" in options:
         return PartSet(ranges=tuple(zip(ids[::2], ids[1::2], strict=False)), problems=problems)
     return PartSet(sets=ids, problems=problems) if "ADD" in options else PartSet(parts=ids, problems=problems)
 
 
-def _id(card: Card, row: Row, position: int) -> Value[int]:
-    value = card.integer(row, position)
-    if value.problem or value.value >= 0:
-        return value
-    return Value(
-        value.value, value.field, f"{value.field.text!r} in a part set is not followed, a positive id was expected"
-    )
+def _negative(value: Value[int]) -> str:
+    told = f"{value.field.text!r} in a part set is not followed, a positive id was expected"
+    return told if value.value < 0 else ""
+
+
+def node_sets(deck: Deck) -> dict[int, frozenset[int]]:
+    """Members of the node sets whose lines are followed."""
+    found: dict[int, frozenset[int]] = {}
+    for card in deck.named("SET_NODE"):
+        options = card.options("SET_NODE")
+        if card.data and options <= _NODE_SET_OPTIONS:
+            ids = [value.value + card.transform.node for value in _listed(card, options) if value.value > 0]
+            if "GENERATE" in options:
+                ids = [one for low, high in zip(ids[::2], ids[1::2], strict=False) for one in range(low, high + 1)]
+            found[card.integer(card.data[0], 0).value + card.transform.set_] = frozenset(ids)
+    return found
+
+
+def _listed(card: Card, options: Collection[str]) -> list[Value[int]]:
+    """Ids below the first line of a set."""
+    places = range(1 if "COLUMN" in options else _PER_LINE)
+    return [value for row in card.data[1:] for at in places if (value := card.integer(row, at)).field.text]
+
+
+class SectionCard(NamedTuple):
+    """A *SECTION as written: its kind, ELFORM, the first number of its second line, points through the thickness."""
+
+    kind: str
+    elform: int
+    first: float | None
+    layers: int | None
+
+    @property
+    def unturned(self) -> str:
+        """The formulation of solids whose stresses do not turn with a rigid body; empty for all others."""
+        return NOT_TURNED.get(self.elform, "") if self.kind == "SOLID" else ""
+
+
+def read_sections(deck: Deck) -> dict[int, SectionCard]:
+    """Collect the sections by id."""
+    return {number: section for card in deck.named("SECTION") for number, section in _sections(card)}
+
+
+def _sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
+    kind = card.name.split("_")[1]
+    options, rows = card.options(f"SECTION_{kind}"), card.lines
+    titled = "TITLE" in options
+    per_section = _LINES.get(kind)
+    if per_section is None or options - {"TITLE"}:
+        rows, per_section, titled = rows[int(titled) :][:2], 2, False
+    for at in range(titled, len(rows), per_section + titled):
+        number, elform = card.integer(rows[at], 0), card.integer(rows[at], 1, 1 if kind == "SOLID" else 2)
+        layers = card.integer(rows[at], 3, 2) if kind == "SHELL" else None
+        through = (layers.value or 2) if layers and not layers.problem else None
+        second = rows[at + 1] if per_section > 1 and at + 1 < len(rows) else None
+        first = card.positive(second, 0) if second else None
+        if not number.problem:
+            section = SectionCard(kind, 0 if elform.problem else elform.value, first, through)
+            yield number.value + card.transform.rest, section
+
+
+def element_cards(deck: Deck, *, searched: bool) -> list[Card]:
+    """Cards of elements that are searched for nodes that parts share, or those whose lines are not followed."""
+    cards = deck.named(*_SEARCHED)
+    return [card for card in cards if searched == (set(card.name.split("_")[2:]) <= _ELEMENT_OPTIONS)]

@@ -11,8 +11,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from d2rpick.deck.columns import NO_NODE, places_of
-from d2rpick.deck.model import SPRING, Boundary
+from d2rpick.deck.mesh import NO_NODE
+from d2rpick.deck.model import SPRING
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -72,15 +72,6 @@ def _rows(inventory: Inventory, parts: frozenset[int]) -> Iterator[Places]:
 _UNTURNED: Final = {"solid", "tetrahedron", "pentahedron", "quad", "tria", "truss", "thick shell", "particle"}
 # Nodes lie in one plane within this share of the size of what they belong to.
 _FLAT: Final = 1e-6
-
-
-def placed_boundary(boundary: Boundary, table: Places) -> Boundary:
-    """Give supports and gravity with the places of their nodes in a table of ids."""
-    holds = tuple(one._replace(nodes=places_of(one.nodes, table)) for one in boundary.holds)
-    gravity = boundary.gravity and tuple(
-        one if one.nodes is None else one._replace(nodes=places_of(one.nodes, table)) for one in boundary.gravity
-    )
-    return Boundary(holds, gravity, boundary.notes)
 
 
 def supports_of(inventory: Inventory) -> tuple[Mapping[int, tuple[Hold, ...]], tuple[Hold, ...]]:

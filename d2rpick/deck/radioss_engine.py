@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.deck.card import Card, Field, Scope, Value
+from d2rpick.deck.card import Card, Field, Row, Scope, Value
 from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.source import Block
 
@@ -72,6 +72,16 @@ def card_of(block: Block) -> Card:
     return Card("/".join(keyword(block)), block, Scope())
 
 
+def number_of(card: Card, at: int = 1) -> int:
+    """Id in the keyword of a card, as one of its words; 0 for none."""
+    return whole("".join(card.words[at:][:1]))
+
+
+def below_title(card: Card) -> tuple[Row, ...]:
+    """Lines that are not blank, below that of the title, which may be blank."""
+    return tuple(row for row in card.rows[1:] if not row.blank)
+
+
 class Start(NamedTuple):
     """An /INIV: velocities given at the start of a leg to ranges of nodes, or to a group of nodes (else 0)."""
 
@@ -97,18 +107,13 @@ class Leg:
 def read_legs(source: SourceFile) -> list[Leg]:
     """Read the legs of a file: one, or several where printed cards are read as they come."""
     legs: list[Leg] = []
-    waiting: list[tuple[Block, tuple[str, ...]]] = []
-    for block in blocks(source):
-        words = keyword(block)
-        if words and words[0] == "RUN":
-            legs.append(_leg(block, words))
-            for earlier, its_words in waiting:
-                _take(legs[-1], earlier, its_words)
-            waiting.clear()
-        elif legs:
-            _take(legs[-1], block, words)
-        else:
-            waiting.append((block, words))
+    waiting: list[Card] = []
+    for card in map(card_of, blocks(source)):
+        waiting.append(card)
+        if card.words[0] == "RUN":
+            legs.append(_leg(card))
+        while legs and waiting:
+            _take(legs[-1], waiting.pop(0))
     return legs
 
 
@@ -119,47 +124,45 @@ def kept_off(legs: Sequence[Leg]) -> tuple[int, ...]:
     return tuple(node for node, rigid in states.items() if not rigid and node not in on)
 
 
-def _leg(block: Block, words: tuple[str, ...]) -> Leg:
-    card = card_of(block)
-    stop = next(_numbers(block), None)
+def _leg(card: Card) -> Leg:
     missing = Value(0.0, card.here, "the end of the run is missing below /RUN")
-    name = block.head.split("/")[2].strip() if len(words) > 1 else ""
-    return Leg(card, name, whole(words[2]) if words[2:] else 0, stop or missing)
+    name = card.block.head.split("/")[2].strip() if card.words[1:] else ""
+    return Leg(card, name, number_of(card, 2), next(_numbers(card), missing))
 
 
-def _take(leg: Leg, block: Block, words: tuple[str, ...]) -> None:
+def _take(leg: Leg, card: Card) -> None:
+    words = card.words
     if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
-        nodes = tuple(_integer(value) for value in _numbers(block))
-        leg.switched.append((card_of(block), words[1] == "ON", nodes))
+        leg.switched.append((card, words[1] == "ON", tuple(_integer(value) for value in _numbers(card))))
     elif words == ("DTIX",):
-        leg.cap = next(reversed(list(_numbers(block))), None)
-    elif words and words[0] == "INIV":
-        leg.starts.append(_start(block, words))
-    elif words and words[0] == "VERS":
-        leg.version = words[1] if words[1:] else ""
+        leg.cap = next(reversed(list(_numbers(card))), None)
+    elif words[0] == "INIV":
+        leg.starts.append(_start(card))
+    elif words[0] == "VERS":
+        leg.version = "".join(words[1:2])
 
 
-def _start(block: Block, words: tuple[str, ...]) -> Start:
+def _start(card: Card) -> Start:
     """Read whom an /INIV moves: single nodes, by type 1 first and last of ranges, by type 2 a group.
 
     Source: Altair's public help for /INIV, and the published source of OpenRadioss.
     """
-    type_ = whole(words[3]) if words[3:] else 0
-    before = 5 if words[1:2] == ("AXIS",) else 1  # numbers of the velocity
-    ids = [_integer(value).value for value in _numbers(block)][before:]
+    type_ = number_of(card, 3)
+    before = 5 if card.words[1:2] == ("AXIS",) else 1  # numbers of the velocity
+    ids = [_integer(value).value for value in _numbers(card)][before:]
     if type_ == 2:
-        return Start(card_of(block), (), ids[0] if ids else 0)
+        return Start(card, (), ids[0] if ids else 0)
     pairs = zip(ids[::2], ids[1::2], strict=False) if type_ == 1 else zip(ids, ids, strict=True)
-    return Start(card_of(block), tuple(pairs), 0)
+    return Start(card, tuple(pairs), 0)
 
 
-def _numbers(block: Block) -> Iterator[Value[float]]:
+def _numbers(card: Card) -> Iterator[Value[float]]:
     """All numbers below a keyword, in free format."""
-    for distance, line in block.lines():
+    for distance, line in card.block.lines():
         column = 0
         for word in line.split():
             column = line.index(word, column)
-            place = Field(word, block, distance, column + 1)
+            place = Field(word, card.block, distance, column + 1)
             column += len(word)
             try:
                 yield Value(float(number(word)), place)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.deck.radioss_engine import blocks, card_of, keyword, whole
+from d2rpick.deck.radioss_engine import number_of
 from d2rpick.deck.radioss_mesh import KINDS, NOT_COUNTED, elements_of, nodes_of
 from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw
 from d2rpick.deck.radioss_starter import reals
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card, Field
-    from d2rpick.deck.columns import Integers, Reals
+    from d2rpick.deck.mesh import Integers, Reals
     from d2rpick.deck.radioss_engine import Start
     from d2rpick.deck.radioss_run import Run
     from d2rpick.deck.radioss_starter import Body, Starter
@@ -53,25 +53,19 @@ class NodeGroups:
     @cached_property
     def _by_part(self) -> Mapping[int, Integers]:
         """Nodes by part; a part with particles, which are not followed, is left out."""
-        found: dict[int, list[Integers]] = {part: [] for part in self._starter.parts}
-        unknown = set()
-        for source in self._starter.sources:
-            for block in blocks(source):
-                words = keyword(block)
-                if words[1:] and words[0] in KINDS:
-                    part = found.setdefault(whole(words[1]), [])
-                    part += [np.unique(nodes) for _, _, nodes in elements_of(card_of(block), words)]
-                elif words[1:] and words[0] in NOT_COUNTED:
-                    unknown.add(whole(words[1]))
-        empty = np.empty(0, np.int64)
-        joined = {part: np.unique(np.concatenate([empty, *nodes])) for part, nodes in found.items()}
+        found: dict[int, list[Integers]] = {part: [np.empty(0, np.int64)] for part in self._starter.parts}
+        for card in self._starter.named(*KINDS):
+            if card.words[1:]:
+                part = found.setdefault(number_of(card), [np.empty(0, np.int64)])
+                part += [np.unique(nodes) for _, _, nodes in elements_of(card)]
+        unknown = {number_of(card) for card in self._starter.named(*NOT_COUNTED) if card.words[1:]}
+        joined = {part: np.unique(np.concatenate(nodes)) for part, nodes in found.items()}
         return {part: nodes[nodes > 0] for part, nodes in joined.items() if part not in unknown}
 
     @cached_property
     def placed(self) -> tuple[Integers, Reals]:
         """Ids of all nodes (n,) and where they lie (n, 3) [length]."""
-        every = [block for source in self._starter.sources for block in blocks(source)]
-        return nodes_of([card_of(block) for block in every if keyword(block)[:1] == ("NODE",)])
+        return nodes_of(self._starter.named("NODE"))
 
 
 def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:

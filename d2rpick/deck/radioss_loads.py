@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.deck.model import Boundary, Gravity, Held, Hold, Joints, ids, plateaus
-from d2rpick.deck.radioss_engine import blocks, keyword, whole
+from d2rpick.deck.model import Boundary, Gravity, Hold, Joint, Joints, ids, plateaus
+from d2rpick.deck.radioss_engine import below_title, blocks, keyword, number_of, whole
 from d2rpick.deck.radioss_starter import reals
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_run import Run
     from d2rpick.deck.radioss_starter import Starter
 
-    Worded = Sequence[tuple[Card, tuple[str, ...]]]
 
 # The same of Radioss, by the first word.
 _OTHER_OF_RADIOSS: Final = ("RBE2", "RBE3", "RLINK", "MPC")
@@ -34,23 +33,14 @@ _WIDTH: Final = 10
 _TRANSLATIONS, _ROTATIONS = slice(3, 6), slice(7, 10)  # codes of /BCS
 
 
-def read(run: Run, starter: Starter, cards: Worded) -> Boundary:
+def read(run: Run, starter: Starter, cards: Sequence[Card]) -> Boundary:
     """Collect what acts on the model from outside."""
-    acting = [(card, words) for card, words in cards if words and words[0] in ("GRAV", "BCS", *_MOTIONS)]
+    acting = [card for card in cards if card.words[0] in ("GRAV", "BCS", *_MOTIONS)]
     if starter.moved and acting:
         return Boundary(notes=("ids of a //SUBMODEL may be moved: supports and gravity of the deck are not followed",))
     found = [*_holds(run, starter, acting)]
-    holds = [one for one in found if isinstance(one, Hold)]
-    pulls = [*_gravity(starter, acting, cards)]
-    gravity = tuple(one for one in pulls if isinstance(one, Gravity))
-    known = len(gravity) == len(pulls) and not run.deck.unread
-    notes = tuple(one for one in (*found, *pulls) if isinstance(one, str))
-    return Boundary((*holds, *_of_bodies(run, starter, holds)), gravity if known else None, notes)
-
-
-def _rows(card: Card) -> list[Row]:
-    """Lines behind the title."""
-    return [row for row in card.rows[1:] if not row.blank]
+    found += [*_of_bodies(run, starter, [one for one in found if isinstance(one, Hold)])]
+    return Boundary.of(found, [*_gravity(starter, acting, cards)], whole=not run.deck.unread)
 
 
 def _name(card: Card) -> str:
@@ -60,11 +50,11 @@ def _name(card: Card) -> str:
 # Supports and imposed motion.
 
 
-def _holds(run: Run, starter: Starter, acting: Worded) -> Iterator[Hold | str]:
+def _holds(run: Run, starter: Starter, acting: Sequence[Card]) -> Iterator[Hold | str]:
     engine = [source for source in run.deck.sources if source not in starter.sources]
     lifted = any(keyword(block)[:1] == ("BCSR",) for source in engine for block in blocks(source))
-    for card, words in acting:
-        rows = _rows(card)
+    for card in acting:
+        words, rows = card.words, below_title(card)
         if words[0] == "GRAV" or not rows:
             continue
         if words[0] == "BCS" and lifted:
@@ -74,7 +64,7 @@ def _holds(run: Run, starter: Starter, acting: Worded) -> Iterator[Hold | str]:
             nodes = ids({whole(row.text[:_WIDTH]) for row in rows[2:]} - {0})
             yield Hold(_name(card), nodes, group, counts=True)
         else:
-            held = _support(card, rows) if words[0] == "BCS" else _motion(card, words, rows)
+            held = _support(card, rows) if words[0] == "BCS" else _motion(card, rows)
             members = starter.group_members(card.integer(rows[0], 2 if words[0] == "BCS" else 4).value)
             if members is None:
                 yield f"{_name(card)}: the nodes of its group are not followed"
@@ -92,9 +82,9 @@ def _support(card: Card, rows: Sequence[Row]) -> Hold | None:
     return Hold(_name(card), ids(()), axes=axes, counts=skewed)
 
 
-def _motion(card: Card, words: Sequence[str], rows: Sequence[Row]) -> Hold:
+def _motion(card: Card, rows: Sequence[Row]) -> Hold:
     """Give the times of an imposed motion; with a sensor, or units of its own, these are all."""
-    timed = len(rows) > 1 and not card.integer(rows[0], 3).value and not whole("".join(words[2:3]))
+    timed = len(rows) > 1 and not card.integer(rows[0], 3).value and not number_of(card, 2)
     start, stop = reals(rows[1], 4)[2:] if timed else (0.0, 0.0)
     known = np.isfinite([start, stop]).all()
     return Hold(_name(card), ids(()), counts=True, start=start if known else 0.0, end=stop if known and stop else inf)
@@ -113,21 +103,21 @@ def _of_bodies(run: Run, starter: Starter, holds: Sequence[Hold]) -> Iterator[Ho
 # Gravity.
 
 
-def _gravity(starter: Starter, acting: Worded, cards: Worded) -> Iterator[Gravity | str]:
-    loads = [(card, words) for card, words in acting if words[0] == "GRAV" and _rows(card)]
+def _gravity(starter: Starter, acting: Sequence[Card], cards: Sequence[Card]) -> Iterator[Gravity | str]:
+    loads = [card for card in acting if card.words[0] == "GRAV" and below_title(card)]
     if not loads:
         return
     functions = dict(_functions(cards))
-    units = next((card.rows[2:4] for card, words in cards if words == ("BEGIN",)), ())
+    units = next((card.rows[2:4] for card in cards if card.words == ("BEGIN",)), ())
     converted = len(units) > 1 and units[0].text.split() != units[1].text.split() and units[1].text.strip() != ""
-    for card, words in loads:
-        found = None if converted or whole("".join(words[2:3])) else _of_card(card, starter, functions)
+    for card in loads:
+        found = None if converted or number_of(card, 2) else _of_card(card, starter, functions)
         yield found or f"{_name(card)} is not followed: whether gravity acts is seen in the run alone"
 
 
 def _of_card(card: Card, starter: Starter, functions: Mapping[int, tuple[float, ...]]) -> Gravity | None:
     """Give the values and nodes of a /GRAV, None where they are not known; before its sensor it is off."""
-    row = _rows(card)[0]
+    row = below_title(card)[0]
     function, skew, sensor, group = (card.integer(row, at).value for at in (0, 2, 3, 4))
     scale = reals(row, 5)[4] or 1.0
     values = plateaus(functions.get(function, ()), scale) if function else (scale,)
@@ -140,56 +130,56 @@ def _of_card(card: Card, starter: Starter, functions: Mapping[int, tuple[float, 
     return Gravity(axis, values, ids(members[0]), frozenset(members[1])) if group else Gravity(axis, values)
 
 
-def _functions(cards: Worded) -> Iterator[tuple[int, tuple[float, ...]]]:
+def _functions(cards: Sequence[Card]) -> Iterator[tuple[int, tuple[float, ...]]]:
     """Ordinates of the functions, none of those that the deck scales."""
-    moved = {whole(words[1]) for _, words in cards if words[:1] == ("MOVE_FUNCT",) and words[1:]}
-    for card, words in cards:
-        if words[:1] == ("FUNCT",) and words[1:]:
-            number = whole(words[1])
-            yield number, () if number in moved else tuple(reals(row, 2)[1] for row in _rows(card))
+    moved = {number_of(card) for card in cards if card.words[0] == "MOVE_FUNCT" and card.words[1:]}
+    for card in cards:
+        if card.words[0] == "FUNCT" and card.words[1:]:
+            number = number_of(card)
+            yield number, () if number in moved else tuple(reals(row, 2)[1] for row in below_title(card))
 
 
 # Joints.
 
 
-def joints_of(run: Run, starter: Starter, cards: Sequence[tuple[Card, tuple[str, ...]]]) -> Joints:
+def joints_of(run: Run, starter: Starter, cards: Sequence[Card]) -> Joints:
     """Collect the tied interfaces (/INTER/TYPE2) of a starter deck whose main surface is one part, and rigid bodies.
 
     A rigid body that no engine file and no sensor switches is always on, and joins what it has nodes of.  Without
     engine files all are taken for those that are switched.
     """
-    surfaces = {whole(words[-1]): card for card, words in cards if words[:2] == ("SURF", "PART") and words[2:]}
-    found, switched, unknown = list[Held](), list[Held](), list[str]()
-    for card, words in cards:
-        interface = words[:2] == ("INTER", "TYPE2")
+    surfaces = {number_of(card, -1): card for card in cards if card.words[:2] == ("SURF", "PART") and card.words[2:]}
+    found, switched, unknown = list[Joint](), list[Joint](), list[str]()
+    for card in cards:
+        interface = card.words[:2] == ("INTER", "TYPE2")
         tie = _of_interface(card, starter, surfaces) if interface else None
         if tie:
             found.append(tie)
-        elif interface or (words and words[0] in _OTHER_OF_RADIOSS):
-            unknown.append(f"/{'/'.join(words)} ({card.at})")
+        elif interface or card.words[0] in _OTHER_OF_RADIOSS:
+            unknown.append(_name(card))
     named = {value.value for leg in run.legs for _, _, nodes in leg.switched for value in nodes}
     for body in starter.bodies:
         always = bool(run.legs) and not body.sensor and body.node.value not in named
         members = starter.group_members(body.group)
         if members:
-            held = Held("rigid body", frozenset(members[0] | {body.node.value}), frozenset(members[1]))
+            held = Joint("rigid body", ids(members[0] | {body.node.value}), frozenset(members[1]))
             (found if always else switched).append(held)
         elif always:
             unknown.append(f"/RBODY/{body.id} ({body.card.at})")
     return Joints(tuple(found), tuple(unknown), tuple(switched))
 
 
-def _of_interface(card: Card, starter: Starter, surfaces: dict[int, Card]) -> Held | None:
-    rows = [row for row in card.rows if not row.blank]
-    group, surface = (card.integer(rows[1], at).value for at in range(2)) if len(rows) > 1 else (0, 0)
+def _of_interface(card: Card, starter: Starter, surfaces: dict[int, Card]) -> Joint | None:
+    rows = below_title(card)
+    group, surface = (card.integer(rows[0], at).value for at in range(2)) if rows else (0, 0)
     members = starter.group_members(group)
     main = frozenset(_listed(surfaces[surface]) if surface in surfaces else ())
     if members is None or len(main) != 1:
         return None
-    return Held("tied interface", frozenset(members[0]), frozenset(members[1]) | main)
+    return Joint("tied interface", ids(members[0]), frozenset(members[1]) | main)
 
 
 def _listed(card: Card) -> Iterator[int]:
     """Ids below the title of a surface."""
-    for row in [row for row in card.rows if not row.blank][1:]:
+    for row in below_title(card):
         yield from (value for at in range(10) if (value := card.integer(row, at).value) > 0)

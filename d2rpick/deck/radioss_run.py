@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.deck.card import Value
 from d2rpick.deck.radioss_engine import Leg, blocks, card_of, keyword, read_legs
-from d2rpick.deck.radioss_starter import KEPT, Starter, rigid_parts
+from d2rpick.deck.radioss_starter import Starter
 from d2rpick.deck.reader import Deck, Unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import Switched, SwitchSet
@@ -25,7 +25,7 @@ from d2rpick.deck.windows import Event, Unit, Window, Windows
 from d2rpick.errors import DeckError, are, in_rows, name_units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card, Field
     from d2rpick.deck.radioss_engine import Leg
@@ -147,11 +147,10 @@ def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
             run.deck.ends.append((block, not chain))
         if not words:
             _include(card_of(block), source, run, chain)
-        elif words[0] in KEPT:
-            card = card_of(block)
-            run.starter.take(card, words)
+        else:
+            run.starter.take(block)
             if words[0] == "RBODY":
-                run.deck.cards.append(card)
+                run.deck.cards.append(card_of(block))
 
 
 def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
@@ -292,6 +291,32 @@ def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]]) -> Iterator[Win
         if stop < math.inf:
             again = Event(unit, LegSwitch(body.card, "plain", None, (), (), at=stop), Switched(body.node, False, True))
             yield Window(unit, stop, None, again, None)
+
+
+def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:
+    """Parts that lie whole in the group of each body.
+
+    Parameters
+    ----------
+    starter : Starter
+        The deck.
+    bodies : mapping
+        Group of nodes by main node.
+
+    Returns
+    -------
+    dict
+        Parts by main node; empty where the members of the group are not known.
+    """
+    members = {node: starter.group_members(group) for node, group in bodies.items()}
+    named = {node: set(known[1]) if known else set() for node, known in members.items()}
+    of_nodes = {node: known[0] for node, known in members.items() if known and known[0]}
+    if of_nodes:
+        from d2rpick.deck.radioss_mesh import parts_within  # loads numpy
+
+        for node, parts in parts_within(starter, of_nodes).items():
+            named[node] |= parts
+    return named
 
 
 class LeftRigid(NamedTuple):

@@ -10,29 +10,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.deck.expression import ExpressionError, number
-from d2rpick.deck.radioss_engine import blocks, keyword, whole
+from d2rpick.deck.radioss_engine import below_title, card_of, keyword, number_of, whole
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.deck.card import Card, Row, Value
-    from d2rpick.deck.source import SourceFile
+    from d2rpick.deck.source import Block, SourceFile
 
 
-# Nodes of an element, behind its id on one line; elements of other kinds take more lines and are not followed.
-NODES: Final = {
-    "SHELL": 4,
-    "SH3N": 3,
-    "BRICK": 8,
-    "TETRA4": 4,
-    "PENTA6": 6,
-    "QUAD": 4,
-    "TRIA": 3,
-    "BEAM": 2,
-    "TRUSS": 2,
-    "SPRING": 2,
-}
-_UNFOLLOWED: Final = {"BRIC20", "TETRA10", "SHEL16", "SPHCEL", "XELEM"}
 WITHOUT_FRAME: Final = {"TETRA4", "TETRA10", "BRIC20", "SHEL16"}  # their stresses do not turn with a rigid body
 _WIDTH: Final = 10
 _BRICK: Final = "BRICK"
@@ -41,7 +27,7 @@ _GROUP_FIELD: Final = 6  # of the first line of /RBODY, in columns of 10: the ma
 _ICOROTATIONAL: Final = 2  # Iframe
 _NOT_TURNED: Final = {1, 2, 12}  # Isolid of bricks without a co-rotating frame; 12 by the help up to 2017
 _DEFAULT_ISOLID: Final = 1
-_SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
+SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
 
 
 class Body(NamedTuple):
@@ -89,45 +75,62 @@ class Starter:
     moved: bool = False  # whether a submodel may offset its ids
     transformed: bool = False  # whether nodes are moved
     sources: list[SourceFile] = field(default_factory=list)
+    blocks: list[Block] = field(default_factory=list)  # all of them, in reading order
 
-    def take(self, card: Card, words: tuple[str, ...]) -> None:
-        """Keep what a card says."""
-        if words[0] == _SUBMODEL:
+    def named(self, *keywords: str) -> Iterator[Card]:
+        """Cards whose first word is one of these; read anew each time, since there may be much in them."""
+        return (card_of(block) for block in self.blocks if keyword(block)[0] in keywords)
+
+    def take(self, block: Block) -> None:
+        """Keep what a block says."""
+        self.blocks.append(block)
+        first, *words = keyword(block)
+        if first not in _KEPT:
+            return
+        card = card_of(block)
+        id_ = number_of(card, _ID_AT.get(first, 1))
+        if first == _SUBMODEL:
             self.moved = True
-            return
-        if words[0] in WITHOUT_FRAME or words[0] == _BRICK:
-            parts = self.bricks if words[0] == _BRICK else self.unturned_parts
-            parts.add(whole(words[1]) if words[1:] else 0)
-            return
-        rows = [*card.rows[:1], *(row for row in card.rows[1:] if not row.blank)]  # the title may be blank
-        id_ = whole(words[_ID_AT.get(words[0], 1)]) if len(words) > _ID_AT.get(words[0], 1) else 0
-        if words[0] == "BEGIN" and rows:
-            self.name = rows[0].text.strip()
-            self.version = card.integer(rows[1], 0).value if len(rows) > 1 else 0
-        elif words[0] == "RBODY" and len(rows) > 1 and id_:  # one of /RBODY/LAGMUL is never switched
-            first = rows[1]
-            sensor, group, keeps = (card.integer(first, at).value for at in (1, _GROUP_FIELD, _GROUP_FIELD + 1))
-            self.bodies.append(Body(id_, card.integer(first, 0), sensor, group, card, bool(sensor or keeps)))
-        elif words[0] == "RWALL":
-            self.walls.append(card)
-        elif words[0] == "INIVEL":
-            self.velocities.append(card)
-        elif words[0] == "TRANSFORM":
+        elif first == "TRANSFORM":
             self.transformed = True
-        elif words[0] == "PART" and len(rows) > 1:
-            prop, subset = card.integer(rows[1], 0).value, card.integer(rows[1], 2).value
-            self.parts[id_] = PartLine(rows[0].text.strip(), prop, subset)
-        elif words[0] == "SUBSET":
-            self.subsets[id_] = _ids(rows[1:])
-        elif words[0] == "GRNOD" and words[1:]:
-            self.groups[id_] = words[1], _ids(rows[1:])
-        elif words[:2] == ("SENSOR", "TIME") and len(rows) > 1:
-            start, stop = reals(rows[1], 2)
+        elif first == _BRICK:
+            self.bricks.add(id_)
+        elif first in WITHOUT_FRAME:
+            self.unturned_parts.add(id_)
+        elif first == "RWALL":
+            self.walls.append(card)
+        elif first == "INIVEL":
+            self.velocities.append(card)
+        elif first == "DEF_SOLID":
+            if card.rows and self.default_solid is None:  # the first one counts
+                self.default_solid = _isolid_and_iframe(card, card.rows[0])
+        elif first == "PROP":
+            if words and words[0] in SOLIDS and len(card.rows) > 1:
+                self.solids[id_] = _isolid_and_iframe(card, card.rows[1])  # the line may be blank
+        else:
+            self._take_rows(card, id_, below_title(card))
+
+    def _take_rows(self, card: Card, id_: int, rows: Sequence[Row]) -> None:
+        """Keep what the lines below a title say."""
+        first, *words = card.words
+        if first == "BEGIN" and card.rows:
+            self.name = card.rows[0].text.strip()
+            self.version = card.integer(rows[0], 0).value if rows else 0
+        elif first == "SUBSET":
+            self.subsets[id_] = _ids(rows)
+        elif first == "GRNOD" and words:
+            self.groups[id_] = words[0], _ids(rows)
+        elif not rows:
+            return
+        elif first == "RBODY" and id_:  # one of /RBODY/LAGMUL is never switched
+            sensor, group, keeps = (card.integer(rows[0], at).value for at in (1, _GROUP_FIELD, _GROUP_FIELD + 1))
+            self.bodies.append(Body(id_, card.integer(rows[0], 0), sensor, group, card, bool(sensor or keeps)))
+        elif first == "PART":
+            prop, subset = card.integer(rows[0], 0).value, card.integer(rows[0], 2).value
+            self.parts[id_] = PartLine(card.rows[0].text.strip(), prop, subset)
+        elif first == "SENSOR" and words[:1] == ["TIME"]:
+            start, stop = reals(rows[0], 2)
             self.timed[id_] = start, stop if stop > 0 else math.inf
-        elif words[0] == "PROP" and words[1:] and words[1] in _SOLIDS and len(card.rows) > 1:
-            self.solids[id_] = _isolid_and_iframe(card, card.rows[1])  # the line may be blank
-        elif words[0] == "DEF_SOLID" and rows and self.default_solid is None:  # the first one counts
-            self.default_solid = _isolid_and_iframe(card, rows[0])
 
     @property
     def unturned(self) -> dict[int, str]:
@@ -141,17 +144,6 @@ class Starter:
         bricks = [part for part, line in self.parts.items() if part in self.bricks and line.prop in props]
         found = dict.fromkeys(bricks, "bricks with Isolid 1, 2 or 12 without Iframe 2")
         return found | dict.fromkeys(self.unturned_parts, "tetrahedra, 20-node bricks or 16-node shells")
-
-    def elements(self) -> Iterator[tuple[int, frozenset[int]]]:
-        """Part and nodes of every element; no nodes for one whose lines are not followed."""
-        for source in self.sources:
-            for block in blocks(source):
-                words = keyword(block)
-                if words[1:] and words[0] in NODES:
-                    part = whole(words[1])
-                    yield from ((part, _nodes(line, NODES[words[0]])) for _, line in block.lines() if line.strip())
-                elif words[1:] and words[0] in _UNFOLLOWED:
-                    yield whole(words[1]), frozenset()
 
     def parts_in(self, subset: int) -> set[int]:
         """Parts of a subset and of those below it."""
@@ -188,49 +180,14 @@ class Starter:
 
 _ID_AT: Final = {"GRNOD": 2, "SENSOR": 2, "PROP": 2}  # where a keyword has its id; others behind their name
 # Keywords of the cards that say what a `Starter` keeps.
-KEPT: Final = {
+_KEPT: Final = {
     *(*WITHOUT_FRAME, _BRICK, _SUBMODEL, "BEGIN", "RBODY", "PART", "SUBSET", "GRNOD", "SENSOR", "PROP", "DEF_SOLID"),
     *("RWALL", "INIVEL", "TRANSFORM"),
 }
 
 
-def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:
-    """Parts that lie whole in the group of each body.
-
-    Parameters
-    ----------
-    starter : Starter
-        The deck.
-    bodies : mapping
-        Group of nodes by main node.
-
-    Returns
-    -------
-    dict
-        Parts by main node; empty where the members of the group are not known.
-    """
-    members = {node: starter.group_members(group) for node, group in bodies.items()}
-    named = {node: set(known[1]) if known else set() for node, known in members.items()}
-    of_nodes = {node: known[0] for node, known in members.items() if known and known[0]}
-    if of_nodes:
-        whole: dict[tuple[int, int], bool] = {}
-        for part, nodes in starter.elements():
-            for node, group in of_nodes.items():
-                key = node, part
-                whole[key] = whole.get(key, True) and bool(nodes) and nodes <= group
-        for (node, part), inside in whole.items():
-            if inside:
-                named[node].add(part)
-    return named
-
-
 def _isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
     return card.integer(row, 0).value, card.integer(row, 7).value
-
-
-def _nodes(line: str, count: int) -> frozenset[int]:
-    cells = (line[start : start + _WIDTH].strip() for start in range(_WIDTH, _WIDTH * (count + 1), _WIDTH))
-    return frozenset(node for cell in cells if (node := whole(cell)))
 
 
 def _ids(rows: Iterable[Row]) -> tuple[int, ...]:

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 from d2rpick.deck import Deck, Parts, SwitchSet, Window, Windows, find_windows, read_parts, read_switching
+from d2rpick.deck.parts import read_sections
 from d2rpick.deck.radioss_run import find_run_windows
-from d2rpick.deck.sections import NOT_TURNED, solid_formulations
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -164,8 +164,9 @@ class Case:
     @cached_property
     def unturned(self) -> Mapping[int, str]:
         """Parts of solids whose stresses do not turn with a rigid body, and their formulation."""
-        forms = solid_formulations(self.deck, self.parts)
-        return {part: f"ELFORM {form}, {NOT_TURNED[form]}" for part, form in forms.items() if form in NOT_TURNED}
+        sections = read_sections(self.deck)
+        found = ((part, sections.get(number)) for part, number in self.parts.sections.items())
+        return {part: f"ELFORM {one.elform}, {one.unturned}" for part, one in found if one and one.unturned}
 
     @cached_property
     def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:

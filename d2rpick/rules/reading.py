@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.card import Field
-from d2rpick.deck.elements import unread_elements
+from d2rpick.deck.parts import element_cards
 from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
 from d2rpick.deck.source import STDIN
 from d2rpick.deck.switching import misspelt
@@ -271,7 +271,7 @@ def _unread(case: Case) -> Iterator[Objection]:
     if len(switched) < 2:
         return
     first: dict[str, Card] = {}
-    for card in unread_elements(case.deck):
+    for card in element_cards(case.deck, searched=False):
         first.setdefault(card.name, card)
     for card in first.values():
         yield card.here, f"nodes that parts share were not searched in *{card.name}, whose lines are not followed"

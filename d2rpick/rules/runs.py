@@ -192,8 +192,10 @@ def _deformable_left(case: RunCase, rigid: set[int]) -> bool:
     """Whether an element may lie outside the parts that are rigid; where that is not known it may."""
     if case.run.starter is None or not case.found.parts or case.deck.unread:
         return True
-    kinds = {part for part, _ in case.run.starter.elements()}
-    return not kinds or bool(kinds - rigid)
+    from d2rpick.deck.radioss_mesh import parts_with_elements  # loads numpy
+
+    parts = parts_with_elements(case.run.starter)
+    return not parts or bool(parts - rigid)
 
 
 @rule("D2R405", WARNING, "legs of different /VERS", (GOOD_RUN,), (run_of(_MIXED),), (RADIOSS,))

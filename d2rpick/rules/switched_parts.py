@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.constraints import read_constraints
-from d2rpick.deck.elements import first_shared_nodes, nodes_of
+from d2rpick.deck.parts import element_cards
 from d2rpick.errors import name_units
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Example, grouped, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
     from d2rpick.deck import Parts, SwitchSet
     from d2rpick.deck.card import Field
@@ -201,9 +201,12 @@ def _torn(case: Case) -> Iterator[Objection]:
     """
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
     bodies = {part: _body(part, first) for part in first}
-    if len(set(bodies.values())) < 2:
+    cards = element_cards(case.deck, searched=True)
+    if len(set(bodies.values())) < 2 or not cards:
         return
-    for (low, high), node in first_shared_nodes(case.deck, bodies).items():
+    from d2rpick.deck.ls_dyna import first_shared_nodes  # loads numpy
+
+    for (low, high), node in first_shared_nodes(cards, bodies).items():
         if _together(case, first[low].unit, first[high].unit):
             place = (first[high].line.lead or first[high].line.part).field
             one, other = (f"part {part}{_of_set(first[part])}" for part in (low, high))
@@ -244,7 +247,7 @@ def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
     switched = _left_active(case, nodal=nodal)
     found = read_constraints(case.deck) if switched else []
     wanted = [one for one in found if (one.kind == "nodal rigid body") == nodal]
-    owner = nodes_of(case.deck, switched) if wanted else {}
+    owner = _owners(case, switched) if wanted else {}
     for constraint in wanted:
         part = _on(constraint, owner, switched)
         if part is None:
@@ -254,6 +257,16 @@ def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
         found_at = f"{name} on part {part}, which is made rigid at {switched[part].nrbf.field.at} with {flag}"
         way_out = "it stays active; delete it there (1) and activate it on the way back (2)"
         yield constraint.place, f"{found_at}: {way_out}"
+
+
+def _owners(case: Case, parts: Collection[int]) -> dict[int, int]:
+    """Nodes of some parts, each with the first of these that has it."""
+    cards = element_cards(case.deck, searched=True)
+    if not cards:
+        return {}
+    from d2rpick.deck.ls_dyna import first_parts  # loads numpy
+
+    return first_parts(cards, parts)
 
 
 def _left_active(case: Case, *, nodal: bool) -> dict[int, Header]:

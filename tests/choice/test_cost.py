@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from d2rpick.choice.cost import CostModel, Weights, saved_share
 from d2rpick.choice.weights_file import read_weights, written
 from d2rpick.deck.formulations import ls_dyna, radioss
-from d2rpick.deck.model import Elements, Formulation, Inventory, Material, PartData, Section
+from d2rpick.deck.mesh import Elements
+from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
 from d2rpick.errors import ConfigurationError
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ import pytest
 
 from d2rpick.deck import read_inventory
 from d2rpick.deck.geometry import Placement
-from d2rpick.deck.model import Elements, Inventory
+from d2rpick.deck.mesh import Elements
+from d2rpick.deck.model import Inventory
 from tests.computed import starter
 from tests.deck import test_ls_dyna as ls_dyna
 from tests.deck import test_radioss as radioss

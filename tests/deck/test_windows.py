@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.deck import read_parts
-from d2rpick.deck.elements import first_shared_nodes
+from d2rpick.deck.ls_dyna import first_shared_nodes
+from d2rpick.deck.parts import element_cards
 from d2rpick.rules.examples import PARTS, automatic
 from tests.decks import read, spans, windows
 
@@ -140,11 +141,12 @@ ELEMENTS: dict[str, str] = {
 
 @pytest.mark.parametrize("deck", ELEMENTS.values(), ids=ELEMENTS.keys())
 def test_shared_nodes(tmp_path: Path, deck: str) -> None:
-    assert first_shared_nodes(read(tmp_path, deck), {1: 1, 2: 2})[(1, 2)] == 3
-    assert first_shared_nodes(read(tmp_path, deck), {1: 1, 2: 1}) == {}
-    assert first_shared_nodes(read(tmp_path, deck), {1: 1, 3: 3}) == {}
+    cards = element_cards(read(tmp_path, deck), searched=True)
+    assert first_shared_nodes(cards, {1: 1, 2: 2})[(1, 2)] == 3
+    assert first_shared_nodes(cards, {1: 1, 2: 1}) == {}
+    assert first_shared_nodes(cards, {1: 1, 3: 3}) == {}
 
 
 def test_the_third_node_of_a_beam_is_not_shared(tmp_path: Path) -> None:
     deck = "*ELEMENT_BEAM\n" + shell(1, 1, 8, 9, 3) + "*ELEMENT_SHELL\n" + shell(2, 2, 3, 4, 6, 7)
-    assert first_shared_nodes(read(tmp_path, deck), {1: 1, 2: 2}) == {}
+    assert first_shared_nodes(element_cards(read(tmp_path, deck), searched=True), {1: 1, 2: 2}) == {}

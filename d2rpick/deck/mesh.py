@@ -1,4 +1,4 @@
-"""Fixed columns of many lines at once: ids and reals of a mesh as arrays.
+"""Meshes: fixed columns of many lines at once, ids and reals as arrays, and the elements and nodes that these are.
 
 A mesh of millions of lines is read in pieces.  Lines between commas and fields with parameters are rare there; they are
 taken one by one.
@@ -7,15 +7,17 @@ taken one by one.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.deck.expression import ExpressionError, number
+from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -180,20 +182,6 @@ def distinct(values: Places) -> Places:
     return ordered[np.append(True, ordered[1:] != ordered[:-1])] if ordered.size else ordered
 
 
-def places_of(ids: Places, table: Places) -> Places:
-    """Places in a table of node ids; ids that it does not have are left out.
-
-    Examples
-    --------
-    >>> places_of(np.array([7, 9]), np.array([3, 7, 5])).tolist()
-    [1]
-    """
-    order = np.argsort(table, kind="stable")
-    at = np.minimum(np.searchsorted(table[order], ids), max(table.size - 1, 0))
-    found = order[at] if table.size else order
-    return np.asarray(found[table[found] == ids] if table.size else found)
-
-
 def _used(wanted: Sequence[Places]) -> Places:
     """Node ids that elements have, ascending."""
     highest = max((int(one.max(initial=0)) for one in wanted), default=0)
@@ -207,40 +195,93 @@ def _used(wanted: Sequence[Places]) -> Places:
     return np.flatnonzero(mask)
 
 
-def placed(ids: Places, wanted: Sequence[Places]) -> tuple[Places, list[Places]]:
-    """Give every node id its place in one table.
+class NodeTable:
+    """Nodes of a mesh, each with its place: those with coordinates, as given, then those that elements have beyond.
 
-    Parameters
-    ----------
-    ids : array of int, shape (n,)
-        Nodes that have coordinates, in the order of these.
-    wanted : sequence of arrays
-        Node ids of elements, 0 for none.
+    ``ids`` are the ids by place, shape (nodes,).
 
-    Returns
-    -------
-    table : array of int
-        Ids by place: ``ids`` first, then those that elements have beyond them.
-    places : list of arrays
-        Of the shapes of ``wanted``.
+    Examples
+    --------
+    >>> table = NodeTable(np.array([3, 7, 5]), [np.array([[7, 9, 0]])])
+    >>> table.ids.tolist(), table.places(np.array([[7, 9, 0]])).tolist(), table.known(np.array([4, 7])).tolist()
+    ([3, 7, 5, 9], [[1, 3, -1]], [1])
     """
-    order = np.argsort(ids, kind="stable")
-    known = ids[order]
-    used = _used(wanted)
-    at = np.minimum(np.searchsorted(known, used), max(known.size - 1, 0))
-    absent = used[known[at] != used] if known.size else used
-    table = np.concatenate([ids, absent])
-    order = np.argsort(table, kind="stable")
-    known = table[order]
-    dense = known.size and int(known[-1]) <= _DENSE
-    if dense:
-        lookup = np.full(int(known[-1]) + 1, NO_NODE, np.int64)
-        lookup[table[::-1]] = np.arange(table.size)[::-1]
-        return table, [lookup[one] for one in wanted]
-    places = [
-        np.where(one > 0, order[np.minimum(np.searchsorted(known, one), known.size - 1)], NO_NODE)
-        if known.size
-        else one
-        for one in wanted
-    ]
-    return table, places
+
+    def __init__(self, ids: Places, elements: Sequence[Places]) -> None:
+        used = _used(elements)
+        self.ids = np.concatenate([ids, used[~np.isin(used, ids)]])
+        self._order = np.argsort(self.ids, kind="stable")
+        self._sorted = self.ids[self._order]
+
+    def places(self, ids: Places) -> Places:
+        """Place of each node, `NO_NODE` for one that the table has not."""
+        if not self.ids.size:
+            return np.full_like(ids, NO_NODE)
+        if self._sorted[-1] <= _DENSE:
+            return np.asarray(self._lookup[np.where((ids > 0) & (ids < self._lookup.size), ids, 0)])
+        at = np.minimum(np.searchsorted(self._sorted, ids), self.ids.size - 1)
+        return np.where(self._sorted[at] == ids, self._order[at], NO_NODE)
+
+    def known(self, ids: Places) -> Places:
+        """Places of those nodes that the table has."""
+        found = self.places(ids)
+        return np.asarray(found[found != NO_NODE])
+
+    @cached_property
+    def _lookup(self) -> Places:
+        """Place by id, where ids are small enough: quicker than a search."""
+        lookup = np.full(int(self._sorted[-1]) + 1, NO_NODE, np.int64)
+        lookup[self._sorted[::-1]] = self._order[::-1]
+        return lookup
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Elements of one kind: the id of the part, shape (n,), and the places of the nodes, shape (n, nodes)."""
+
+    kind: str
+    part: Places
+    nodes: Places
+
+    def of(self, part: int) -> Places:
+        """Nodes of the elements of a part."""
+        return np.asarray(self.nodes[self.part == part])
+
+
+class Mesh(NamedTuple):
+    """Elements of a deck by kind, the table of their nodes, where these lie, and how many are not placed."""
+
+    elements: tuple[Elements, ...]
+    table: NodeTable
+    coordinates: Reals
+    lost: int
+
+    @classmethod
+    def of(cls, blocks: Sequence[tuple[str, Places, Places]], ids: Places, coordinates: Reals) -> Mesh:
+        """Put together blocks of elements (kind, parts, node ids) and all nodes with coordinates."""
+        kinds = sorted({(kind, nodes.shape[1]) for kind, _, nodes in blocks})
+        alike = [[one for one in blocks if (one[0], one[2].shape[1]) == kind] for kind in kinds]
+        nodes = [np.concatenate([own for _, _, own in those]) for those in alike]
+        table = NodeTable(ids, nodes)
+        elements = tuple(
+            Elements(those[0][0], np.concatenate([part for _, part, _ in those]), table.places(own))
+            for those, own in zip(alike, nodes, strict=True)
+        )
+        lost = table.ids.size - ids.size
+        return cls(elements, table, np.concatenate([coordinates, np.full((lost, 3), np.nan)]), lost)
+
+    @property
+    def kinds(self) -> Mapping[int, set[str]]:
+        """Kinds of the elements of each part."""
+        found: dict[int, set[str]] = {}
+        for one in self.elements:
+            for part in np.unique(one.part).tolist():
+                found.setdefault(part, set()).add(one.kind)
+        return found
+
+    def doubts(self, parts: Collection[int], sign: str) -> Iterator[str]:
+        """Say which parts of elements are not those of the deck, whose keywords begin with ``sign``, or which nodes."""
+        if unknown := sorted(self.kinds.keys() - parts):
+            yield f"elements of {name_units(unknown)}, which no {sign}PART of the deck defines"
+        if self.lost:
+            yield f"{self.lost} nodes of elements are not in any {sign}NODE of the deck"
