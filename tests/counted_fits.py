@@ -17,7 +17,7 @@ class CountedFits(Fits):
 
     made = 0
 
-    def once(self, key: tuple[Hashable, ...], make: Callable[[], _Found]) -> _Found:
+    def once(self, key: Hashable, make: Callable[[], _Found]) -> _Found:
         def counted() -> _Found:
             self.made += 1
             return make()

@@ -108,28 +108,27 @@ def bodies_in_flight(
         Where the deck puts the parts.
     """
     if not told:
-        apart = apart_in_flight(history, flight)
-        return Bodies([None if apart else drift_in_flight(history, flight, placement=placement)], None, apart)
-    found = [_drift(history, flight, body, placement) for body in told]
-    away = [_apart(history, flight, body) for body in told]
-    return Bodies([None if parts else one for one, parts in zip(found, away, strict=True)], told, sum(away, ()))
+        away = apart_in_flight(history, flight)
+        return Bodies([None if away else drift_in_flight(history, flight, placement=placement)], None, away)
+    parts = [[part for part in history.parts or () if part.id in body.parts] for body in told]
+    leaving = [apart_in_flight(history, flight, own) for own in parts]
+    drifts = [
+        None if some else _drift(history, flight, body, own, placement)
+        for body, own, some in zip(told, parts, leaving, strict=True)
+    ]
+    return Bodies(drifts, told, sum(leaving, ()))
 
 
-def _apart(history: History, flight: Flight, body: RigidBody) -> tuple[Part, ...]:
-    return apart_in_flight(history, flight, [part for part in history.parts or () if part.id in body.parts])
-
-
-def _drift(history: History, flight: Flight, body: RigidBody, placement: Placement | None) -> Drift | None:
-    """Drift of one body; of a single part none at all while it flies."""
-    parts = [part for part in history.parts or () if part.id in body.parts]
-    flying = {part.id for part in flight.parts or ()}
+def _drift(
+    history: History, flight: Flight, body: RigidBody, parts: Sequence[Part], placement: Placement | None
+) -> Drift | None:
+    """Drift of one body of those parts that have energy; of a single part none at all while it flies."""
     if not body.whole or len(parts) < len(body.parts):
         return None
     if len(parts) > 1:
         return drift_in_flight(history, flight, parts, placement)
     (part,) = parts
-    if part.id not in flying or flight.refusal:
+    if flight.refusal or part.id not in {one.id for one in flight.parts or ()}:
         return None
-    span = np.array([history.time[0] if flight.start is None else flight.start,
-                     history.time[-1] if flight.end is None else flight.end])  # fmt: skip
-    return Drift(span, np.zeros((2, 3)), np.zeros(2), part, 0.0)
+    start, end = (bound if at is None else at for bound, at in zip(history.time[[0, -1]], flight[:2], strict=True))
+    return Drift(np.array([start, end]), np.zeros((2, 3)), np.zeros(2), part, 0.0)

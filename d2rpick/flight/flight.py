@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache, partial
 from math import isinf, isnan, nan
 from typing import TYPE_CHECKING, Final, NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.flight.window import FreeFlight
-    from d2rpick.histories.history import History, Momenta, Samples
+    from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
     from d2rpick.vibration.span import Span
 
@@ -119,11 +118,6 @@ def _of_middle(time: Samples, around: Callable[[float], FreeFlight | None], mome
     return of_middle if of_middle and of_middle.start <= moment <= of_middle.end else flight
 
 
-_WITNESSES: WeakKeyDictionary[History, tuple[Witness, ...]] = WeakKeyDictionary()
-# What was confirmed of the flights that witnesses show: many td lie in the same.
-_CONFIRMED: WeakKeyDictionary[History, dict[tuple[tuple[str, FreeFlight], ...], Seen]] = WeakKeyDictionary()
-
-
 class Seen(NamedTuple):
     """What the evidence says of a td: the flight around it, or the one nearest to it and what denies one at td.
 
@@ -221,12 +215,12 @@ def _seen(history: History, td: float) -> Seen:
         if flight:
             found.append((witness.source, flight))
         elif (not found or _may_deny(witness, found[0][1])) and witness.counts():
-            doubts = _contradicting(found, witness, td)
-            return _nearest(witness, td, _no_flight(witness.source, td), doubts)
-    known = _CONFIRMED.setdefault(history, {})
-    if found and tuple(found) not in known:
-        known[tuple(found)] = _confirmed(history, found)
-    return known[tuple(found)] if found else Seen(None, None)
+            refusal = f"the {_spoken(witness.source)} shows no free flight at td = {td:.6g}"
+            doubts = tuple(f"the {source} shows a flight there, but {refusal}" for source, _ in found)
+            return _nearest(witness, td, refusal, doubts)
+    if not found:
+        return Seen(None, None)
+    return history.known.once(("confirmed", *found), lambda: _confirmed(history, found))  # many td lie in the same
 
 
 def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
@@ -258,9 +252,7 @@ def _may_deny(witness: Witness, flight: FreeFlight) -> bool:
 
 def witnesses(history: History) -> tuple[Witness, ...]:
     """Give the sources of evidence that a history has, best first; it is asked about many td."""
-    if history not in _WITNESSES:
-        _WITNESSES[history] = tuple(_witnesses(history))
-    return _WITNESSES[history]
+    return history.known.once("witnesses", lambda: tuple(_witnesses(history)))
 
 
 def _witnesses(history: History) -> Iterator[Witness]:
@@ -277,17 +269,12 @@ def _witnesses(history: History) -> Iterator[Witness]:
     from d2rpick.flight import work
 
     if work.shows_contacts(balance):
-        plateau = partial(work.plateau_around, balance)
-        around = plateau if history.momenta else partial(_level_around, history, plateau)
-        yield Witness.of("contact-energy", balance.time, partial(_unheld, history, around), decisive=False)
+        around = partial(_by_energies, history, work.plateau_around, level=not history.momenta)
+        yield Witness.of("contact-energy", balance.time, around, decisive=False)
     if work.can_tell(balance):
         worked = balance.external_work is not None and bool(np.ptp(balance.external_work))
-        around = partial(_level_around, history, partial(work.balanced_around, balance))
-        yield Witness.of("energy-balance", balance.time, partial(_unheld, history, around), decisive=worked)
-
-
-def _unheld(history: History, around: Callable[[float], FreeFlight | None], td: float) -> FreeFlight | None:
-    return unheld(history.surroundings, around(td), history.parts, td)
+        around = partial(_by_energies, history, work.balanced_around, level=True)
+        yield Witness.of("energy-balance", balance.time, around, decisive=worked)
 
 
 def _first(history: History, momenta: Sequence[Momenta], td: float) -> FreeFlight | None:
@@ -301,12 +288,18 @@ def _first(history: History, momenta: Sequence[Momenta], td: float) -> FreeFligh
     return None
 
 
-def _level_around(history: History, around: Callable[[float], FreeFlight | None], td: float) -> FreeFlight | None:
-    """Give the flight around td of a source that does not see a wall that does no work."""
-    found, balance = _keeping_level(history, around(td), td), history.balance
-    if found and isinf(found.gravity) and history.surroundings.gravity_on(None) == (0.0,):
-        return None  # no gravity feeds the energies
-    return found if found and balance and moves_as_a_whole(balance, found.start, found.end) else None
+def _by_energies(
+    history: History, look: Callable[[Balance, float], FreeFlight | None], td: float, *, level: bool
+) -> FreeFlight | None:
+    """Give the flight around td by energies; of those that do not see a wall that does no work it keeps a ``level``."""
+    assert history.balance
+    found = look(history.balance, td)
+    if level:
+        found = _keeping_level(history, found, td)
+        if found and isinf(found.gravity) and history.surroundings.gravity_on(None) == (0.0,):
+            return None  # no gravity feeds the energies
+        found = found if found and moves_as_a_whole(history.balance, found.start, found.end) else None
+    return unheld(history.surroundings, found, history.parts, td)
 
 
 def _keeping_level(history: History, flight: FreeFlight | None, td: float) -> FreeFlight | None:
@@ -332,16 +325,8 @@ def _nearest(witness: Witness, td: float, refusal: str, doubts: tuple[str, ...])
     return Seen(nearest, witness.source if nearest else None, refusal, doubts)
 
 
-def _no_flight(source: str, td: float) -> str:
-    return f"the {_spoken(source)} shows no free flight at td = {td:.6g}"
-
-
 def _spoken(source: str | None) -> str:
     return str(source).replace("-", " ")
-
-
-def _contradicting(found: list[tuple[str, FreeFlight]], witness: Witness, td: float) -> tuple[str, ...]:
-    return tuple(f"the {source} shows a flight there, but {_no_flight(witness.source, td)}" for source, _ in found)
 
 
 def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> Seen:
@@ -384,9 +369,8 @@ def _driven(history: History, source: str, flight: FreeFlight) -> str | None:
 
 def _is_subset(history: History, flight: FreeFlight) -> bool:
     """Whether other parts than those that fly move, too."""
-    members = {part.id for part in flight.parts or ()}
-    for momenta in history.momenta:
-        if momenta.parts is not None and flight.parts is not None:
-            moving = np.ptp(momenta.values, axis=0).any(axis=1)
-            return any(moves and part.id not in members for part, moves in zip(momenta.parts, moving, strict=True))
-    return False
+    momenta = next((one for one in history.momenta if one.parts is not None), None)
+    if momenta is None or momenta.parts is None or flight.parts is None:
+        return False
+    members, moves = {part.id for part in flight.parts}, np.ptp(momenta.values, axis=0).any(axis=1)
+    return any(part.id not in members for part, one in zip(momenta.parts, moves, strict=True) if one)

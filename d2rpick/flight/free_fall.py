@@ -16,7 +16,7 @@ from d2rpick.flight.window import (
     ROUND_OFF,
     TOLERANCE,
     Constant,
-    Remembered,
+    Law,
     lasting_window,
     longest_window,
     moments,
@@ -84,22 +84,25 @@ class Laws:
         largest = float(np.linalg.norm(momentum, axis=1).max())
         share = min(1.0, largest / self.extent) if self.extent > 0 else 0.0
         self._enough = _ENOUGH * share if complete else min(TOLERANCE, _ENOUGH * share)
-        self._falling, self._steady = Remembered(self.fit), Remembered(Constant(time, momentum))
-        self._given: dict[tuple[float, ...], Remembered] = {}
+        self._steady = Constant(time, momentum)
+        self._given: dict[tuple[float, ...], Constant] = {}
 
     def window(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
         """Give the states around ``td`` in free flight, and its gravity [length/time^2]; None where nothing acts."""
-        window = lasting_window(self._falling, td, self.extent, self.noise, fades=True)
+        window = self._lasting(self.fit, td)
         gravity = self._gravity(window) if window and not self._braked(*window) else None
         if gravity is not None:
             return window, gravity
-        window = lasting_window(self._steady, td, self.extent, self.noise, fades=True)
+        window = self._lasting(self._steady, td)
         if window:
             return (None if self._carried else window), None
-        window = lasting_window(self._steady, td, self.extent, self.noise, fades=True, enough=self._enough)
+        window = self._lasting(self._steady, td, self._enough)
         if window and not self._falls_across:  # a push that balances the weight for a moment leaves it as steady
             return (None if self._carried else window), None
         return self._under_gravity(td)
+
+    def _lasting(self, law: Law, td: float, enough: float = 0.0) -> tuple[int, int] | None:
+        return lasting_window(law, td, self.extent, self.noise, fades=True, enough=enough)
 
     @property
     def _carried(self) -> bool:
@@ -132,12 +135,12 @@ class Laws:
             key = tuple(weight.tolist())
             if key not in self._given:
                 impulse = (time - time[0])[:, np.newaxis] * weight
-                self._given[key] = Remembered(Constant(time, momentum - impulse))
+                self._given[key] = Constant(time, momentum - impulse)
             law = self._given[key]
-            window = lasting_window(law, td, self.extent, self.noise, fades=True)
+            window = self._lasting(law, td)
             if window is None:
                 enough = self._enough if across else TOLERANCE
-                window = lasting_window(law, td, self.extent, self.noise, fades=True, enough=enough)
+                window = self._lasting(law, td, enough)
                 window = window if window and (across or self._fades_out(window, weight)) else None
             found.append((window, float(np.linalg.norm(weight)) / self.mass))
         windows = [(one, gravity) for one, gravity in found if one]
@@ -146,7 +149,7 @@ class Laws:
     def _around(self, td: float) -> tuple[int, int]:
         """States around ``td`` in which a load that fades, or a constant one, bends the momentum by little."""
         at = min(int(np.searchsorted(self.fit.time, td)), self.fit.time.size - 1)
-        return longest_window(self._falling, at, TOLERANCE * self.extent + self.noise)
+        return longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
         """Weights (3,) along an axis that show across a load of one direction: only along it is the momentum bent."""
@@ -215,9 +218,7 @@ class Laws:
         self.fall = False  # asked while it is looked for
         if not self.noise < TOLERANCE * self.extent or self.fit.time.size < FEWEST:
             return False
-        windows = (
-            lasting_window(self._falling, td, self.extent, self.noise, fades=True) for td in moments(self.fit.time)
-        )
+        windows = (self._lasting(self.fit, td) for td in moments(self.fit.time))
         return any((self._gravity(one) or 0.0) > 0 for one in windows if one and not self._braked(*one))
 
     @cached_property
@@ -287,19 +288,19 @@ def acceleration_by_work(balance: Balance, time: Samples, momentum: Samples, sta
     return float(factors[1]) if rest <= _OF_WORK * float(np.ptp(work[inside])) else 0.0
 
 
-class FreeFall:
-    """Least-squares fits of free flight to windows of one momentum, a `Law`."""
+class FreeFall(Law):
+    """Least-squares fits of free flight to windows of one momentum; the misfit is a momentum."""
 
     def __init__(self, time: Samples, momentum: Samples) -> None:
-        self.time, self.momentum = time, momentum
+        super().__init__(time)
+        self.momentum = momentum
         self.integral = integral(time, momentum)
         self._both = np.hstack([momentum, self.integral])
 
-    def misfit(self, first: int, last: int) -> float:
-        """Largest deviation of the momentum from free flight between two states [momentum]."""
-        if abs(last - first) < 3:  # three numbers per component fit any three states
+    def _misfit(self, first: int, last: int) -> float:
+        if last - first < 3:  # three numbers per component fit any three states
             return 0.0
-        p, impulse, alpha = self._fitted(min(first, last), max(first, last))
+        p, impulse, alpha = self._fitted(first, last)
         return float(np.abs(p + alpha * impulse).max())
 
     def damping(self, first: int, last: int) -> float:

@@ -19,8 +19,6 @@ from d2rpick.flight.window import FEWEST, SHORTEST
 from d2rpick.histories.samples import find_crossings, window
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from d2rpick.histories.history import Balance, History, Samples
 
 
@@ -74,8 +72,7 @@ def landing_after(history: History, start: float) -> float | None:
     It is held against the first three quarters of the time since ``start``, and must exceed their band by its width: no
     vibration goes so far beyond what it has done for so long.
     """
-    inside = history.time >= start
-    time, energy = history.time[inside], history.energy[inside]
+    time, energy = history.between(start, np.inf)
     if time.size < FEWEST:
         return None
     known = np.searchsorted(time, start + _KNOWN * (time - start), side="right") - 1
@@ -99,22 +96,20 @@ def end_of_load(history: History, td: float) -> float | None:
     """
     length = td - float(history.time[0])
     earlier, latest = (
-        np.append(history.energy[(history.time >= td - share * length) & (history.time <= end)], history.energy_at(end))
+        np.append(history.between(td - share * length, end)[1], history.energy_at(end))
         for share, end in ((1 / 4, td - length / 16), (1 / 16, td))
     )
-    before = history.time <= td
     if latest.max() > earlier.max() + _BAND_RESERVE * np.ptp(earlier):
         return None
     values = np.append(earlier, latest)
     level = float(values.max() + _BAND_RESERVE * np.ptp(values))
-    times, rising = find_crossings(history.time[before], history.energy[before], level)
+    times, rising = find_crossings(*history.between(-np.inf, td), level)
     return float(times[~rising][-1]) if not rising.all() else None
 
 
 def _last_excursion(history: History, start: float, td: float) -> float:
     """Give the last time from ``start`` to td at which the energy is far from where it stays most of the time."""
-    inside = _between(history.time, start, td)
-    time, energy = history.time[inside], history.energy[inside]
+    time, energy = history.between(start, td)
     if time.size < FEWEST:
         return start
     low, high = _widened(np.quantile(energy, (_OUTER, 1 - _OUTER)), 1.0)
@@ -124,8 +119,7 @@ def _last_excursion(history: History, start: float, td: float) -> float:
 
 def _last_push(history: History, start: float, td: float) -> float:
     """Give the last time from ``start`` to td at which the energy changes much faster than just before td."""
-    inside = _between(history.time, start, td)
-    time, energy = history.time[inside], history.energy[inside]
+    time, energy = history.between(start, td)
     if time.size < FEWEST:
         return start
     rates = np.abs(np.diff(energy)) / np.diff(time)
@@ -136,14 +130,14 @@ def _last_push(history: History, start: float, td: float) -> float:
 
 def _burst(history: History, start: float, td: float) -> float | None:
     """Give the first time after ``td`` at which the energy leaves its band from ``start`` to td upwards, or None."""
-    top = _widened(history.energy[_between(history.time, start, td)], _BAND_RESERVE)[1]
+    top = _widened(history.between(start, td)[1], _BAND_RESERVE)[1]
     above = np.flatnonzero((history.time > td) & (history.energy > top))
     return float(history.time[above[0]]) if above.size else None
 
 
 def _change_of_level(history: History, start: float, td: float) -> float | None:
     """Give the first time after ``td`` at which the mean energy leaves its band from ``start`` to td, or None."""
-    width = round(_LEVEL * np.count_nonzero(_between(history.time, start, td)))
+    width = round(_LEVEL * history.between(start, td)[0].size)
     if width < 1 or history.time.size <= width:
         return None
     sums = np.append(0.0, np.cumsum(history.energy))
@@ -155,10 +149,6 @@ def _change_of_level(history: History, start: float, td: float) -> float | None:
     low, high = _widened(means[inside], 1.0)
     off = np.flatnonzero((first > td) & ((means < low) | (means > high)))
     return float(middle[off[0]]) if off.size else None
-
-
-def _between(time: Samples, start: float, end: float) -> NDArray[np.bool_]:
-    return (time >= start) & (time <= end)
 
 
 def _widened(values: Samples, share: float) -> tuple[float, float]:

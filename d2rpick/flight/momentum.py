@@ -82,16 +82,12 @@ def _of_its_bodies(momenta: Momenta, members: Sequence[int], td: float, flight: 
 
 def bodies_apart(momenta: Momenta, members: Sequence[int]) -> tuple[int, ...]:
     """Give the parts among ``members`` that fly by themselves at some time, at a velocity that is not that of all."""
-    key = "apart", tuple(members)
-    if key not in momenta.known:
-        momenta.known[key] = tuple(_apart(momenta, key[1])) if momenta.parts and len(members) > 1 else ()
-    found: tuple[int, ...] = momenta.known[key]
-    return found
+    return momenta.known.once(("apart", *members), lambda: tuple(_apart(momenta, members)))
 
 
-def _apart(momenta: Momenta, members: tuple[int, ...]) -> Iterator[int]:
+def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
     mass, masses = momenta.mass(members), momenta.masses
-    if masses is None or not mass > 0:
+    if not momenta.parts or len(members) < 2 or masses is None or not mass > 0:
         return
     velocity = momenta.of(members) / mass
     room = _OF_ITS_OWN * float(np.abs(velocity).max())
@@ -110,11 +106,7 @@ def _apart(momenta: Momenta, members: tuple[int, ...]) -> Iterator[int]:
 
 def _alone(momenta: Momenta, part: int) -> tuple[FreeFlight, ...]:
     """Give the flights of one part by itself, looked for once."""
-    key = "alone", part
-    if key not in momenta.known:
-        momenta.known[key] = all_windows(momenta.time, partial(flight_of, momenta, (part,)))
-    flights: tuple[FreeFlight, ...] = momenta.known[key]
-    return flights
+    return momenta.known.once(("alone", part), lambda: all_windows(momenta.time, partial(flight_of, momenta, (part,))))
 
 
 def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Balance | None = None) -> FreeFlight | None:
@@ -152,28 +144,22 @@ def _laws(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = 
     """Give the laws of free flight for a set of parts, made once for all td."""
     mass = momenta.mass(members)
     whole = balance if momenta.parts is None or np.isnan(mass) else None
-    key = "laws", members, whole is None
-    if key not in momenta.known:
-        parts = None if momenta.parts is None else [momenta.parts[i] for i in members]
-        momenta.known[key] = Laws(
-            momenta.time,
-            momenta.of(members),
-            mass,
-            momenta.noise(members),
-            whole,
-            momenta.surroundings.gravity_on(parts),
-            velocity=momenta.velocity,
-            complete=set(momenta.moving) <= set(members),
-        )
-    laws: Laws = momenta.known[key]
-    return laws
+    parts = None if momenta.parts is None else [momenta.parts[i] for i in members]
+    gravities, complete = momenta.surroundings.gravity_on(parts), set(momenta.moving) <= set(members)
+    return momenta.known.once(
+        ("laws", members, whole is None),
+        lambda: Laws(
+            momenta.time, momenta.of(members), mass, momenta.noise(members), whole, gravities,
+            velocity=momenta.velocity, complete=complete,
+        ),
+    )  # fmt: skip
 
 
 def _falls(momenta: Momenta) -> bool:
     """Whether some part by itself is seen to fall under gravity."""
-    if "falls" not in momenta.known:
-        momenta.known["falls"] = momenta.parts is not None and any(_laws(momenta, (i,)).fall for i in momenta.moving)
-    return bool(momenta.known["falls"])
+    return momenta.parts is not None and momenta.known.once(
+        "falls", lambda: any(_laws(momenta, (i,)).fall for i in momenta.moving)
+    )
 
 
 def all_flights(momenta: Momenta, balance: Balance | None = None) -> tuple[FreeFlight, ...]:

@@ -15,19 +15,19 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.flight.rotation import least_rests, least_ways, off_the_circle, periods_of, steady_rotation
-from d2rpick.flight.turning import Rigid, turning_in_flight
+from d2rpick.flight.turning import Flying, turning_in_flight
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import integral, window
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.deck.geometry import Placement
     from d2rpick.flight.flight import Flight
     from d2rpick.flight.turning import Turning
-    from d2rpick.histories.history import History, Momenta, Samples
+    from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
 
     Places = NDArray[np.intp]
@@ -130,14 +130,7 @@ class Drift:
         return MOST_OF_PATH * float(self.path[-1])
 
 
-def drift_of(
-    momenta: Momenta,
-    masses: Samples,
-    members: Sequence[int],
-    flight: tuple[float, float],
-    flying: Collection[int] = (),
-    placement: Placement | None = None,
-) -> Drift | None:
+def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
     """Find how the body drifts in flight against where a rigid one would be.
 
     The parts that move against the others are those without which the others are most nearly one rigid body that
@@ -145,16 +138,7 @@ def drift_of(
 
     Parameters
     ----------
-    momenta : Momenta
-        Of single parts.
-    masses : array of shape (parts,)
-        Of the same parts; NaN where unknown [mass].
-    members : sequence of int
-        Places of the parts that become one rigid body.
-    flight : (float, float)
-        When they fly freely [time].
-    flying : collection of int, optional
-        Places of all parts that fly with them, which what moves in the body pushes off too.  Default: no others.
+    seen : Flying
     placement : Placement, optional
         Where the deck puts the parts: how the body turns is known too then.
 
@@ -164,11 +148,11 @@ def drift_of(
         None where it is not known: a mass is not, there are fewer than three parts, or two with hardly any mass beside
         the third, or the others are no rigid body by far.
     """
-    inside = window(momenta.time, *flight)
-    time, mass = momenta.time[inside], masses[list(members)]
+    momenta, masses, inside = seen.momenta, seen.masses, window(seen.momenta.time, seen.start, seen.end)
+    time, mass = momenta.time[inside], masses[list(seen.members)]
     if momenta.parts is None or time.size < FEWEST or not np.isfinite(mass).all():
         return None
-    members = [i for i, m in zip(members, mass.tolist(), strict=True) if m > 0]
+    members = [i for i, m in zip(seen.members, mass.tolist(), strict=True) if m > 0]
     mass = masses[members]
     if not _shows_rotation(mass):
         return None
@@ -177,15 +161,16 @@ def drift_of(
     moving, rate, rest = _apart(time[::stride], ways[::stride], mass)
     if not moving:
         return None
-    whole = float(np.nansum(masses[sorted({*flying, *members})]))  # unknown ones left out: no error is told too small
+    whole = float(
+        np.nansum(masses[sorted({*seen.others, *members})])
+    )  # unknown ones left out: no error is told too small
     share = float(mass[moving].sum()) / whole
     doubt = share * float(np.sqrt(rest / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride))))
     offsets = _offsets(time, ways, mass, moving, rate) * float(mass.sum()) / whole
     against = [members[i] for i in moving]
     ids = [momenta.parts[i].id for i in against]
     part = momenta.parts[against[int(np.argmax(np.square(offsets).sum(axis=(0, 2))))]]
-    rigid = Rigid(members, against)
-    turning = turning_in_flight(momenta, masses, rigid, flying, flight, placement) if placement else None
+    turning = turning_in_flight(seen._replace(members=members), against, placement) if placement else None
     place = offsets.sum(axis=1)
     slow = bool(rate.any()) and periods_of(time[::stride], place[::stride], rate) < 1
     found = Drift(time, place, path, part, doubt, turning, moving=ids, slow=slow)
@@ -279,7 +264,7 @@ def drift_in_flight(
     None also where the momentum of single parts does not show the flight.  ``placement`` is that of the deck.
     """
     seen = _seen(history, flight, parts)
-    return drift_of(*seen, placement) if seen else None
+    return drift_of(seen, placement) if seen else None
 
 
 def apart_in_flight(history: History, flight: Flight, parts: Sequence[Part] | None = None) -> tuple[Part, ...]:
@@ -291,7 +276,7 @@ def apart_in_flight(history: History, flight: Flight, parts: Sequence[Part] | No
     if seen is None or seen.momenta.parts is None:
         return ()
     members = [i for i in seen.members if seen.masses[i] > 0]
-    inside, mass = window(seen.momenta.time, *seen.flight), seen.masses[members]
+    inside, mass = window(seen.momenta.time, seen.start, seen.end), seen.masses[members]
     time, momentum = seen.momenta.time[inside], seen.momenta.values[inside][:, members]
     if time.size < FEWEST or len(members) < 2:
         return ()
@@ -304,17 +289,7 @@ def apart_in_flight(history: History, flight: Flight, parts: Sequence[Part] | No
     return tuple(seen.momenta.parts[i] for i, one in zip(members, alone.tolist(), strict=True) if one)
 
 
-class _Seen(NamedTuple):
-    """Momenta and masses of parts, places of those that become rigid, the flight, and places of all that fly."""
-
-    momenta: Momenta
-    masses: Samples
-    members: Sequence[int]
-    flight: tuple[float, float]
-    flying: Sequence[int]
-
-
-def _seen(history: History, flight: Flight, parts: Sequence[Part] | None) -> _Seen | None:
+def _seen(history: History, flight: Flight, parts: Sequence[Part] | None) -> Flying | None:
     """Collect what a drift rests on; None where the momentum of single parts does not show the flight."""
     momenta, masses = next((one for one in history.momenta if one.parts is not None), None), history.masses
     if momenta is None or momenta.parts is None or masses is None or flight.parts is None or flight.refusal:
@@ -323,7 +298,5 @@ def _seen(history: History, flight: Flight, parts: Sequence[Part] | None) -> _Se
     wanted = {momenta.parts[i].id for i in momenta.chosen} if parts is None else {part.id for part in parts}
     flying = [i for i in momenta.moving if momenta.parts[i].id in ids]  # the ground does not fly
     members = [i for i in flying if momenta.parts[i].id in wanted]
-    start, end = (
-        bound if seen is None else seen for bound, seen in zip(momenta.time[[0, -1]], flight[:2], strict=True)
-    )
-    return _Seen(momenta, masses, members, (float(start), float(end)), flying)
+    start, end = (bound if at is None else at for bound, at in zip(momenta.time[[0, -1]], flight[:2], strict=True))
+    return Flying(momenta, masses, members, float(start), float(end), flying)

@@ -87,27 +87,30 @@ class Parts(NamedTuple):
     rigid: Sequence[int]
 
 
-class Rigid(NamedTuple):
-    """Places of the parts that become one rigid body, and of those of them that move against the others."""
+class Flying(NamedTuple):
+    """Parts in a flight, from ``start`` to ``end`` [time]: ``momenta`` of single parts and their ``masses`` (parts,).
 
+    A mass is NaN where it is unknown.  ``members`` are the places of those that become one rigid body, ``others`` of
+    all that fly with them, which what moves in the body pushes off too.
+    """
+
+    momenta: Momenta
+    masses: Samples
     members: Sequence[int]
-    moving: Sequence[int]
+    start: float
+    end: float
+    others: Collection[int] = ()
 
 
-def turning_in_flight(
-    momenta: Momenta,
-    masses: Samples,
-    rigid: Rigid,
-    flying: Collection[int],
-    flight: tuple[float, float],
-    placement: Placement,
-) -> Turning | None:
+def turning_in_flight(seen: Flying, moving: Sequence[int], placement: Placement) -> Turning | None:
     """Follow the orientation of the body that parts become, from where the deck puts all parts that fly.
 
-    None where a mass or a place is not known, or the record does not begin with the run; arguments as of `drift_of`.
+    ``moving`` are the places of those that move against the others.  None where a mass or a place is not known, or the
+    record does not begin with the run.
     """
+    momenta, masses = seen.momenta, seen.masses
     assert momenta.parts is not None
-    every = sorted(i for i in {*flying, *rigid.members} if masses[i] != 0)
+    every = sorted(i for i in {*seen.others, *seen.members} if masses[i] != 0)
     placed = {i: placement.parts.get(momenta.parts[i].id) for i in every}
     known = [one for one in placed.values() if one]
     time, mass = momenta.time, masses[every]
@@ -116,25 +119,23 @@ def turning_in_flight(
     velocity = momenta.values[:, every] / mass[:, np.newaxis]
     centre = np.stack([one.centre for one in known])
     since = integral(time, velocity.reshape(time.size, -1)).reshape(velocity.shape)
-    inside = window(time, *flight)
+    inside = window(time, seen.start, seen.end)
     stride = -(-(inside.stop - inside.start) // _STATES)
-    body = _frame_of(momenta, masses, rigid, placement)
+    body = _frame_of(seen, moving, placement)
     where = (centre + velocity[0] * time[0] + since)[inside][::stride]
     at = {i: place for place, i in enumerate(every)}
-    parts = Parts(
-        where, mass, centre, np.stack([one.spread for one in known]), [at[i] for i in body],
-        [at[i] for i in rigid.members],
-    )  # fmt: skip
+    spread, rigid = np.stack([one.spread for one in known]), [at[i] for i in seen.members]
+    parts = Parts(where, mass, centre, spread, [at[i] for i in body], rigid)
     return turning_of(time[inside][::stride], parts, placement.watched_centre(momenta.parts[i].id for i in body))
 
 
-def _frame_of(momenta: Momenta, masses: Samples, rigid: Rigid, placement: Placement) -> Sequence[int]:
+def _frame_of(seen: Flying, moving: Sequence[int], placement: Placement) -> Sequence[int]:
     """Parts that make the frame of the body: those that hang together and do not move against each other."""
-    assert momenta.parts is not None
-    still = [i for i in rigid.members if i not in rigid.moving]
-    together = placement.hanging_together([momenta.parts[i].id for i in still])
-    main = [i for i in still if momenta.parts[i].id in together]
-    return main if masses[main].sum() >= _MOST * masses[list(rigid.members)].sum() else still
+    parts = seen.momenta.parts or ()
+    still = [i for i in seen.members if i not in moving]
+    together = placement.hanging_together([parts[i].id for i in still])
+    main = [i for i in still if parts[i].id in together]
+    return main if seen.masses[main].sum() >= _MOST * seen.masses[list(seen.members)].sum() else still
 
 
 def turning_of(time: Samples, parts: Parts, looked_at: Samples | None) -> Turning | None:

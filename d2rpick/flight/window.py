@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -53,46 +53,37 @@ class FreeFlight(NamedTuple):
     gravity: float = 0.0
 
 
-class Law(Protocol):
-    """What free flight obeys, and how far a record is off."""
+class Law:
+    """What free flight obeys over ``time`` (n,), and how far a record is off.
 
-    @property
-    def time(self) -> Samples:
-        """Times of the record, shape (n,)."""
+    It is held against no window twice: from one time to the next the same ones come up again.
+    """
+
+    def __init__(self, time: Samples) -> None:
+        self.time = time
+        self._misfits: dict[tuple[int, int], float] = {}
 
     def misfit(self, first: int, last: int) -> float:
         """Largest deviation of the states ``first`` to ``last``, in any order, from the law that suits them best."""
-
-
-class Constant:
-    """Quantities (n, k) that do not change, a `Law`."""
-
-    def __init__(self, time: Samples, values: Samples) -> None:
-        self.time, self.values = time, values
-
-    def misfit(self, first: int, last: int) -> float:
-        """Half the largest range between two states [unit of the values]."""
-        return float(np.ptp(self.values[min(first, last) : max(first, last) + 1], axis=0).max()) / 2
-
-
-class Remembered:
-    """A law that is held against no window twice: from one time to the next the same ones come up again."""
-
-    def __init__(self, law: Law) -> None:
-        self._law = law
-        self._misfits: dict[tuple[int, int], float] = {}
-
-    @property
-    def time(self) -> Samples:
-        """Times of the record, shape (n,)."""
-        return self._law.time
-
-    def misfit(self, first: int, last: int) -> float:
-        """Largest deviation of the states ``first`` to ``last`` from the law that suits them best."""
         window = min(first, last), max(first, last)
         if window not in self._misfits:
-            self._misfits[window] = self._law.misfit(*window)
+            self._misfits[window] = self._misfit(*window)
         return self._misfits[window]
+
+    def _misfit(self, first: int, last: int) -> float:
+        """The same of states in order."""
+        raise NotImplementedError
+
+
+class Constant(Law):
+    """Quantities (n, k) that do not change; the misfit is half the largest range [unit of the values]."""
+
+    def __init__(self, time: Samples, values: Samples) -> None:
+        super().__init__(time)
+        self.values = values
+
+    def _misfit(self, first: int, last: int) -> float:
+        return float(np.ptp(self.values[first : last + 1], axis=0).max()) / 2
 
 
 def lasting_window(

@@ -8,11 +8,10 @@ contact energy does not change.
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from d2rpick.flight.window import FEWEST, Constant, FreeFlight, Remembered, lasting_window
+from d2rpick.flight.window import FEWEST, Constant, FreeFlight, Law, lasting_window
 from d2rpick.histories.samples import integral, window
 
 if TYPE_CHECKING:
@@ -37,8 +36,6 @@ _OF_INTERNAL: Final = 0.1
 # Momentum changes by half the share of the kinetic energy that is gained or lost along the motion.  A loss of this much
 # of it is told from that by friction.
 _LITTLE, _MUCH = 5e-3, 0.5
-# One for each record: it is asked about many td.
-_LAWS: Final[WeakKeyDictionary[Balance, tuple[Remembered, ...]]] = WeakKeyDictionary()
 
 
 def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | None:
@@ -144,11 +141,11 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     noise = balance.precision.quantum(largest) / 2
     if noise > _OWN_ERROR * extent:
         return None
-    if balance not in _LAWS:
-        energies = np.stack(terms, axis=1)
-        laws = (_Parabola(time, energies, balance.kinetic, of_rate) for of_rate in (None, balance.internal))
-        _LAWS[balance] = tuple(map(Remembered, laws))
-    exact, ringing = _LAWS[balance]  # without and with a rate, which takes up what tells a load from free flight, too
+    # without and with a rate, which takes up what tells a load from free flight, too
+    exact, ringing = balance.known.once(
+        "work",
+        lambda: [_Parabola(time, np.stack(terms, axis=1), balance.kinetic, of) for of in (None, balance.internal)],
+    )
     window = lasting_window(exact, td, extent, noise)
     rings = lasting_window(ringing, td, extent, noise, rings=True) if window is None else None
     found = window or rings
@@ -194,8 +191,8 @@ def _terms(balance: Balance) -> list[Samples]:
     return found
 
 
-class _Parabola:
-    """Energies that are parabolas of time but for damping, which takes a share of the kinetic energy; a `Law`.
+class _Parabola(Law):
+    """Energies that are parabolas of time but for damping, which takes a share of the kinetic energy.
 
     Solvers know velocities half a step away from places: that adds the rate of the ``internal`` energy, where given.
     """
@@ -203,14 +200,14 @@ class _Parabola:
     def __init__(
         self, time: Samples, energies: Samples, kinetic: Samples | None, internal: Samples | None = None
     ) -> None:
-        self.time, self.energies = time, energies
+        super().__init__(time)
+        self.energies = energies
         self.others = [] if kinetic is None else [integral(time, kinetic)]
         if internal is not None and time.size > 1:
             self.others.append(np.gradient(internal, time))
 
-    def misfit(self, first: int, last: int) -> float:
-        """Largest deviation between two states [energy]."""
-        states = slice(min(first, last), max(first, last) + 1)
+    def _misfit(self, first: int, last: int) -> float:
+        states = slice(first, last + 1)
         time = self.time[states]
         if time.size < FEWEST_STATES:
             return 0.0
@@ -225,8 +222,6 @@ class _Parabola:
 
 # A contact energy that never exceeds its printed digits by this factor shows no contact at all.
 _VISIBLE = 100
-# One for each record: it is asked about many td.
-_PLATEAUS: Final[WeakKeyDictionary[Balance, Remembered]] = WeakKeyDictionary()
 
 
 def shows_contacts(balance: Balance) -> bool:
@@ -244,9 +239,8 @@ def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     time, energy = balance.time, balance.sliding
     if energy is None or not time[0] <= td <= time[-1]:
         return None
-    if balance not in _PLATEAUS:
-        _PLATEAUS[balance] = Remembered(Constant(time, energy[:, np.newaxis]))
-    window = lasting_window(_PLATEAUS[balance], td, float(np.ptp(energy)), _noise(balance))
+    law = balance.known.once("sliding", lambda: Constant(time, energy[:, np.newaxis]))
+    window = lasting_window(law, td, float(np.ptp(energy)), _noise(balance))
     if window is None or (window[0] == 0 and balance.external_work is None):
         return None
     first, last = window

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from d2rpick.histories.samples import find_turns, window
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Sequence
+    from collections.abc import Callable, Hashable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 # in quotes: numpy.typing costs start-up
 Samples: TypeAlias = "NDArray[np.float64]"
+_Found = TypeVar("_Found")
 
 # Parts slower than this share of the fastest stand still: single precision leaves them a speed.
 _STILL: Final = 1e-6
@@ -66,6 +67,23 @@ class Precision(NamedTuple):
 EXACT = Precision()
 
 
+class Memory:
+    """What was found in a record, each made once: the same few things are asked for often."""
+
+    def __init__(self) -> None:
+        self._found: dict[Hashable, Any] = {}
+
+    def once(self, key: Hashable, make: Callable[[], _Found]) -> _Found:
+        """Make what is not known yet by this key."""
+        if key not in self._found:
+            self._found[key] = make()
+        found: _Found = self._found[key]
+        return found
+
+    def __reduce__(self) -> tuple[type[Memory], tuple[()]]:
+        return Memory, ()  # in another process all is found anew
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Momenta:
     """Momentum of ``parts`` over ``time`` (n,): ``values`` of shape (n, parts, 3); None for parts: the whole model.
@@ -85,7 +103,7 @@ class Momenta:
     masses: Samples | None = None
     velocity: bool = False
     surroundings: Surroundings = UNKNOWN
-    known: dict[Hashable, Any] = field(default_factory=dict, init=False)
+    known: Memory = field(default_factory=Memory, init=False)
 
     def choosing(self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None) -> Momenta:
         """Give the same momenta with other parts to switch; what was found of them stays ``known``."""
@@ -95,11 +113,7 @@ class Momenta:
 
     def of(self, members: Sequence[int]) -> Samples:
         """Sum over the parts with these indices, shape (n, 3), read-only."""
-        key = "sum", tuple(members)
-        if key not in self.known:
-            self.known[key] = _frozen(self.values[:, list(members)].sum(axis=1))
-        sums: Samples = self.known[key]
-        return sums
+        return self.known.once(("sum", *members), lambda: _frozen(self.values[:, list(members)].sum(axis=1)))
 
     def noise(self, members: Sequence[int]) -> float:
         """What the printed digits of these parts leave open in their sum [momentum]."""
@@ -169,6 +183,7 @@ class Balance:
     velocity: Samples | None = None
     hourglass_of_parts: tuple[tuple[Part, float, float], ...] = ()
     precision: Precision = EXACT
+    known: Memory = field(default_factory=Memory, init=False)
 
     @cached_property
     def kinetic_and_internal(self) -> Samples | None:
@@ -236,6 +251,7 @@ class History:
     complete: bool = True
     notes: tuple[str, ...] = ()
     files: tuple[Source, ...] = ()
+    known: Memory = field(default_factory=Memory, init=False)
 
     def __post_init__(self) -> None:
         time, energy = _frozen(self.time), _frozen(self.energy)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from functools import partial
 from math import ceil, log
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from d2rpick.histories.history import Memory
 from d2rpick.vibration.identify import identify
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterator
+    from collections.abc import Iterator
     from typing import Protocol
 
     from d2rpick.histories.history import History, Samples
@@ -194,14 +195,8 @@ def _cleared(
     return span_of(history, (inner.start + inner.end) / 2, core, bounds) or span, core
 
 
-_Found = TypeVar("_Found")
-
-
-class Fits:
+class Fits(Memory):
     """Fits to windows of one record by one set of rules, and what else is looked for in them, each made once."""
-
-    def __init__(self) -> None:
-        self._found: dict[tuple[Hashable, ...], Any] = {}
 
     def remembered(self, name: str, fitter: Fitter) -> Fitter:
         """Give a fitter that does as ``fitter``, which has this name, and fits no window twice."""
@@ -211,10 +206,3 @@ class Fits:
             return self.once((name, quick, *window), lambda: fitter(time, energy, quick=quick))
 
         return fit
-
-    def once(self, key: tuple[Hashable, ...], make: Callable[[], _Found]) -> _Found:
-        """Make what is not known yet by this key."""
-        if key not in self._found:
-            self._found[key] = make()
-        found: _Found = self._found[key]
-        return found

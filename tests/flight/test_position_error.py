@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from d2rpick.choice.of_run import Reference, read
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
+from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
@@ -59,7 +60,7 @@ def sliding(way: Samples, part: int = ENGINE) -> Samples:
 
 
 def drift(found: Momenta, masses: Samples = MASSES) -> Drift:
-    answer = drift_of(found, masses, range(masses.size), FLIGHT)
+    answer = drift_of(Flying(found, masses, range(masses.size), *FLIGHT))
     assert answer is not None
     return answer
 
@@ -103,7 +104,7 @@ def test_a_rigid_body_is_where_it_should_be() -> None:
 
 
 def test_beyond_the_flight_nothing_is_known() -> None:
-    found = drift_of(momenta(np.zeros(3), sliding(np.ones(3) / 100)), MASSES, range(5), (0.02, 0.08))
+    found = drift_of(Flying(momenta(np.zeros(3), sliding(np.ones(3) / 100)), MASSES, range(5), 0.02, 0.08))
     assert found is not None
     assert np.isnan(found.errors(np.array([0.01, 0.05]), 0.07)).tolist() == [True, False]
     assert np.isnan(found.errors(np.array([0.05]), 0.09)).all()
@@ -119,12 +120,13 @@ def test_beyond_the_flight_nothing_is_known() -> None:
 )
 def test_unknown_is_none(masses: Samples, members: tuple[int, ...]) -> None:
     known = np.where(np.isnan(masses), 1.0, masses)
-    assert drift_of(momenta(np.ones(3), sliding(np.ones(3) / 50), known), masses, members, FLIGHT) is None
+    found = momenta(np.ones(3), sliding(np.ones(3) / 50), known)
+    assert drift_of(Flying(found, masses, members, *FLIGHT)) is None
 
 
 def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
     slides = np.random.default_rng(1).normal(0.0, 0.05, PLACES.shape) * np.sin(300 * TIME[:, None, None] + PLACES)
-    assert drift_of(momenta(np.zeros(3), slides), MASSES, range(5), FLIGHT) is None
+    assert drift_of(Flying(momenta(np.zeros(3), slides), MASSES, range(5), *FLIGHT)) is None
 
 
 @settings(max_examples=20, deadline=None)
@@ -155,7 +157,7 @@ def errors(name: str, parts: str, flight: tuple[float, float], tr: list[float], 
     """Position errors [mm] by the momenta of a run that a solver computed."""
     history = solved(name, parts).history
     assert history.masses is not None
-    found = drift_of(history.momenta[0], history.masses, history.momenta[0].chosen, flight)
+    found = drift_of(Flying(history.momenta[0], history.masses, history.momenta[0].chosen, *flight))
     assert found is not None
     assert found.part.title == ("engine" if name.startswith("car") else "block")
     return 1e3 * found.errors(np.array(tr), td)
@@ -205,7 +207,7 @@ def test_of_computed_runs_those_that_come_out_too_small_are_lower_bounds(
 ) -> None:
     history = read([stored(name)], Selection(parts=tuple(parts.split(",")))).history
     assert history.masses is not None
-    found = drift_of(history.momenta[0], history.masses, history.momenta[0].chosen, flight)
+    found = drift_of(Flying(history.momenta[0], history.masses, history.momenta[0].chosen, *flight))
     assert found is not None
     assert found.at_least is bound
 

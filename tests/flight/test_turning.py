@@ -17,6 +17,7 @@ from d2rpick.deck import read_inventory
 from d2rpick.deck.geometry import Placed, Placement
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
+from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
@@ -85,7 +86,7 @@ def drift(where: Samples, deck: Placement | None, members: Collection[int] = ran
     velocity = np.gradient(where, TIME, axis=0, edge_order=2)
     parts = tuple(Part(i + 1, f"part {i + 1}") for i in range(MASSES.size))
     momenta = Momenta(TIME, velocity * MASSES[:, np.newaxis], parts, EXACT, tuple(range(MASSES.size)))
-    return drift_of(momenta, MASSES, list(members), (0.01, 0.1), range(5), deck)
+    return drift_of(Flying(momenta, MASSES, list(members), 0.01, 0.1, range(5)), deck)
 
 
 @settings(max_examples=5, deadline=None)
