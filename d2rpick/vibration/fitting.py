@@ -56,12 +56,7 @@ def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst:
     None where on a few of the samples the fit leaves more than ``worst`` of the variance or, where that is finite, on
     these or some more of them a structure that is too large.
     """
-
-    def model(parameters: Samples, times: Samples) -> tuple[Samples, Samples]:
-        return energy_and_jacobian(parameters, times, size)
-
-    starts = partial(_starts, poles, size=size)
-    best = best_of_starts(starts, model, s, e, worst)
+    best = best_of_starts(partial(_starts, poles, size=size), partial(energy_and_jacobian, size=size), s, e, worst)
     if best is None:
         return None
     if best[5] < 0:  # q and -q make the same energy; the preload is taken positive
@@ -73,30 +68,26 @@ def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst:
 
 def hopeless(poles: NDArray[np.complex128], s: Samples, e: Samples, worst: float) -> bool:
     """Whether the richest model leaves more than ``worst`` of the variance of a few samples: the others leave more."""
-
-    def model(parameters: Samples, times: Samples) -> tuple[Samples, Samples]:
-        return energy_and_jacobian(parameters, times, WITH_PRELOAD)
-
-    few_s, few_e = _few(s, e)
-    return refine(_starts(poles, few_s, few_e, size=WITH_PRELOAD), model, few_s, few_e, worst) is None
+    few, model = _few(s, e), partial(energy_and_jacobian, size=WITH_PRELOAD)
+    return refine(_starts(poles, *few, size=WITH_PRELOAD), model, *few, worst) is None
 
 
 def best_of_starts(
     starts: Callable[[Samples, Samples], Sequence[Samples]], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
     """Return the best fit to all samples from what ``starts`` gives for a few of them; None as for `fit`."""
-    coarse_s, coarse_e = _few(s, e)
-    best = refine(starts(coarse_s, coarse_e), model, coarse_s, coarse_e, worst)
+    few = _few(s, e)
+    best = refine(starts(*few), model, *few, worst)
     if best is None:
         return None
-    if np.isfinite(worst) and (_structured(best, model, coarse_s, coarse_e) or fails(best, model, s, e)):
+    if np.isfinite(worst) and (_structured(best, model, *few) or fails(best, model, s, e)):
         return None
-    return best if coarse_s.size == s.size else minimise(best, model, s, e)[0]
+    return best if few[0].size == s.size else minimise(best, model, s, e)[0]
 
 
-def _few(s: Samples, e: Samples) -> tuple[Samples, Samples]:
-    """Give the few of the samples on which starts are compared."""
-    stride = -(-s.size // COARSE)
+def _few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
+    """Give ``most`` of the samples, evenly chosen; by default those on which starts are compared."""
+    stride = -(-s.size // most)
     return s[::stride], e[::stride]
 
 
@@ -118,15 +109,12 @@ def fails(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
 
     Never where there are no more samples than that: then the fit to all of them costs no more.
     """
-    stride = -(-s.size // _MEDIUM)
-    if stride == 1:
-        return False
-    some_s, some_e = s[::stride], e[::stride]
-    return _structured(minimise(parameters, model, some_s, some_e, near=_NEAR)[0], model, some_s, some_e)
+    some = _few(s, e, _MEDIUM)
+    return some[0].size < s.size and _structured(minimise(parameters, model, *some, near=_NEAR)[0], model, *some)
 
 
 def _structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
-    """Whether what the best fit to some of the samples leaves there refuses the fit to all of them."""
+    """Whether what the best fit to some of the samples, evenly chosen, leaves there refuses the fit to all of them."""
     return surely_structured(e - model(parameters, s)[0], float(np.std(e)))
 
 
@@ -146,11 +134,11 @@ class Pencil(NamedTuple):
     def of(cls, s: Samples, e: Samples) -> Pencil:
         """Find the vectors, those that hold most of E first."""
         running = integral(s, e)
-        fine = _means_of_cells(s, running, min(s.size - 1, _MAX_CELLS))
+        fine = cell_means(s, running, min(s.size - 1, _MAX_CELLS))
         power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
         periods = int(np.argmax(power * np.arange(power.size)))  # per octave: decay alone must not win
         count = min(max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS)
-        cells = _means_of_cells(s, running, count)
+        cells = cell_means(s, running, count)
         hankel = np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
         return cls(np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1], count)
 
@@ -169,13 +157,8 @@ class Pencil(NamedTuple):
         return poles
 
 
-def cell_means(s: Samples, e: Samples, count: int) -> Samples:
-    """Means of E(s) over equal cells of [0, 1]."""
-    return _means_of_cells(s, integral(s, e), count)
-
-
-def _means_of_cells(s: Samples, running: Samples, count: int) -> Samples:
-    """The same of the ``running`` integral of E(s)."""
+def cell_means(s: Samples, running: Samples, count: int) -> Samples:
+    """Means over equal cells of [0, 1] of what has this ``running`` integral over s."""
     return np.asarray(np.diff(np.interp(np.linspace(0, 1, count + 1), s, running)) * count)
 
 
@@ -249,20 +232,13 @@ def minimise(
 
 def _normal_equations(parameters: Samples, model: Model, s: Samples, e: Samples) -> tuple[float, Samples, Samples]:
     """Sum of squares of the rest, J J^T and J rest, block by block."""
-    if s.size <= _BLOCK:
-        return _of_block(parameters, model, s, e)
     cost, normal, gradient = 0.0, np.zeros(()), np.zeros(())
     for first in range(0, s.size, _BLOCK):
         block = slice(first, first + _BLOCK)
-        own, squares, slope = _of_block(parameters, model, s[block], e[block])
-        cost, normal, gradient = cost + own, normal + squares, gradient + slope
+        energy, jacobian = model(parameters, s[block])
+        rest = e[block] - energy
+        cost, normal, gradient = cost + float(rest @ rest), normal + jacobian @ jacobian.T, gradient + jacobian @ rest
     return cost, normal, gradient
-
-
-def _of_block(parameters: Samples, model: Model, s: Samples, e: Samples) -> tuple[float, Samples, Samples]:
-    energy, jacobian = model(parameters, s)
-    rest = e - energy
-    return float(rest @ rest), jacobian @ jacobian.T, jacobian @ rest
 
 
 # Least difference of two rates over the record to start from [rad]: below a quarter of a beat two modes act as one.

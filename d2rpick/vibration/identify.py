@@ -10,6 +10,8 @@ from d2rpick.vibration import fitting
 from d2rpick.vibration.modes import Mode, Modes, energy_and_jacobian, sum_and_jacobian
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from d2rpick.histories.history import Samples
 
 # Thresholds of acceptance.  White noise may be large; what a true model must not leave over is structure, the
@@ -134,16 +136,12 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False) -> Identifi
     if poles.size == 0:
         return _nothing(time, "the energy does not oscillate: nothing vibrates, or it is overdamped")
     if quick and fitting.hopeless(poles, record.s, record.e, HOPELESS):
-        return _least_wrong([], time)
-    refused = []
-    for size, least_periods in _MODELS:
-        parameters = fitting.fit(poles, record.s, record.e, size, HOPELESS if quick else np.inf)
-        if parameters is not None:
-            attempt, follows = _judged(_one(parameters, size, record), least_periods, record)
-            if follows:  # a richer model would follow as well, and be no more plausible
-                return attempt
-            refused.append(attempt)
-    return _least_wrong(refused, time)
+        return _out_of_reach(time)
+    worst = HOPELESS if quick else np.inf
+    fits = ((fitting.fit(poles, record.s, record.e, size, worst), size, periods) for size, periods in _MODELS)
+    return _first_to_follow(
+        ((_one(found, size, record), most) for found, size, most in fits if found is not None), record
+    )
 
 
 def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
@@ -168,15 +166,9 @@ def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> 
     if lacking:
         return _nothing(time, lacking)
     record = _Record.scaled(time, energy)
-    refused, pencil = [], fitting.Pencil.of(record.s, record.e)
-    for count in _SEVERAL:
-        parameters = fitting.fit_several(pencil, record.s, record.e, count, HOPELESS if quick else np.inf)
-        if parameters is not None:
-            attempt, follows = _judged(_sum(parameters, record), _PERIODS_OF_SEVERAL, record)
-            if follows:
-                return attempt
-            refused.append(attempt)
-    return _least_wrong(refused, time)
+    pencil, worst = fitting.Pencil.of(record.s, record.e), HOPELESS if quick else np.inf
+    fits = (fitting.fit_several(pencil, record.s, record.e, count, worst) for count in _SEVERAL)
+    return _first_to_follow(((_sum(found, record), _PERIODS_OF_SEVERAL) for found in fits if found is not None), record)
 
 
 def identify_beside(time: Samples, energy: Samples, mode: Mode, rates: Samples) -> Identification:
@@ -191,11 +183,22 @@ def identify_beside(time: Samples, energy: Samples, mode: Mode, rates: Samples) 
     return _judged(best, _PERIODS_OF_SEVERAL, record, MIN_SAMPLES_BESIDE)[0]
 
 
-def _least_wrong(refused: list[Identification], time: Samples) -> Identification:
-    """Give the refused fit that is nearest to the record."""
-    if not refused:
-        return _nothing(time, f"no vibration comes near the energy: a few samples miss it by more than {MAX_MISFIT}")
-    return min(refused, key=lambda attempt: attempt.rms)
+def _first_to_follow(attempts: Iterable[tuple[_Attempt, float]], record: _Record) -> Identification:
+    """Judge fits with the least periods for each, the simplest first; else give the refused one that is nearest.
+
+    Where one follows the samples, a richer one would follow as well, and be no more plausible.
+    """
+    refused = []
+    for attempt, least_periods in attempts:
+        found, follows = _judged(attempt, least_periods, record)
+        if follows:
+            return found
+        refused.append(found)
+    return min(refused, key=lambda one: one.rms) if refused else _out_of_reach(np.array([record.start, record.end]))
+
+
+def _out_of_reach(time: Samples) -> Identification:
+    return _nothing(time, f"no vibration comes near the energy: a few samples miss it by more than {MAX_MISFIT}")
 
 
 def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
@@ -208,7 +211,7 @@ def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = Fal
         return _nothing(time, lacking)
     few = slice(None, None, -(-time.size // fitting.COARSE))
     if quick and np.var(energy[few] - mode.energy(time[few])) > HOPELESS * np.var(energy[few]):
-        return _least_wrong([], time)
+        return _out_of_reach(time)
     record = _Record.scaled(time, energy)
     start = record.start
     cosine = mode.deformation(start) - mode.preload

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
@@ -74,6 +74,7 @@ class Mode:
     origin: float
     energy_plastic: float = 0.0
     preload: float = 0.0
+    apart: ClassVar = float("inf")  # least difference of the rates of two modes: there is no other [1/time]
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -84,11 +85,6 @@ class Mode:
     def fastest(self) -> float:
         """Rate of the fastest mode, the only one [1/time]."""
         return self.omega
-
-    @property
-    def apart(self) -> float:
-        """Least difference of the rates of two modes: there is no other [1/time]."""
-        return float("inf")
 
     @property
     def omega_0(self) -> float:
@@ -276,6 +272,8 @@ class Modes:
     """
 
     modes: tuple[Mode, ...]
+    energy_plastic: ClassVar = 0.0  # no energy stays behind,
+    preload: ClassVar = 0.0  # and the modes vibrate about rest
 
     @classmethod
     def of(cls, parameters: Samples, origin: float) -> Modes:
@@ -302,16 +300,6 @@ class Modes:
     def alpha(self) -> float:
         """Damping, proportional to mass [1/time]."""
         return self.modes[0].alpha
-
-    @property
-    def energy_plastic(self) -> float:
-        """No energy stays behind."""
-        return 0.0
-
-    @property
-    def preload(self) -> float:
-        """The modes vibrate about rest."""
-        return 0.0
 
     def amplitudes(self, t: Samples | float) -> Samples:
         """Signed deformations of all modes, of the shape of ``t`` with an axis for the modes before it."""

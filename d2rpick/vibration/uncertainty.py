@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.histories.samples import integral
 from d2rpick.vibration.fitting import cell_means
 from d2rpick.vibration.identify import MIN_SAMPLES_BESIDE, MIN_SAMPLES_PER_PERIOD, identify_beside, samples_per_period
 from d2rpick.vibration.modes import Mode
@@ -85,11 +86,8 @@ def fitted_reach(history: History, fit: Identification, mode: Mode | Modes, time
     slope, bend = mode.energy_slopes(times)
     distance = reach(np.abs(slope), np.abs(bend), error)
     # the fit, not the output interval, bounds how far a crossing can be off: it stays within a quarter of a period
-    return (
-        np.minimum(distance, np.pi / 2 / mode.fastest)
-        + _BETWEEN_SAMPLES * history.step
-        + _time_quanta(history, times, td)
-    )
+    quanta = _half_quanta(history.time_precision, times) + history.time_precision.quantum(td) / 2
+    return np.minimum(distance, np.pi / 2 / mode.fastest) + _BETWEEN_SAMPLES * history.step + quanta
 
 
 def _local_rest(fit: Identification, mode: Mode | Modes, at: Samples) -> Samples:
@@ -119,10 +117,6 @@ def _rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
 
 def _half_quanta(precision: Precision, values: Samples) -> Samples:
     return precision.quanta(values) / 2
-
-
-def _time_quanta(history: History, times: Samples, td: float) -> Samples:
-    return _half_quanta(history.time_precision, times) + history.time_precision.quantum(td) / 2
 
 
 def curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
@@ -242,7 +236,8 @@ def _spectrum(time: Samples, energy: Samples, mode: Mode | Modes | Waves) -> _Sp
     """Lines of what ``mode`` leaves over, from one period in the record to the fastest that the samples show."""
     span = float(time[-1] - time[0])
     count = min(time.size - 1, _MOST_LINES)
-    rest = cell_means((time - time[0]) / span, energy - mode.energy(time), count)
+    s = (time - time[0]) / span
+    rest = cell_means(s, integral(s, energy - mode.energy(time)), count)
     decay = np.exp(-mode.alpha * span * (np.arange(count) + 0.5) / count)
     power, whole = float(np.sum(decay**2)), float(mode.vibration_energy(time[0]))
     lines = np.abs(np.fft.rfft(rest * decay, _FINER * count))
