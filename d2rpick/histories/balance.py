@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.errors import FormatError
-from d2rpick.histories.history import Balance
+from d2rpick.histories.history import Balance, Momenta
 from d2rpick.histories.names import is_internal_energy, normalised
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.database import Legs
-    from d2rpick.histories.history import Precision, Samples
+    from d2rpick.histories.history import Samples
     from d2rpick.histories.names import Part
 
 # Normalised names, see `d2rpick.histories.names`: glstat and binout, Radioss, Abaqus (ALLAE is its hourglass energy),
@@ -71,19 +71,8 @@ def terms_of(databases: Sequence[Legs]) -> Balance | None:
     return None if whole is None or known.isdisjoint(map(normalised, whole.channels)) else _terms(whole, np.inf)
 
 
-class Velocity(NamedTuple):
-    """Velocity of the centre of mass times a ``mass``, shape (n, 3), and how finely it was printed.
-
-    The mass is None of a velocity itself, NaN of a momentum whose mass is not known.
-    """
-
-    values: Samples
-    precision: Precision
-    mass: float | None
-
-
-def velocity_of(database: Legs) -> Velocity | None:
-    """Read the velocity or momentum of the whole model; None where it is not written."""
+def momentum_of(database: Legs) -> Momenta | None:
+    """Read the momentum of the whole model, or its velocity, which is the same but for the mass; None without."""
     known = {normalised(name) for name in (*database.channels, *database.quantities)}
     if not any(known & {*axes} for axes in _VELOCITIES):
         return None
@@ -94,8 +83,17 @@ def velocity_of(database: Legs) -> Velocity | None:
     values = columns.velocity()
     if values is None:
         return None
+    values = values[:, np.newaxis]
     precision = database.precisions(columns.used)[1]
-    return Velocity(values, precision, columns.mass(values) if columns.momentum else None)
+    mass = (columns.mass(values) if columns.momentum else 0.0) or float("nan")  # nothing moves, or it is not known
+    return Momenta(database.time, values, None, precision, (0,), masses=np.array([mass]), velocity=not columns.momentum)
+
+
+def least_masses(momenta: Samples, kinetic: Samples) -> Samples:
+    """Least masses (k,) that have such momenta (n, k, 3) at such kinetic energies (n, k); 0 where there is none."""
+    squares = np.sum(momenta**2, axis=2)
+    found = np.divide(squares, 2 * kinetic, out=np.zeros(squares.shape), where=kinetic > 0)
+    return np.asarray(found.max(axis=0))
 
 
 def _whole(databases: Sequence[Legs]) -> Legs | None:
@@ -135,14 +133,14 @@ class _Columns:
         self.used: list[str] = []
         self.momentum = False  # whether the velocity that was read is a momentum
 
-    def mass(self, momentum: Samples) -> float:
-        """Give the mass of the model: as written, or the least that has this momentum (n, 3) at its kinetic energy."""
+    def mass(self, momenta: Samples) -> float:
+        """Give the mass of the model: as written, or the least that has these momenta, (n, 1, 3)."""
         written, kinetic = self.first("mass", "totalmass"), self.first(*_NAMES["kinetic"])
         if written is not None:
             return float(np.median(written))
         if kinetic is None or not (kinetic > 0).any():
             return float("nan")
-        return float((np.sum(momentum**2, axis=1)[kinetic > 0] / (2 * kinetic[kinetic > 0])).max())
+        return float(least_masses(momenta, kinetic[:, np.newaxis])[0])
 
     def first(self, *names: str) -> Samples | None:
         """Give the first of these columns that is there."""

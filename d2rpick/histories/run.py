@@ -130,32 +130,26 @@ class Run:
 
     def _least_masses(self, momenta: Samples, holder: Legs) -> Samples | None:
         """Masses of the parts; of a part that writes none, the least that has its momentum at its kinetic energy."""
+        from d2rpick.histories.balance import least_masses
+
         masses = self._masses(momenta, holder)
         ids = [part.id for part in holder.parts]
         if masses is None or not np.isnan(masses).any():
             return masses
         try:
-            kinetic = holder.part_channel("kinetic_energy", ids)
+            least = least_masses(momenta, holder.part_channel("kinetic_energy", ids))
         except FormatError:
             return masses
-        squares = np.sum(momenta**2, axis=2)
-        least = np.divide(squares, 2 * kinetic, out=np.zeros(squares.shape), where=kinetic > 0).max(axis=0)
         return np.where(np.isnan(masses), least, masses)
 
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
-        """Momentum of the whole model, or its velocity, which is the same but for the mass; None if not written."""
-        from d2rpick.histories.balance import velocity_of
+        """Momentum of the whole model, or its velocity; None if not written."""
+        from d2rpick.histories.balance import momentum_of
 
-        for database in self.databases:
-            velocity = velocity_of(database) if database.channels else None
-            if velocity:
-                values, mass = velocity.values[:, np.newaxis], np.array([velocity.mass or np.nan])
-                return Momenta(
-                    database.time, values, None, velocity.precision, (0,), masses=mass,
-                    velocity=velocity.mass is None, surroundings=self.surroundings,
-                )  # fmt: skip
-        return None
+        found = (momentum_of(database) for database in self.databases if database.channels)
+        written = next(filter(None, found), None)
+        return written and replace(written, surroundings=self.surroundings)
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
         """Give the momentum of some parts together, or of the whole model; None where it is not written."""
