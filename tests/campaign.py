@@ -28,7 +28,7 @@ from d2rpick.workers import answers, cores, on_cores
 from tests.command import DECK
 from tests.faults import Fault, damage
 from tests.hdf5_files import plain, written
-from tests.histories.formats import test_curves, test_faults_binary, test_faults_text, test_radioss_text
+from tests.histories.formats import test_curves, test_faults_binary, test_faults_text, test_radioss_th
 from tests.reading import run_of, states_of
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def binout(random: Random) -> bool:
 def time_history(random: Random) -> bool:
     """Damage the structure of a T01; runs of records as long as a state are left alone, since nothing tells them."""
     made, places = test_faults_binary.T01, test_faults_binary.T01_STRUCTURE
-    text = test_radioss_text
+    text = test_radioss_th
     if random.random() < 1 / 2:
         return bool(text.true(_restructured(random, text.DATA, text.SMALL.marks, text.STRUCTURE, 4)))
     return bool(test_faults_binary.true_t01(_restructured(random, bytes(made.data), made.marks, places, 5)))

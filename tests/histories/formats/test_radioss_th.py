@@ -1,19 +1,94 @@
-"""Radioss T01: computed runs against other readings, and made files of every age."""
+"""Radioss T01, binary and as text: computed runs against other readings, made files of every age, damaged texts."""
 
 from __future__ import annotations
 
+import gzip
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from d2rpick.errors import FormatError
+from d2rpick.errors import D2RPickError, FormatError
+from d2rpick.histories.formats import csv_table, radioss_th
 from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
+from d2rpick.histories.opening import Selection, open_run
 from tests.command import BOX, ROLLOVER
 from tests.computed import stored, unpacked
-from tests.made_t01 import MadePart, T01Writer, t01, value
+from tests.faults import cases, some
+from tests.histories.formats.test_faults_binary import bounded_memory, t01_value, true_columns
+from tests.made_t01 import MadePart, T01TextWriter, T01Writer, real, t01, value
+from tests.reading import run_of, run_on_disk
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+STATES = 3
+SMALL = t01(
+    STATES, [MadePart(id_, f"part {id_}", (1, 5)) for id_ in (7, 3)], globals_=5, subset_variables=0,
+    made=T01TextWriter(),
+)  # fmt: skip
+DATA = bytes(SMALL.data)
+FIRST_STATE = SMALL.marks[-4 * STATES]
+# All but the lines of numbers in the states, which bear no mark but their place.
+STRUCTURE = [
+    *range(FIRST_STATE),
+    *(at for mark in SMALL.marks[-4 * STATES :] for at in range(mark, DATA.index(b"\n", mark) + 1)),
+]
+
+
+def printed(number: float) -> float:
+    return float(real(number))
+
+
+def true(data: bytes) -> list[tuple[int, bool]]:
+    """Read everything; what is read must be true."""
+    return true_columns(
+        lambda: TimeHistory(data, "runT01"),
+        ("internal_energy", "z_momentum"),
+        lambda name, state, part=0: printed(t01_value(name, state, part)),
+    )
+
+
+FORMS: dict[str, Callable[[], T01Writer]] = {
+    "binary": T01Writer,
+    "text": T01TextWriter,
+    "text of another system": lambda: T01TextWriter(line_end=b"\r\n"),
+}
 
 
 def opened(made: T01Writer | bytes) -> TimeHistory:
     return TimeHistory(bytes(made.data) if isinstance(made, T01Writer) else made, "runT01")
+
+
+@pytest.mark.parametrize("globals_", [0, 12, 16, 22, 25])
+@pytest.mark.parametrize(("code", "title"), [(3040, 40), (3041, 80), (3050, 80), (4021, 100)])
+@pytest.mark.parametrize("into", FORMS.values(), ids=FORMS.keys())
+def test_any_age_and_form_of_the_format(into: Callable[[], T01Writer], code: int, title: int, globals_: int) -> None:
+    parts = [MadePart(3, "box", material=123456), MadePart(12, "step"), MadePart(3, "half a box", is_group=True)]
+    made = t01(5, parts, globals_=globals_, code=code, title=title, made=into())
+    written = printed if isinstance(made, T01TextWriter) else float
+    assert recognises(bytes(made.data)[:300])
+    run = opened(made)
+    assert (run.complete, run.notes) == (True, ())
+    assert run.time.tolist() == [state / 8 for state in range(5)]
+    assert (run.title, run.version) == ("made for tests", "Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss, linuxa64 gf")
+    assert [(part.id, part.title) for part in run.parts] == [(3, "box"), (12, "step")]
+    assert len(run.channels) == globals_
+    for number, name in enumerate(run.channels, start=1):
+        assert run.channel(name).tolist() == [written(value(state, 0, number)) for state in range(5)]
+    for number, name in ((1, "internal_energy"), (5, "z_momentum"), (7, "hourglass_energy")):
+        expected = [[written(value(s, id_, number)) for id_ in (12, 3)] for s in range(5)]
+        assert run.part_channel(name, [12, 3]).tolist() == expected
+
+
+@pytest.mark.parametrize("into", FORMS.values(), ids=FORMS.keys())
+def test_control_bytes_in_titles_are_blanks(into: Callable[[], T01Writer]) -> None:
+    made = bytes(t01(1, [MadePart(1, "part 7")], made=into()).data).replace(b"part 7", b"p\nrt\x007")
+    assert opened(made).parts[0].title == "p rt 7"
 
 
 @pytest.mark.parametrize("path", [BOX, stored("rollover_r100_T02.gz"), stored("chain_referenceT01.gz")])
@@ -40,21 +115,6 @@ def test_legs_follow_one_another() -> None:
     assert (np.diff(np.concatenate([leg.time for leg in legs])) > 0).all()
 
 
-@pytest.mark.parametrize("globals_", [0, 12, 16, 22, 25])
-@pytest.mark.parametrize(("code", "title"), [(3040, 40), (3041, 80), (3050, 80), (4021, 100)])
-def test_any_age_of_the_format(globals_: int, code: int, title: int) -> None:
-    run = opened(t01(5, globals_=globals_, code=code, title=title))
-    assert run.time.tolist() == [state / 8 for state in range(5)]
-    assert (run.title, run.version) == ("made for tests", "Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss, linuxa64 gf")
-    assert len(run.channels) == globals_
-    for number, name in enumerate(run.channels, start=1):
-        assert run.channel(name).tolist() == [value(state, 0, number) for state in range(5)]
-    for number, name in ((1, "internal_energy"), (5, "z_momentum"), (7, "hourglass_energy")):
-        assert run.part_channel(name, [12, 3]).tolist() == [
-            [value(s, id_, number) for id_ in (12, 3)] for s in range(5)
-        ]
-
-
 def test_a_group_of_elements_is_no_part_and_its_energy_not_counted_twice() -> None:
     run = opened(t01(2, [MadePart(1, "box"), MadePart(1, "half of the box", is_group=True)]))
     assert [(part.id, part.title) for part in run.parts] == [(1, "box")]
@@ -77,11 +137,6 @@ def test_a_variable_that_was_not_asked_for_is_refused() -> None:
         run.channel("heat")
 
 
-def test_control_bytes_in_titles_are_blanks() -> None:
-    made = bytes(t01(1, [MadePart(1, "box")]).data).replace(b"box ", b"b\nx\0")
-    assert opened(made).parts[0].title == "b x"
-
-
 def test_no_states_is_a_legal_file() -> None:
     run = opened(t01(0))
     assert run.time.shape == (0,)
@@ -93,3 +148,152 @@ def test_something_else_is_not_recognised_and_refused(head: bytes) -> None:
     assert not recognises(head)
     with pytest.raises(FormatError, match="was expected in the head of the time history"):
         opened(head)
+
+
+# As text.
+
+
+def test_numbers_of_a_record_that_five_columns_do_not_count() -> None:
+    parts = [MadePart(id_, "piece", tuple(range(1, 501))) for id_ in range(1, 202)]
+    run = opened(t01(1, parts, made=T01TextWriter()))
+    assert run.part_channel("internal_energy", [201]).tolist() == [[printed(value(0, 201, 1))]]
+
+
+@pytest.mark.parametrize("number", [-1.5e-120, 2.25e117, 0.0, -0.125])
+def test_an_exponent_of_three_digits_stands_without_its_letter(number: float) -> None:
+    made = t01(2, made=T01TextWriter())
+    made.state(0.5, [number] * 22, [0.0] * 16)
+    assert opened(made).channel("mass").tolist()[-1] == number
+
+
+@pytest.mark.parametrize(("single", "digits"), [(True, 7), (False, 9)])
+def test_numbers_have_the_digits_in_which_the_solver_computed(single: bool, digits: int) -> None:
+    made = t01(0, made=T01TextWriter())
+    for time in np.arange(4) / 7:
+        made.state(float(np.float32(time)) if single else float(time), [0.0] * 22, [0.0] * 16)
+    run = opened(made)
+    assert [precision.digits for precision in run.precisions(["mass"])] == [digits, digits]
+
+
+def test_legs_may_be_text_and_binary() -> None:
+    text, binary = t01(4, start=2, made=T01TextWriter()), t01(4)
+    run = run_of(radioss_th, bytes(text.data), bytes(binary.data))
+    assert run.history(Selection()).time.tolist() == [state / 8 for state in range(6)]
+    assert "where legs overlap the newer one counts" in run.notes[0]
+
+
+def test_a_packed_text_is_read_like_one_on_a_disk(tmp_path: Path) -> None:
+    plain, packed = tmp_path / "plain", tmp_path / "packed"
+    plain.write_bytes(DATA)
+    packed.write_bytes(gzip.compress(DATA))
+    read = [open_run([str(file)]).history(Selection(parts=("7",))) for file in (plain, packed)]
+    assert [history.format for history in read] == ["radioss-th"] * 2
+    assert read[0].energy.tolist() == read[1].energy.tolist() == [printed(value(s, 7, 1)) for s in range(STATES)]
+
+
+def test_what_a_running_solver_appends_to_a_file_on_its_disk_does_not_count(tmp_path: Path) -> None:
+    file = tmp_path / "runT01"
+    file.write_bytes(DATA[:-10])
+    run = run_on_disk(file)
+    with file.open("ab") as end:
+        end.write(DATA[-10:])
+    history = run.history(Selection(parts=("7",)))
+    assert history.energy.tolist() == [printed(value(s, 7, 1)) for s in range(STATES - 1)]
+    assert not history.complete
+    assert "the file ends within state 3, which was left out" in history.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("line", "damaged"),
+    [
+        (b"ZZZZZEOR    6I", b"ZZZZZEOR" + b"9" * 5000 + b"I"),
+        (b"ZZZZZEOR    6I", b"ZZZZZEOR99999I"),
+        (b"ZZZZZEOR    6I", b"ZZZZZEOR    6C"),
+        (b"         7part 7", b"**********part 7"),
+        (b"         7part 7", b"9999999999part 7"),
+        (b"         7part 7", b"       1 7part 7"),
+    ],
+)
+def test_a_head_that_does_not_hold_what_it_says_is_refused(line: bytes, damaged: bytes) -> None:
+    with pytest.raises(FormatError, match="was expected in the head of the time history near byte"):
+        opened(DATA.replace(line, damaged))
+
+
+CODED = "runT01\n00000318a title\nWed Apr 10 13:20:15 2024 RADIOSS Open\n0000000A0000000MZZZZZEOR\n"
+
+
+@pytest.mark.parametrize("text", [CODED, "ZZZZZEOR      84\n      3041a title\nZZZZZEOR      80\n"])
+def test_other_forms_of_text_are_refused_with_what_to_do(text: str) -> None:
+    assert recognises(text.encode())
+    with pytest.raises(FormatError, match=r"runT01: .* as text, but not as /TFILE/3 writes it .*; let the run"):
+        opened(text.encode())
+
+
+def test_as_a_table_it_is_refused() -> None:
+    with pytest.raises(FormatError):
+        run_of(csv_table, DATA).history(Selection())
+
+
+def test_cut_at_any_byte_it_keeps_its_whole_states() -> None:
+    assert true(DATA) == [(STATES, True)] * 6
+    stride = (len(DATA) - FIRST_STATE) // STATES
+    for cut in some(range(len(DATA))):
+        whole, rest = divmod(cut - FIRST_STATE, stride)
+        # a head alone, behind which a record begins, may be refused
+        assert true(DATA[:cut]) in ([(whole, rest == 0)] * 6, *([[]] if whole < 1 else ()))
+
+
+@pytest.mark.parametrize("flip", [0x01, 0x04, 0x10, 0x80])
+def test_any_byte_of_its_structure_may_be_wrong(flip: int) -> None:
+    data = bytearray(DATA)
+    for place in some(STRUCTURE):
+        data[place] ^= flip
+        true(bytes(data))
+        data[place] ^= flip
+
+
+@cases(60)
+@given(
+    st.lists(st.tuples(st.sampled_from(STRUCTURE), st.integers(0, 255)), max_size=3),
+    st.sampled_from(SMALL.marks),
+    st.binary(max_size=40),
+    st.integers(0, 30).filter(lambda lost: lost % 4),
+)
+def test_bytes_and_records_may_be_put_in_lost_and_changed(
+    changed: list[tuple[int, int]], at: int, put_in: bytes, lost: int
+) -> None:
+    data = bytearray(DATA)
+    for place, byte in changed:
+        data[place] = byte
+    records = [bytes(data[begin:end]) for begin, end in pairwise([*SMALL.marks, len(data)])]
+    first = SMALL.marks.index(at)
+    with bounded_memory():
+        true(bytes(data[:at] + put_in + data[at:]))
+        true(bytes(data[: SMALL.marks[0]]) + b"".join(records[:first] + records[first + lost :]))
+
+
+@pytest.mark.parametrize(
+    ("number", "damaged"),
+    [
+        ("  7.00000000E+00", " 7.00000000E+00 "),
+        ("  7.00000000E+00", "   7.00000000E+0"),
+        ("  7.00000000E+00", "   .00000000E+00"),
+        ("  7.00000000E+00", "  7.0000 000E+00"),
+        ("  7.00000000E+00", "             NaN"),
+        ("  7.00000000E+00", "****************"),
+    ],
+)
+def test_a_number_out_of_its_columns_is_none(number: str, damaged: str) -> None:
+    made = t01(2, made=T01TextWriter())
+    made.state(0.25, [7.0] * 22, [0.0] * 16)
+    data = bytes(made.data).decode()
+    place = data.rindex(number * 2) + len(number)
+    run = opened((data[:place] + damaged + data[place + len(number) :]).encode())
+    assert sum(bool(np.isnan(run.channel(name)).any()) for name in run.channels) == 1
+
+
+def test_a_number_that_is_none_is_refused() -> None:
+    made = t01(2, made=T01TextWriter())
+    made.state(0.25, [float("nan")] * 22, [0.0] * 16)
+    with pytest.raises(D2RPickError, match="energy of state 3 is nan, a finite number"):
+        run_of(radioss_th, bytes(made.data)).history(Selection())
