@@ -55,9 +55,7 @@ _PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "tim
 
 def as_table(overview: Overview) -> str:
     """One line per fact, the channels, and a table of the parts."""
-    rows = _rows(overview)
-    width = max(len(name) for name, _ in rows)
-    lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in rows]
+    lines = tables.in_line(_rows(overview))
     if overview.parts:
         lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview))]
     if overview.health and (health := _health(overview)):

@@ -8,7 +8,7 @@ from d2rpick.choice.study_rows import runs_of
 from d2rpick.report import page, parts, plan, study, suggestion, trade_off, verdict
 from d2rpick.report.explorer import explorer
 from d2rpick.report.html import Markup, document, drawings, pairs, remarks, section, table, tag
-from d2rpick.report.tables import known, measure, short
+from d2rpick.report.tables import known, measure, short, unstarred
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -88,8 +88,7 @@ def _candidates(answer: Suggestion) -> Iterator[Markup]:
         return
     shown = answer.candidates[:_MOST_ROWS]
     marked = next((i for i, candidate in enumerate(shown) if candidate.recommended), None)
-    head = [name.replace("+-", "±") for name in suggestion.HEAD[1:]]
-    yield table("Candidates", *known(head, [row[1:] for row in suggestion.rows(answer, _MOST_ROWS)]), marked)
+    yield table("Candidates", *known(*unstarred(*suggestion.table(answer, _MOST_ROWS))), marked)
     left = len(answer.candidates) - len(shown)
     if left:
         yield tag("p", f"{left} more in the csv and json results.", class_="soft")
@@ -165,7 +164,7 @@ def _of_trade_off(found: TradeOff, record: page.PageContext) -> Iterator[Markup]
     yield from page.shown(_draw_trade_off(found), record)
     best = trade_off.some_of(found, _MOST_ROWS)
     marked = next((i for i, one in enumerate(best) if one.recommended), None)
-    shown = table("Pairs", *known(trade_off.HEAD[1:], [row[1:] for row in trade_off.rows(best)]), marked)
+    shown = table("Pairs", *known(*unstarred(*trade_off.table(best))), marked)
     left = tag("p", f"{len(found.offers) - len(best)} more td in the csv and json results.", class_="soft")
     yield section("Pairs that nothing beats", shown, left)
     yield from _below_figures(found.suggestion, record)
@@ -202,8 +201,7 @@ def _of_plan(
         yield explorer(explored)
     caption = "Internal energy with the flights, and below it the rigid windows with their numbers"
     yield drawings({caption: svg_element(draw_plan(found, page=True), "plan-")})
-    reasons = pairs([(f"flight {row.number}", row.reason) for row in found.rows if row.reason])
-    yield section("Flights", table("Flights", plan.head(found)[1:], [row[1:] for row in plan.rows(found)]), reasons)
+    yield section("Flights", table("Flights", *unstarred(*plan.table(found))), pairs(plan.reasons(found)))
     if card:
         yield section("For the solver's input", tag("pre", card, tabindex="0"))
     files = [*page.digests(run.files), *page.digests_of(found.settings)]
@@ -233,8 +231,8 @@ def _of_study(answer: Study, command: Sequence[str]) -> Iterator[Markup]:
     yield page.front([_common(answer)], remarks(answer.cautions), pairs(study.outcome(answer)))
     caption = "Internal energies of all runs, with the tr of each, the common one and td"
     yield drawings({caption: svg_element(draw_study(answer, page=True), "runs-")})
-    head = [name.replace("+-", "\u00b1") for name in study.HEAD]
-    yield section("Runs", table("Runs", *known(head, study.rows(answer))))
+    head, rows = study.table(answer)
+    yield section("Runs", table("Runs", *known([name.replace("+-", "±") for name in head], rows)))
     yield section("Files", tag("pre", _files(answer), class_="wrap"))
     yield from page.method(command)
 
@@ -270,10 +268,9 @@ def _of_parts(found: Parts, command: Sequence[str]) -> Iterator[Markup]:
     yield page.front([_set(found.recommended)], remarks(found.cautions))
     if found.sets:
         marked = next((at for at, one in enumerate(found.sets) if one.recommended), None)
-        body = parts.columns(parts.SET_HEAD, parts.SETS, parts.set_rows(found))
-        yield section("Sets", table("Sets", parts.SETS, body, marked))
+        yield section("Sets", table("Sets", *unstarred(*parts.set_table(found, parts.SETS)), marked))
     for caption, names in parts.TABLES.items():
-        yield section(caption, table(caption, names, parts.columns(parts.HEAD, names, parts.rows(found))))
+        yield section(caption, table(caption, *unstarred(*parts.table(found, names))))
     yield section("What it means", pairs(parts.outlook(found)))
     weights = [("weights", found.weights.source)] if found.weights else []
     deck = page.deck_digests(found.inventory.files, found.weights) if found.inventory else []

@@ -10,19 +10,11 @@ from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, each, many, maybe, one_of, row
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from d2rpick.choice.sets_of_parts import Parts, PartSet
     from d2rpick.choice.switchable_parts import PartRow
 
-HEAD = (
-    "", "part", "title", "verdict", "elements", "formulation", "material", "mass", "energy", "scatter", "flies",
-    "deforms", "cost", "step", "shares nodes with", "why",
-)  # fmt: skip
-SET_HEAD = (
-    "", "set", "parts", "elements", "mass", "saved of a step", "step grows", "tr", "td", "run time", "saved",
-    "out of place", "turned [deg]",
-)  # fmt: skip
 # Columns of the sets, and of the parts in two tables: as many as a screen and a sheet hold side by side.
 SETS = ("set", "parts", "saved of a step", "tr", "td", "run time", "saved", "out of place", "turned [deg]")
 TABLES = {
@@ -143,35 +135,18 @@ def as_table(found: Parts) -> str:
     """What was read, a row per part in two tables, a row per set, and the set to take; markdown has all columns."""
     lines = heading(found)
     for names in TABLES.values():
-        head, body = tables.known(names, columns(HEAD, names, rows(found)))
-        if body and {*head} - {"part", "title"}:
-            lines += ["", _starred(head, body, [row[0] for row in rows(found)])]
+        head, body = tables.known(*table(found, names))
+        if body and {*head} - {"", "part", "title"}:
+            lines += ["", tables.as_text(head, body, _WIDTH)]
     if found.sets:
-        body = columns(SET_HEAD, SETS, set_rows(found))
-        lines += ["", _starred(SETS, body, [row[0] for row in set_rows(found)])]
-    lines += ["", *(f"{name.ljust(11)}  {printable(text)}" for name, text in outlook(found))]
-    return "\n".join(lines)
-
-
-def columns(
-    head: Sequence[str], names: Sequence[str], body: Sequence[Sequence[tables.Cell]]
-) -> list[list[tables.Cell]]:
-    """Take the columns with these names out of the rows of a table."""
-    at = [head.index(name) for name in names]
-    return [[row[i] for i in at] for row in body]
-
-
-def _starred(head: Sequence[str], body: Sequence[Sequence[tables.Cell]], stars: Sequence[tables.Cell]) -> str:
-    """Write rows with their stars before them."""
-    return tables.as_text(("", *head), [[star, *row] for star, row in zip(stars, body, strict=True)], _WIDTH)
+        lines += ["", tables.as_text(*set_table(found, SETS), _WIDTH)]
+    return "\n".join([*lines, "", *tables.in_line(outlook(found), 11)])
 
 
 def as_markdown(found: Parts) -> str:
     """The parts and the sets as Markdown tables, and below them the set to take."""
-    blocks = [tables.as_markdown(HEAD, rows(found))]
-    if found.sets:
-        blocks.append(tables.as_markdown(SET_HEAD, set_rows(found)))
-    return "\n\n".join([*blocks, *(f"{name}: {tables.in_markdown(text)}" for name, text in outlook(found))])
+    sets = [tables.as_markdown(*set_table(found))] if found.sets else []
+    return "\n\n".join([tables.as_markdown(*table(found)), *sets, *tables.listed(outlook(found))])
 
 
 def as_csv(found: Parts) -> str:
@@ -201,52 +176,17 @@ def heading(found: Parts) -> list[str]:
     return [printable(line) for line in lines]
 
 
-def rows(found: Parts) -> list[list[tables.Cell]]:
-    """Cells of all parts, below ``HEAD``; those of the recommended set have a star."""
+def table(found: Parts, names: Iterable[str] = ()) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Give names and cells of all columns of the parts, or of some; the parts of the recommended set have a star."""
     best = set(found.recommended.parts) if found.recommended else set()
-    return [
-        [
-            "*" if row.id in best else " ",
-            row.id,
-            row.title,
-            verdict(row),
-            _counted(row),
-            ", ".join(row.formulations) or None,
-            row.material,
-            _short(row.mass),
-            _short(row.flight.mean if row.flight else None),
-            _percent(row.flight.scatter if row.flight else None),
-            row.flight.flies if row.flight else None,
-            row.flight.deforms if row.flight else None,
-            _percent(row.cost_share),
-            _short(row.smallest_step),
-            None if row.shares_nodes is None else listing(row.shares_nodes, most=_MOST_SHOWN, between=","),
-            "; ".join(row.reasons),
-        ]
-        for row in found.rows
-    ]
+    columns = {name: COLUMNS[name] for name in names or COLUMNS}
+    return tables.filled({"": lambda row: "*" if row.id in best else " ", **columns}, found.rows)
 
 
-def set_rows(found: Parts) -> list[list[tables.Cell]]:
-    """Cells of all sets, below ``SET_HEAD``; that of the recommended one has a star."""
-    return [
-        [
-            "*" if one.recommended else " ",
-            one.name,
-            ranges(one.parts),
-            one.elements,
-            _percent(one.mass_fraction),
-            _percent(one.cost_share),
-            _growth(one.step_growth),
-            one.window[0] if one.window else None,
-            one.window[1] if one.window else None,
-            _percent(one.run_time_share),
-            _percent(one.saving),
-            _position(one),
-            _least(one, one.angle_error),
-        ]
-        for one in found.sets
-    ]
+def set_table(found: Parts, names: Iterable[str] = ()) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Give the same of the sets, among which the recommended one has a star."""
+    columns = {name: SET_COLUMNS[name] for name in names or SET_COLUMNS}
+    return tables.filled({"": lambda one: "*" if one.recommended else " ", **columns}, found.sets)
 
 
 def _position(one: PartSet) -> str | None:
@@ -292,6 +232,10 @@ def _counted(row: PartRow) -> str | None:
     return None if row.elements is None else ", ".join(f"{count} {kind}" for kind, count in row.elements.items())
 
 
+def _sharing(row: PartRow) -> str | None:
+    return None if row.shares_nodes is None else listing(row.shares_nodes, most=_MOST_SHOWN, between=",")
+
+
 def ranges(ids: Sequence[int]) -> str:
     """Numbers of parts as ``--part`` takes them.
 
@@ -304,7 +248,7 @@ def ranges(ids: Sequence[int]) -> str:
 
 
 def _short(value: float | None) -> str | None:
-    return None if value is None else f"{value:.3g}"
+    return tables.shown(value, ".3g")
 
 
 def _percent(value: float | None) -> str | None:
@@ -312,4 +256,37 @@ def _percent(value: float | None) -> str | None:
 
 
 def _growth(value: float | None) -> str | None:
-    return None if value is None else "free" if isinf(value) else f"{value:.2g}"
+    return "free" if value is not None and isinf(value) else tables.shown(value, ".2g")
+
+
+COLUMNS: Final[dict[str, Callable[[PartRow], tables.Cell]]] = {
+    "part": lambda row: row.id,
+    "title": lambda row: row.title,
+    "verdict": verdict,
+    "elements": _counted,
+    "formulation": lambda row: ", ".join(row.formulations) or None,
+    "material": lambda row: row.material,
+    "mass": lambda row: _short(row.mass),
+    "energy": lambda row: _short(row.flight.mean if row.flight else None),
+    "scatter": lambda row: _percent(row.flight.scatter if row.flight else None),
+    "flies": lambda row: row.flight.flies if row.flight else None,
+    "deforms": lambda row: row.flight.deforms if row.flight else None,
+    "cost": lambda row: _percent(row.cost_share),
+    "step": lambda row: _short(row.smallest_step),
+    "shares nodes with": _sharing,
+    "why": lambda row: "; ".join(row.reasons),
+}
+SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
+    "set": lambda one: one.name,
+    "parts": lambda one: ranges(one.parts),
+    "elements": lambda one: one.elements,
+    "mass": lambda one: _percent(one.mass_fraction),
+    "saved of a step": lambda one: _percent(one.cost_share),
+    "step grows": lambda one: _growth(one.step_growth),
+    "tr": lambda one: one.window[0] if one.window else None,
+    "td": lambda one: one.window[1] if one.window else None,
+    "run time": lambda one: _percent(one.run_time_share),
+    "saved": lambda one: _percent(one.saving),
+    "out of place": _position,
+    "turned [deg]": lambda one: _least(one, one.angle_error),
+}

@@ -15,11 +15,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.plan import Plan, Planned
     from d2rpick.choice.situation import Situation
 
-HEAD = (
-    "", "flight", "from", "to", "margin", "tr", "td", "rigid", "of record", "run time", "error", "out of place",
-    "quality", "status",
-)  # fmt: skip
-
 
 def _times(row: Planned, at: int) -> float | None:
     return row.window[at] if row.window else None
@@ -82,18 +77,19 @@ DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in t
 
 def as_table(plan: Plan) -> str:
     """What was read, a row per flight, what the supported windows save, and why others are not supported."""
-    table = tables.as_text(head(plan), rows(plan)) if plan.rows else "no flight"
-    named = [f"flight {row.number}  {printable(row.reason)}" for row in plan.rows if row.reason]
-    told = [f"{name.ljust(9)}  {printable(text)}" for name, text in outlook(plan)]
-    lines = [heading(plan), "", table, "", *told, *named]
-    return "\n".join(lines)
+    shown = tables.as_text(*table(plan)) if plan.rows else "no flight"
+    named = [f"{name}  {printable(reason)}" for name, reason in reasons(plan)]
+    return "\n".join([heading(plan), "", shown, "", *tables.in_line(outlook(plan), 9), *named])
 
 
 def as_markdown(plan: Plan) -> str:
     """The flights as a Markdown table, and below it what is saved, and why windows are not supported."""
-    named = [(f"flight {row.number}", row.reason) for row in plan.rows if row.reason]
-    told = [f"{name}: {tables.in_markdown(text)}" for name, text in (*outlook(plan), *named)]
-    return "\n\n".join([tables.as_markdown(head(plan), rows(plan)), *told])
+    return "\n\n".join([tables.as_markdown(*table(plan)), *tables.listed((*outlook(plan), *reasons(plan)))])
+
+
+def reasons(plan: Plan) -> list[tuple[str, str]]:
+    """Why windows are not supported; the flight and a sentence each."""
+    return [(f"flight {row.number}", row.reason) for row in plan.rows if row.reason]
 
 
 def as_csv(plan: Plan) -> str:
@@ -146,34 +142,11 @@ def given_up(row: Planned) -> str:
     return told(row.answer.longer, row.answer.recommended)
 
 
-def head(plan: Plan) -> list[str]:
-    """Columns of the table; run time and place only where they are known."""
-    unknown = {"run time"} if plan.settings.cost_share is None else set()
-    unknown |= set() if _placed(plan) else {"out of place"}
-    return [name for name in HEAD if name not in unknown]
-
-
-def rows(plan: Plan) -> list[list[tables.Cell]]:
-    """Cells of all flights, below ``head``; those of supported windows have a star."""
-    return [
-        [
-            "*" if row.status == "supported" else " ",
-            row.number,
-            row.start,
-            "end of record" if row.flight.end is None else row.flight.end,
-            "-" if row.done else f"{row.margin.time:.3g}",
-            row.window[0] if row.window else None,
-            row.window[1] if row.window else None,
-            row.rigid_time,
-            None if row.rigid_fraction is None else f"{row.rigid_fraction:.0%}",
-            *([] if plan.settings.cost_share is None else [_run_time(row)]),
-            error(row),
-            *([_place(row)] if _placed(plan) else []),
-            row.quality.grade if row.quality else None,
-            row.status,
-        ]
-        for row in plan.rows
-    ]
+def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Give names of columns and cells of all flights; run time and place only where they are known."""
+    placed = any(row.candidate and row.candidate.position_error is not None for row in plan.rows)
+    unknown = [*["run time"] * (plan.settings.cost_share is None), *["out of place"] * (not placed)]
+    return tables.filled({name: cell for name, cell in _COLUMNS.items() if name not in unknown}, plan.rows)
 
 
 def error(row: Planned) -> str | None:
@@ -187,11 +160,6 @@ def error(row: Planned) -> str | None:
     return f"{name} {tables.measure(off)}"
 
 
-def _placed(plan: Plan) -> bool:
-    """Whether it is known of any window how far a rigid body is out of place."""
-    return any(row.candidate and row.candidate.position_error is not None for row in plan.rows)
-
-
 def _place(row: Planned) -> str | None:
     """How far a rigid body is out of place at td [length]."""
     best = row.candidate
@@ -201,7 +169,19 @@ def _place(row: Planned) -> str | None:
     return f"{least}{best.position_error:.2g}{' if one body' if best.position_error_assumes else ''}"
 
 
-def _run_time(row: Planned) -> str | None:
-    """Run time with this window alone."""
-    share = row.candidate.run_time_share if row.candidate else None
-    return None if share is None else f"{share:.0%}"
+_COLUMNS: Final[dict[str, Callable[[Planned], tables.Cell]]] = {
+    "": lambda row: "*" if row.status == "supported" else " ",
+    "flight": lambda row: row.number,
+    "from": lambda row: row.start,
+    "to": lambda row: "end of record" if row.flight.end is None else row.flight.end,
+    "margin": lambda row: "-" if row.done else f"{row.margin.time:.3g}",
+    "tr": lambda row: _times(row, 0),
+    "td": lambda row: _times(row, 1),
+    "rigid": lambda row: row.rigid_time,
+    "of record": lambda row: tables.shown(row.rigid_fraction, ".0%"),
+    "run time": lambda row: tables.shown(row.candidate.run_time_share if row.candidate else None, ".0%"),
+    "error": error,
+    "out of place": _place,
+    "quality": lambda row: row.quality.grade if row.quality else None,
+    "status": lambda row: row.status,
+}

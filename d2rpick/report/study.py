@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.choice.study_rows import runs_of
-from d2rpick.errors import printable
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe, one_of, row
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from d2rpick.choice.study import Study
     from d2rpick.choice.study_rows import StudyRow
@@ -88,20 +87,17 @@ DOCUMENT: Final = Document(
     row(*_SHARED.fields[:3], _RUNS, *_SHARED.fields[3:]),
     also=(_RUN, _LINE, row(*LAST.whole.fields, name="last")),
 )
-HEAD = ("run", "tr", "+-", "td", "E(td)", "R", "at common", "basis", "status", "message")
 
 
 def as_table(answer: Study) -> str:
     """One line per run, and below what they have in common."""
-    width = max(len(name) for name, _ in outcome(answer))
-    below = [f"{name.ljust(width)}  {printable(text)}" for name, text in outcome(answer)]
-    return "\n".join([tables.as_text(HEAD, rows(answer)), "", *below])
+    return "\n".join([tables.as_text(*table(answer)), "", *tables.in_line(outcome(answer))])
 
 
 def as_markdown(answer: Study) -> str:
     """The runs as a Markdown table, and below what they have in common."""
-    below = "\n".join(f"* {name}: {tables.in_markdown(text)}" for name, text in outcome(answer))
-    return f"{tables.as_markdown(HEAD, rows(answer))}\n\n{below}"
+    below = "\n".join(f"* {line}" for line in tables.listed(outcome(answer)))
+    return f"{tables.as_markdown(*table(answer))}\n\n{below}"
 
 
 def as_csv(answer: Study) -> str:
@@ -114,23 +110,21 @@ def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
     return zip(answer.rows, answer.common.errors or [None] * len(answer.rows), strict=True)
 
 
-def rows(answer: Study) -> list[list[tables.Cell]]:
-    """Cells of the table of runs."""
-    return [
-        [
-            row.source,
-            row.tr,
-            None if row.tr_low is None or row.tr_high is None else f"{(row.tr_high - row.tr_low) / 2:.1e}",
-            row.td,
-            row.energy_td,
-            tables.measure(row.residual),
-            tables.measure(error),
-            row.basis,
-            row.status,
-            row.message or ", ".join(row.warnings),
-        ]
-        for row, error in with_errors(answer)
-    ]
+def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Give names of columns and cells of the runs."""
+    columns: dict[str, Callable[[tuple[StudyRow, float | None]], tables.Cell]] = {
+        "run": lambda one: one[0].source,
+        "tr": lambda one: one[0].tr,
+        "+-": lambda one: tables.half(one[0].tr_low, one[0].tr_high),
+        "td": lambda one: one[0].td,
+        "E(td)": lambda one: one[0].energy_td,
+        "R": lambda one: tables.measure(one[0].residual),
+        "at common": lambda one: tables.measure(one[1]),
+        "basis": lambda one: one[0].basis,
+        "status": lambda one: one[0].status,
+        "message": lambda one: one[0].message or ", ".join(one[0].warnings),
+    }
+    return tables.filled(columns, with_errors(answer))
 
 
 def outcome(answer: Study) -> list[tuple[str, str]]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.choice.candidates import MUCH_HIGHER
-from d2rpick.errors import name_units, printable
+from d2rpick.errors import name_units
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
 from d2rpick.report.situation import heading
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.ranking import Quality
@@ -51,21 +51,12 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
     later=("health", "kinetic_share_estimated", "modes", "unsigned_parts", "td_window", "expected", "quality",
            "quality_reasons"),
 ))  # fmt: skip
-HEAD = ("", "rank", "tr", "+-", "kind", "E(tr)/E(td)", "sign", "L", "R", "tolerance", "rigid", "verdict")
 
 
 def as_table(answer: Suggestion, limit: int) -> str:
     """The verdict, what it rests on, and the first ``limit`` candidates; the recommended row has a star."""
-    table = tables.as_text(HEAD, rows(answer, limit)) if answer.candidates else "no candidates"
-    said = [*verdict(answer), *outlook(answer)]
-    width = max(len(name) for name, _ in said)
-    lines = [
-        *(f"{name.ljust(width)}  {printable(text)}" for name, text in said),
-        "",
-        *heading(answer.situation),
-        "",
-        table,
-    ]
+    shown = tables.as_text(*table(answer, limit)) if answer.candidates else "no candidates"
+    lines = [*tables.in_line((*verdict(answer), *outlook(answer))), "", *heading(answer.situation), "", shown]
     left = len(answer.candidates) - limit
     if left > 0:
         lines.append(f"... and {left} more (--limit)")
@@ -74,8 +65,8 @@ def as_table(answer: Suggestion, limit: int) -> str:
 
 def as_markdown(answer: Suggestion, limit: int) -> str:
     """The candidates as a Markdown table, and the verdict below it."""
-    lines = [f"{name}: {tables.in_markdown(text)}" for name, text in (*verdict(answer), *outlook(answer))]
-    return "\n\n".join([tables.as_markdown(HEAD, rows(answer, limit)), *lines])
+    said = tables.listed((*verdict(answer), *outlook(answer)))
+    return "\n\n".join([tables.as_markdown(*table(answer, limit)), *said])
 
 
 def as_csv(answer: Suggestion) -> str:
@@ -205,25 +196,23 @@ def as_value(answer: Suggestion) -> str:
     return f"{pair.tr!r} {pair.td!r}" if answer.td_window else repr(pair.tr)
 
 
-def rows(answer: Suggestion, limit: int) -> list[list[tables.Cell]]:
-    """Cells of the first ``limit`` candidates, below ``HEAD``."""
-    return [
-        [
-            "*" if c.recommended else " ",
-            c.rank,
-            c.tr,
-            None if c.tr_low is None or c.tr_high is None else f"{(c.tr_high - c.tr_low) / 2:.1e}",
-            c.kind,
-            c.energy_ratio,
-            None if c.sign_match is None else "same" if c.sign_match else "opposite",
-            tables.measure(c.lock_in_error),
-            tables.measure(c.residual),
-            None if c.timing_tolerance is None else f"{c.timing_tolerance:.1e}",
-            c.rigid_time,
-            headline(answer) if c.recommended else "acceptable" if c.acceptable else c.notes[0],
-        ]
-        for c in answer.candidates[:limit]
-    ]
+def table(answer: Suggestion, limit: int) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Give names of columns and cells of the first ``limit`` candidates."""
+    columns: dict[str, Callable[[Candidate], tables.Cell]] = {
+        "": lambda c: "*" if c.recommended else " ",
+        "rank": lambda c: c.rank,
+        "tr": lambda c: c.tr,
+        "+-": lambda c: tables.half(c.tr_low, c.tr_high),
+        "kind": lambda c: c.kind,
+        "E(tr)/E(td)": lambda c: c.energy_ratio,
+        "sign": lambda c: {True: "same", False: "opposite", None: None}[c.sign_match],
+        "L": lambda c: tables.measure(c.lock_in_error),
+        "R": lambda c: tables.measure(c.residual),
+        "tolerance": lambda c: tables.shown(c.timing_tolerance, ".1e"),
+        "rigid": lambda c: c.rigid_time,
+        "verdict": lambda c: headline(answer) if c.recommended else "acceptable" if c.acceptable else c.notes[0],
+    }
+    return tables.filled(columns, answer.candidates[:limit])
 
 
 def _pair(pair: Pair | None) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from d2rpick.errors import UNSEEN, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
@@ -43,6 +43,16 @@ def measure(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
+def shown(value: float | None, form: str) -> str | None:
+    """Write a number in a form of Python's, as ``.0%``; None where it is not known."""
+    return None if value is None else format(value, form)
+
+
+def half(low: float | None, high: float | None) -> str | None:
+    """Write half the width of an interval, as it stands behind +-."""
+    return None if low is None or high is None else f"{(high - low) / 2:.1e}"
+
+
 def known(head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> tuple[list[str], list[list[Cell]]]:
     """Leave the columns out in which nothing is known.
 
@@ -53,6 +63,34 @@ def known(head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> tuple[list[str
     """
     kept = [i for i in range(len(head)) if any(row[i] not in (None, "", "-") for row in rows)]
     return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
+
+
+def filled(columns: Mapping[str, Callable[[Any], Cell]], things: Iterable[Any]) -> tuple[list[str], list[list[Cell]]]:
+    """Give the names of columns, and below them the cells of each thing.
+
+    Examples
+    --------
+    >>> filled({"word": str, "letters": len}, ["tr", "flight"])
+    (['word', 'letters'], [['tr', 2], ['flight', 6]])
+    """
+    return list(columns), [[cell(thing) for cell in columns.values()] for thing in things]
+
+
+def unstarred(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> tuple[list[str], list[list[Cell]]]:
+    """Leave out the first column, which has a star for what is recommended; ``±`` as it is written on a page."""
+    return [name.replace("+-", "±") for name in head[1:]], [list(row[1:]) for row in rows]
+
+
+def in_line(said: Iterable[tuple[str, Cell]], width: int = 0) -> list[str]:
+    """Write lines of a name, in so many letters or those of the longest, and what it stands for."""
+    lines = list(said)
+    width = width or max(len(name) for name, _ in lines)
+    return [f"{name.ljust(width)}  {short(value)}" for name, value in lines]
+
+
+def listed(said: Iterable[tuple[str, str]]) -> list[str]:
+    """Write the same as paragraphs of Markdown."""
+    return [f"{name}: {in_markdown(text)}" for name, text in said]
 
 
 def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]], width: int | None = None) -> str:

@@ -11,7 +11,7 @@ from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
 from d2rpick.report.situation import read_line
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from d2rpick.choice.trade_off import Offer, TradeOff
 
@@ -62,7 +62,6 @@ DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; time
     Field("offers", many(OFFER),
           "by ascending td: a grid, the peaks of the energy, the td asked for and the recommended one"),
 ))  # fmt: skip
-HEAD = ("", "td", "peak", "tr", "error", "level error", "K", "rigid", "of record", "run time", "tolerance", "quality")
 # A change of the rigid time below this share is none that people read.
 _NO_CHANGE: Final = 5e-4
 # An error that falls to about this share of itself is halved; much further, it is as good as gone.
@@ -72,8 +71,8 @@ _HALF: Final = (0.45, 0.5)
 def as_table(found: TradeOff, limit: int) -> str:
     """What was read, some ``limit`` of the offers that nothing beats, and the answer in a sentence."""
     shown = some_of(found, limit)
-    table = tables.as_text(HEAD, rows(shown)) if shown else "nothing to offer"
-    lines = [read_line(found.situation.history), *_heading(found), "", table]
+    offered = tables.as_text(*table(shown)) if shown else "nothing to offer"
+    lines = [read_line(found.situation.history), *_heading(found), "", offered]
     left = len(found.offers) - len(shown)
     if left:
         lines.append(f"... and {left} more td (--limit; csv and json have all)")
@@ -82,7 +81,7 @@ def as_table(found: TradeOff, limit: int) -> str:
 
 def as_markdown(found: TradeOff, limit: int) -> str:
     """The same offers as a Markdown table, and the answer below it."""
-    return "\n\n".join([tables.as_markdown(HEAD, rows(some_of(found, limit))), tables.in_markdown(answer(found))])
+    return "\n\n".join([tables.as_markdown(*table(some_of(found, limit))), tables.in_markdown(answer(found))])
 
 
 def as_csv(found: TradeOff) -> str:
@@ -167,22 +166,27 @@ def some_of(found: TradeOff, limit: int) -> list[Offer]:
     return [one for one in found.offers if one.td in named]
 
 
-def rows(offers: Sequence[Offer]) -> list[list[tables.Cell]]:
-    """Cells of some offers, below ``HEAD``; the recommended one has a star."""
-    return [
-        [
-            "*" if one.recommended else " ",
-            one.td,
-            "peak" if one.peak else "",
-            one.tr,
-            tables.measure(one.error),
-            tables.measure(one.best.level_error if one.best else None),
-            tables.measure(one.kinetic_share),
-            one.rigid_time,
-            f"{one.best.rigid_fraction:.1%}" if one.best else None,
-            f"{one.best.run_time_share:.0%}" if one.best and one.best.run_time_share is not None else None,
-            f"{one.best.timing_tolerance:.1e}" if one.best and one.best.timing_tolerance is not None else None,
-            one.quality.grade if one.quality else one.reason,
-        ]
-        for one in offers
-    ]
+def table(offers: Sequence[Offer]) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Give names of columns and cells of some offers; the recommended one has a star."""
+    return tables.filled(_COLUMNS, offers)
+
+
+def _of_best(key: str, form: str) -> Callable[[Offer], tables.Cell]:
+    """Show a measure of the best pair of an offer."""
+    return lambda one: tables.shown(getattr(one.best, key), form) if one.best else None
+
+
+_COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
+    "": lambda one: "*" if one.recommended else " ",
+    "td": lambda one: one.td,
+    "peak": lambda one: "peak" if one.peak else "",
+    "tr": lambda one: one.tr,
+    "error": lambda one: tables.measure(one.error),
+    "level error": lambda one: tables.measure(one.best.level_error if one.best else None),
+    "K": lambda one: tables.measure(one.kinetic_share),
+    "rigid": lambda one: one.rigid_time,
+    "of record": _of_best("rigid_fraction", ".1%"),
+    "run time": _of_best("run_time_share", ".0%"),
+    "tolerance": _of_best("timing_tolerance", ".1e"),
+    "quality": lambda one: one.quality.grade if one.quality else one.reason,
+}

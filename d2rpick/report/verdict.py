@@ -56,8 +56,7 @@ COMPARED = ("", "switched", "reference")
 
 def as_table(answer: Verdict) -> str:
     """The verdict and its reasons, what it rests on, and the measures of the pair."""
-    width = max(len(name) for name in MEASURES.plain(answer))
-    lines = [f"{name.ljust(width)}  {tables.short(value)}" for name, value in MEASURES.plain(answer).items()]
+    lines = tables.in_line(MEASURES.plain(answer).items())
     reasons = [f"  {printable(reason)}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.report.parts import HEAD, SET_HEAD
+from d2rpick.report.parts import COLUMNS, SET_COLUMNS
 from tests.choice.test_calibration import run_folder
 from tests.command import ROOT, answer, run
 from tests.json_schemas import check_by_schema
@@ -53,7 +53,7 @@ def test_the_tables_fit_a_screen_and_markdown_has_every_column() -> None:
         table = run("parts", "-q", *args).stdout
         assert max(map(len, table.splitlines()[3:])) <= 110  # below the names of files
     markdown = run("parts", "-q", "-f", "markdown", *WITH_DECK).stdout
-    assert all(f"| {name} |" in markdown for name in (*HEAD, *SET_HEAD))
+    assert all(f"| {name} |" in markdown for name in (*COLUMNS, *SET_COLUMNS))
 
 
 def test_without_a_set_to_take_every_form_is_an_objection() -> None:
