@@ -19,7 +19,7 @@ from d2rpick.histories.samples import window as within
 from d2rpick.vibration.modes import LARGEST_ENERGY
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.histories.history import Balance, History, Samples
     from d2rpick.histories.names import Part
@@ -128,55 +128,49 @@ def cautions_of_health(health: Health, *, at_rest: bool = False) -> Iterator[Cau
     Where nothing vibrates (``at_rest``) no level of the internal energy is matched, so hourglass does not matter.
     """
     up_to = "" if health.until is None else f" up to {health.until:.6g}"
-    if not at_rest:
-        yield from _of_hourglass(health, up_to)
-    low, high = health.energy_ratio_min, health.energy_ratio_max
-    if low is not None and high is not None and (low < 1 - MOST_IMBALANCE or high > 1 + MOST_IMBALANCE):
-        found = f"total energy over initial energy and external work ranges from {low:.3g} to {high:.3g}{up_to}"
-        yield Caution("energy-ratio", f"{found}: the run gains or loses energy")
-    if _above(health.negative_sliding_share, MOST_NEGATIVE_SLIDING):
-        share = f"{health.negative_sliding_share:.0%}"
-        yield Caution(
-            "negative-sliding",
-            f"contact energy falls to -{share} of the internal energy{up_to}: check for penetrations",
-        )
-    if _above(health.sliding_share, MOST_SLIDING):
-        found = f"contact energy reaches {health.sliding_share:.0%} of the internal energy{up_to}"
-        yield Caution("sliding", f"{found}; only friction can explain that")
-    if _above(health.eroded_share, MOST_WORK):
-        found = f"deleted elements hold {health.eroded_share:.0%} of the internal energy{up_to}"
-        yield Caution("eroded-energy", f"{found}: it counts as internal energy of the model but does not spring back")
-    yield from _of_window(health)
-
-
-def _of_hourglass(health: Health, up_to: str) -> Iterator[Caution]:
-    rest = "do not rely on the internal energy"
-    if _above(health.hourglass_share, MOST_HOURGLASS):
-        share = f"{health.hourglass_share:.0%}"
-        yield Caution("hourglass", f"hourglass energy reaches {share} of the internal energy{up_to}: {rest}")
-    if health.part and _above(health.part_hourglass_share, MOST_HOURGLASS):
-        found = f"hourglass energy of {health.part.name} reaches {health.part_hourglass_share:.0%}"
-        yield Caution("part-hourglass", f"{found} of its internal energy{up_to}: {rest}")
-
-
-def _of_window(health: Health) -> Iterator[Caution]:
-    if not health.window:
-        return
-    where = "from {:.6g} to {:.6g}".format(*health.window)
-    if health.window_reason:
-        yield Caution("window-not-judged", health.window_reason)
-    if _above(health.window_sliding, MOST_WORK):
-        found = f"contact energy of the model changes by {health.window_sliding:.0%} of the energy {where}"
-        yield Caution("contact-in-window", f"{found}: where the parts touch something, they do not fly freely")
-    if _above(health.window_work, MOST_WORK):
-        found = f"external work beyond gravity and damping is {health.window_work:.0%} of the energy {where}"
-        yield Caution("work-in-window", f"{found}: where it acts on the parts, they do not fly freely")
-    if _above(health.window_eroded, 0.0):
-        yield Caution("erosion", f"elements are eroded {where}; elements of rigid parts would not be")
+    where = "from {:.6g} to {:.6g}".format(*health.window) if health.window else ""
+    for code, holds, sentence in _ALARMS:
+        if holds(health) and not (at_rest and code.endswith("hourglass")):
+            yield Caution(code, sentence.format(h=health, up_to=up_to, where=where))
 
 
 def _above(value: float | None, limit: float) -> bool:
     return value is not None and value > limit
+
+
+def _gains_or_loses(health: Health) -> bool:
+    low, high = health.energy_ratio_min, health.energy_ratio_max
+    return low is not None and high is not None and (low < 1 - MOST_IMBALANCE or high > 1 + MOST_IMBALANCE)
+
+
+_UNRELIABLE: Final = "do not rely on the internal energy"
+# Codes of what should be known of a run, when it holds, and what is said then.
+_ALARMS: Final[Sequence[tuple[str, Callable[[Health], bool], str]]] = (
+    ("hourglass", lambda h: _above(h.hourglass_share, MOST_HOURGLASS),
+     f"hourglass energy reaches {{h.hourglass_share:.0%}} of the internal energy{{up_to}}: {_UNRELIABLE}"),
+    ("part-hourglass", lambda h: _above(h.part_hourglass_share, MOST_HOURGLASS),
+     ("hourglass energy of {h.part.name} reaches {h.part_hourglass_share:.0%} of its internal energy{up_to}: "
+     f"{_UNRELIABLE}")),
+    ("energy-ratio", _gains_or_loses,
+     ("total energy over initial energy and external work ranges from {h.energy_ratio_min:.3g} to "
+     "{h.energy_ratio_max:.3g}{up_to}: the run gains or loses energy")),
+    ("negative-sliding", lambda h: _above(h.negative_sliding_share, MOST_NEGATIVE_SLIDING),
+     "contact energy falls to -{h.negative_sliding_share:.0%} of the internal energy{up_to}: check for penetrations"),
+    ("sliding", lambda h: _above(h.sliding_share, MOST_SLIDING),
+     "contact energy reaches {h.sliding_share:.0%} of the internal energy{up_to}; only friction can explain that"),
+    ("eroded-energy", lambda h: _above(h.eroded_share, MOST_WORK),
+     ("deleted elements hold {h.eroded_share:.0%} of the internal energy{up_to}: it counts as internal energy of the "
+     "model but does not spring back")),
+    ("window-not-judged", lambda h: h.window_reason is not None, "{h.window_reason}"),
+    ("contact-in-window", lambda h: _above(h.window_sliding, MOST_WORK),
+     ("contact energy of the model changes by {h.window_sliding:.0%} of the energy {where}: where the parts touch "
+     "something, they do not fly freely")),
+    ("work-in-window", lambda h: _above(h.window_work, MOST_WORK),
+     ("external work beyond gravity and damping is {h.window_work:.0%} of the energy {where}: where it acts on the "
+     "parts, they do not fly freely")),
+    ("erosion", lambda h: _above(h.window_eroded, 0.0),
+     "elements are eroded {where}; elements of rigid parts would not be"),
+)  # fmt: skip
 
 
 def _peak(balance: Balance) -> float | None:
