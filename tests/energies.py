@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -11,6 +11,15 @@ from tests.command import ROLLOVER
 
 if TYPE_CHECKING:
     from d2rpick.choice.suggest import Suggestion
+
+
+T = TypeVar("T")
+
+
+def sure(value: T | None) -> T:
+    """Give what must be there."""
+    assert value is not None
+    return value
 
 
 def codes(answer: Suggestion) -> set[str]:

@@ -26,6 +26,7 @@ from d2rpick.histories.opening import Selection
 from d2rpick.vibration.modes import Mode, Modes
 from tests import chain
 from tests.command import ROLLOVER
+from tests.energies import sure
 from tests.paper import OMEGA_2
 from tests.reading import read_history
 from tests.records import ENERGY, MODE, TIME, noisy
@@ -168,16 +169,14 @@ def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it
     """On the level alone the level error grows by 0.05."""
     for history, asked in ((PAPER, Settings()), (PAPER, Settings(replay=False, after=0.005))):
         answer = suggest(history, TD, asked)
-        best = answer.chosen
-        assert best is not None
+        best = sure(answer.chosen)
         windows = alike_windows(answer.situation, answer.candidates, best, windows_of(answer))
         (around,) = (one for one in windows.tolist() if one[0] <= best.tr <= one[1])
         if best.timing_tolerance is not None:
             assert min(abs(end - best.tr) for end in around) == pytest.approx(best.timing_tolerance, rel=1e-3)
         ends = [verify(history, end, TD, asked).candidate for end in windows.ravel()]
         errors = [one.level_error if one.lock_in_error is None else one.lock_in_error for one in (best, *ends)]
-        assert errors[0] is not None
-        assert errors[1:] == pytest.approx([errors[0] + 0.05] * len(ends), abs=1e-6)
+        assert errors[1:] == pytest.approx([sure(errors[0]) + 0.05] * len(ends), abs=1e-6)
 
 
 def test_a_profile_is_short_where_the_error_is_smooth() -> None:

@@ -12,7 +12,7 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.choice.suggest_td import looking
 from d2rpick.vibration import measures
 from tests import paper
-from tests.energies import codes, of, rollover, vibration
+from tests.energies import codes, of, rollover, sure, vibration
 
 PLAIN = Settings()
 
@@ -43,8 +43,7 @@ def test_residual_is_made_of_lock_in_error_and_kinetic_share() -> None:
 def test_the_first_sample_counts_like_any_other() -> None:
     time = np.linspace(0, 1, 2001)
     answer = suggest(of(4 * np.cos(30 * time) ** 2, time), 6 * np.pi / 30, PLAIN)
-    assert answer.recommended is not None
-    assert answer.recommended.tr == pytest.approx(0.0, abs=1e-9)
+    assert sure(answer.recommended).tr == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_level_of_zero_is_met_once_by_each_passage() -> None:
@@ -66,8 +65,7 @@ def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates
 
 def test_crossings_during_the_trip_are_not_acceptable() -> None:
     answer = suggest(rollover(), 0.37, PLAIN)
-    start = answer.situation.flight.start
-    assert start is not None
+    start = sure(answer.situation.flight.start)
     early = [c for c in answer.candidates if c.tr < start]
     assert early
     assert not any(c.acceptable for c in early)
@@ -78,12 +76,9 @@ def test_margin_and_after_move_the_earliest_tr() -> None:
     plain = suggest(paper.history(), paper.TD, PLAIN)
     later = suggest(paper.history(), paper.TD, Settings(after=0.013))
     margin = suggest(paper.history(), paper.TD, Settings(after=0.013, margin=0.02))
-    assert plain.recommended is not None
-    assert later.recommended is not None
-    assert margin.recommended is not None
-    assert plain.recommended.tr == pytest.approx(0.0128853, abs=1e-6)
-    assert later.recommended.tr == pytest.approx(0.0247264, abs=1e-6)
-    assert margin.recommended.tr == pytest.approx(0.0383104, abs=1e-6)
+    assert sure(plain.recommended).tr == pytest.approx(0.0128853, abs=1e-6)
+    assert sure(later.recommended).tr == pytest.approx(0.0247264, abs=1e-6)
+    assert sure(margin.recommended).tr == pytest.approx(0.0383104, abs=1e-6)
     assert later.situation.flight.source == "given"
 
 

@@ -18,6 +18,7 @@ from d2rpick.histories.history import History, Track
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import BOX, ENERGY, OSCILLATOR, ROLLOVER, answer, run
 from tests.computed import results, stored
+from tests.energies import sure
 from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
@@ -393,46 +394,39 @@ def compared(run: str, *parts: str) -> Verdict:
 
 def test_the_parts_that_were_rigid_are_recognised_in_several_bodies() -> None:
     heavy = open_run(legs("car_heavy"), Selection())
-    rigid = rigid_parts(heavy, heavy.parts[:17], heavy.part_time, CAR_TR, CAR_TD)
-    assert rigid is not None
+    rigid = sure(rigid_parts(heavy, heavy.parts[:17], heavy.part_time, CAR_TR, CAR_TD))
     assert [part.title for part, one in zip(heavy.parts, rigid, strict=False) if one] == ["engine", "battery", "wheels"]
     every = open_run(legs("car_all"), Selection())
-    rigid = rigid_parts(every, every.parts[:17], every.part_time, CAR_TR, CAR_TD)
-    assert rigid is not None
+    rigid = sure(rigid_parts(every, every.parts[:17], every.part_time, CAR_TR, CAR_TD))
     assert rigid.all()
     assert rigid_parts(every, every.parts[:17], every.part_time, CAR_TR, CAR_TR + 5e-4) is None  # too few states
 
 
 def test_a_run_of_which_all_parts_were_rigid_is_judged_by_its_energy() -> None:
     """Computed: 0.947 of the mean energy of shells and beams until the landing, all parts without springs here."""
-    found = compared("car_all", "1-17").switched
-    assert found is not None
+    found = sure(compared("car_all", "1-17").switched)
     assert found.objections == ()
     assert found.mean_after / found.mean_after_reference == pytest.approx(0.957, abs=0.005)
 
 
 def test_parts_that_were_not_rigid_are_named() -> None:
-    found = compared("car_heavy", "11,12").switched
-    assert found is not None
+    found = sure(compared("car_heavy", "11,12").switched)
     assert "not rigid from tr 0.0496 to td 0.1464 in the switched run: bows" in found.objections
 
 
 def test_energies_that_are_reported_wrongly_do_not_enter_the_comparison() -> None:
     """The battery reports 70 400 J for 21; shells and beams keep 1.019 of their mean energy."""
-    found = compared("car_heavy", "1-17").switched
-    assert found is not None
+    found = sure(compared("car_heavy", "1-17").switched)
     assert found.mean_after / found.mean_after_reference == pytest.approx(1.019, abs=0.002)
     assert any(note.startswith("left out of the comparison: engine, battery, wheels,") for note in found.notes)
 
 
 @pytest.mark.parametrize("parts", [("12-14",), ()])
 def test_where_all_energies_are_reported_wrongly_only_the_motion_is_judged(parts: tuple[str, ...]) -> None:
-    found = compared("car_heavy", *parts).switched
-    assert found is not None
+    found = sure(compared("car_heavy", *parts).switched)
     (objection,) = found.objections
     assert objection.startswith("the energies of engine, battery, wheels are reported wrongly after td")
-    assert found.momentum_error is not None
-    assert found.momentum_error < 1e-5
+    assert sure(found.momentum_error) < 1e-5
     assert (parts == ()) == ("judged by the parts that were rigid: engine, battery, wheels" in found.notes)
 
 

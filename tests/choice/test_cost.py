@@ -17,6 +17,7 @@ from d2rpick.deck.formulations import ls_dyna, radioss
 from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
 from d2rpick.errors import ConfigurationError
+from tests.energies import sure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -58,8 +59,7 @@ def test_shares_of_parts_of_one_formulation_are_those_of_their_elements() -> Non
 @pytest.mark.parametrize(("layers", "extra"), [(1, 0), (3, 8), (5, 16), (None, 8)])
 def test_shells_cost_more_with_more_integration_points(layers: int | None, extra: int) -> None:
     """Four points in each layer, of which 3 are assumed; without a weight for points none counts."""
-    of_deck = radioss("shell", 12, 0, 0)
-    assert of_deck is not None
+    of_deck = sure(radioss("shell", 12, 0, 0))
     found = inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
     parts = {1: replace(found.parts[1], section=Section({"shell": of_deck}, layers=layers)), 2: found.parts[2]}
     found = replace(found, parts=parts)

@@ -19,6 +19,7 @@ from d2rpick.choice.verify import verify_at
 from d2rpick.histories.history import History
 from d2rpick.report.suggestion import as_table
 from d2rpick.rules.judgement import faults_of
+from tests.energies import sure
 
 if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
@@ -66,8 +67,7 @@ def test_up_to_the_limit_it_is_accepted_and_the_windows_end_there() -> None:
     assert levels[kept].max() <= most_energy(situation)
     within = np.abs(np.sqrt(levels / situation.energy_td) - 1) <= 0.2
     assert (kept == (within & (levels <= most_energy(situation)))).all()
-    found = expectation(situation, most_energy(situation))
-    assert found is not None
+    found = sure(expectation(situation, most_energy(situation)))
     assert found.ratio == pytest.approx(MOST_KEPT)
     inside = (windows[:, :1] <= grid) & (grid <= windows[:, 1:])
     assert (inside.any(axis=0) == kept).mean() > 0.999

@@ -15,6 +15,7 @@ from d2rpick.choice.of_run import read
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta
 from tests.computed import results, stored
+from tests.energies import sure
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -49,8 +50,7 @@ def test_the_landing_moves_by_the_amplitude_over_the_speed(
 
 def test_the_larger_of_share_and_spread_counts() -> None:
     history, flight = flying_oscillator(10.0, 1e-4, 1.0, 2.0)
-    assert flight.end is not None
-    assert margin_before_contact(history, flight)[:2] == (SHARE * flight.end, "flight")
+    assert margin_before_contact(history, flight)[:2] == (SHARE * sure(flight.end), "flight")
     history, flight = flying_oscillator(10.0, 0.1, 1.0, 2.0, periods=2)
     found = margin_before_contact(history, flight)
     assert (found.source, found.time) == ("landing", found.spread)

@@ -16,6 +16,7 @@ from d2rpick.histories.opening import open_run
 from d2rpick.report.situation import measures_of
 from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run
 from tests.computed import stored
+from tests.energies import sure
 from tests.made_t01 import t01, value
 
 if TYPE_CHECKING:
@@ -104,6 +105,7 @@ def test_a_term_with_a_state_that_is_no_number_is_unknown(tmp_path: Path) -> Non
         run_of = open_run([str(tmp_path / f"{name}T01")])
         balance = balance_of(run_of.databases, run_of.parts)
         assert balance is not None
+        balance = sure(balance_of(run_of, run_of.parts))
         assert (balance.hourglass is None, balance.kinetic is None) == (name == "damaged", False)
 
 
@@ -174,6 +176,8 @@ def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
     health = assess(balance_of(run_of.databases, run_of.parts) or Balance(TIME), (0.013, 0.064))
     assert health.window_work is not None
     assert health.window_work < 1e-3
+    health = assess(balance_of(run_of, run_of.parts) or Balance(TIME), (0.013, 0.064))
+    assert sure(health.window_work) < 1e-3
     assert not list(cautions_of_health(health))
 
 

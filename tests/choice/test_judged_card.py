@@ -12,6 +12,7 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.verify import verify
 from d2rpick.deck.printed_card import Printing
 from tests.command import ENERGY, GLSTAT
+from tests.energies import sure
 from tests.reading import read_history
 
 PAIR = (0.0135867, 0.0687534)
@@ -42,8 +43,7 @@ def test_each_window_has_its_verdict_in_the_comments() -> None:
     windows = [PAIR, (0.0939, 0.119)]
     history = read_history([GLSTAT])
     judge = partial(verify, history, settings=Settings())
-    found = judged_card(windows, history, judge, CardRequest(printing=Printing(part=(1,))))
-    assert found is not None
+    found = sure(judged_card(windows, history, judge, CardRequest(printing=Printing(part=(1,)))))
     card, verdicts = found
     assert card.windows == tuple(windows)
     assert [verdict.verified for verdict in verdicts] == [True, False]

@@ -25,7 +25,7 @@ from tests.choice.test_same_answers import made
 from tests.command import BOX, run
 from tests.computed import stored
 from tests.drops import drop, written
-from tests.energies import codes, of
+from tests.energies import codes, of, sure
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,8 +60,7 @@ def read_again(history: History, tr: float, td: float, asked: Settings) -> Verdi
 @pytest.mark.parametrize("td", [0.7, 0.8])
 def test_the_better_pair_is_what_is_said_of_its_td(td: float) -> None:
     history = made("five modes")
-    pair = suggest(history, td, PLAIN).better_pair
-    assert pair
+    pair = sure(suggest(history, td, PLAIN).better_pair)
     assert suggest(history, pair.td, PLAIN).recommended == pair
 
 
@@ -80,8 +79,7 @@ def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:
     asked = Settings(after=float(history.time[0]))
     answer = suggest(history, 0.8, asked)
     assert "at-rest" in codes(answer)
-    assert answer.recommended
-    assert read_again(history, *answer.recommended[:2], asked).verified
+    assert read_again(history, *sure(answer.recommended)[:2], asked).verified
 
 
 def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
@@ -128,8 +126,7 @@ def test_the_last_td_that_is_named_lies_in_the_flight(box: Reference, margin: fl
     asked, flights = Settings(margin=margin), plan_of(box, PLAIN).rows
     answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, asked)
     (message,) = (one.message for one in answer.cautions if one.code == "no-free-flight")
-    found = re.search(r"its last td is (\S+)$" if margin else r"to (\S+); td must lie in it$", message)
-    assert found
+    found = sure(re.search(r"its last td is (\S+)$" if margin else r"to (\S+); td must lie in it$", message))
     assert suggest(box.history, float(found[1]), asked).recommended
 
 
@@ -145,8 +142,7 @@ def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
 
 def test_an_error_that_is_refused_reads_as_too_large() -> None:
     history, td = made("one mode"), 0.8
-    best = suggest(history, td, PLAIN).chosen
-    assert best
+    best = sure(suggest(history, td, PLAIN).chosen)
     assert best.residual
     barely = Settings(max_residual=best.residual * (1 - 1e-6))
     (reason,) = (one for one in verify(history, best.tr, td, barely).reasons if "above the limit" in one)
@@ -167,8 +163,7 @@ def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it(tmp_path: Path) -> None
     rows = [row for row in plan_of(reference, PLAIN).rows if row.window]
     assert rows
     for row in rows:
-        assert row.window
-        flight = verify(reference.history, *row.window, PLAIN).situation.flight
+        flight = verify(reference.history, *sure(row.window), PLAIN).situation.flight
         assert (row.flight.source, row.flight.certain, row.start) == (flight.source, flight.certain, flight.start)
 
 
@@ -179,8 +174,7 @@ def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does(tmp_path: 
     save(file, time, energy)
     reference = read([str(file)])
     (row,) = plan_of(reference, asked).rows
-    assert row.window
-    flight = verify(reference.history, *row.window, asked).situation.flight
+    flight = verify(reference.history, *sure(row.window), asked).situation.flight
     assert row.flight == flight
     assert row.end == pytest.approx(0.8, abs=0.01)
     assert row.margin.source == "flight"
@@ -216,8 +210,7 @@ def test_a_plan_keeps_the_margin_that_it_lists(tmp_path: Path) -> None:
     rows = [row for row in plan_of(read([str(file)]), Settings(replay=False)).rows if row.window and row.flight.end]
     assert rows
     for row in rows:
-        assert row.window
-        assert row.window[1] <= row.end - row.margin.time
+        assert sure(row.window)[1] <= row.end - row.margin.time
 
 
 def test_a_crossing_at_the_start_of_the_flight_may_be_typed_as_it_is_read() -> None:

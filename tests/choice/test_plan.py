@@ -21,6 +21,7 @@ from d2rpick.histories.digits import first_as_read
 from d2rpick.histories.opening import Selection
 from tests.computed import stored
 from tests.drops import drop, written
+from tests.energies import sure
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -59,8 +60,7 @@ def test_the_first_fall_is_rigid_from_the_start_and_the_first_that_locks_in_ener
     plan: Plan,
 ) -> None:
     first, *others = [row for row in plan.rows if row.window]
-    assert first.window is not None
-    assert first.window[0] == 0.0
+    assert sure(first.window)[0] == 0.0
     assert (first.status, first.locks_in) == ("supported", False)
     assert others[0].status == "supported"
     assert others[0].locks_in
@@ -124,8 +124,7 @@ def test_a_switched_run_is_recognised_and_the_next_window_planned(
     assert found.windows()[0][0] > done[-1][1]
     for row in found.rows:
         if row.done:
-            assert row.done.moved is not None
-            assert abs(row.done.moved) <= row.margin.time
+            assert abs(sure(row.done.moved)) <= row.margin.time
             assert not row.done.landed_rigid
     landed = [row.done.landing for row in found.rows if row.done]
     contacts = [start for start, _ in drop(*done).landings]
@@ -160,14 +159,12 @@ def test_where_nothing_vibrates_td_lies_as_late_as_the_margin_allows(reference: 
     resting = [row for row in plan.rows if row.window and row.answer and row.answer.situation.at_rest]
     assert [row.number for row in resting] == [1]  # after it there is plastic work, and little vibration above it
     for row in resting:
-        assert row.window is not None
         room = max(row.margin.time, 2 * (row.margin.spread or 0.0))
-        assert row.window[1] == pytest.approx(row.end - room, abs=1e-5)
+        assert sure(row.window)[1] == pytest.approx(row.end - room, abs=1e-5)
     flight = resting[0].flight
     cut = reference.history.between(0, 0.9 * (flight.end or 0))[0].size  # a record that ends before the landing
     short = replace(reference.history, time=reference.history.time[:cut], energy=reference.history.energy[:cut])
-    found = suggest_in_window(short, (0.0, float(short.time[-1])), Settings(after=0.0)).recommended
-    assert found is not None
+    found = sure(suggest_in_window(short, (0.0, float(short.time[-1])), Settings(after=0.0)).recommended)
     assert short.time[-3] < found.td <= short.time[-2]
 
 
@@ -261,8 +258,7 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_fac
         assert row.window is None or first_as_read(row.start) <= row.window[0] < row.window[1] <= row.end
     assert all(one.end <= other.start for one, other in pairwise(plan.rows))
     if len(plan.rows) == 1 and plan.rows[0].window:
-        alone = suggest_of(reference, None, asked).recommended
-        assert alone is not None
+        alone = sure(suggest_of(reference, None, asked).recommended)
         assert plan.rows[0].window == (alone.tr, alone.td)
 
 
@@ -292,8 +288,7 @@ def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(c
     found = plan_of(car, PLAIN)
     assert statuses(found) == ["left-out", "supported"]
     assert "flight 2 behind it for 0.108: this window locks in energy" in (found.rows[0].reason or "")
-    longest = suggest_of(car, None, PLAIN).recommended
-    assert longest is not None
+    longest = sure(suggest_of(car, None, PLAIN).recommended)
     assert found.windows() == ((longest.tr, longest.td),)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.benchmarks.promise import BAD, CLASSES, tried
+from tests.energies import sure
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 )
 def test_what_was_upside_down_has_the_sign_of_td(name: str, number: int, tmp_path: Path) -> None:
     """The energy alone, or an oscillator about a preload, gave these pairs the other sign: residuals of 2."""
-    found = tried(CLASSES[name](np.random.default_rng([1, number])), tmp_path)
-    assert found is not None
+    found = sure(tried(CLASSES[name](np.random.default_rng([1, number])), tmp_path))
     assert found.kept
     assert found.true < BAD

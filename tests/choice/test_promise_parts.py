@@ -7,6 +7,7 @@ import pytest
 
 from d2rpick.choice.settings import Settings
 from tests.benchmarks.promise_parts import BAD, CLASSES, Motion, Record, Stated, counted, history, records, stated
+from tests.energies import sure
 
 
 @pytest.mark.parametrize("kind", CLASSES)
@@ -23,8 +24,7 @@ def test_two_planes_turn_no_pair_upside_down() -> None:
     forms = np.array([np.diag([0.97, 0.03, 0.0]), np.diag([0.0, 0.0, 0.5])])
     truth = Motion(7.7, 2 * np.pi * np.array([29.2, 70.1, 48.76]), np.array([2.95, 4.64, -0.82]), forms)
     time = np.arange(0, 0.4, 4e-4)
-    found = stated(Record(history(time, truth.energies(time)), Settings(after=0.0), (0.2, 0.38), truth.residual))
-    assert found is not None
+    found = sure(stated(Record(history(time, truth.energies(time)), Settings(after=0.0), (0.2, 0.38), truth.residual)))
     assert (found.basis, found.grade, found.within) == ("parts", "good", True)
     assert found.true < BAD
 

@@ -32,7 +32,7 @@ from d2rpick.report.suggestion import as_table
 from d2rpick.vibration.span import Fits
 from tests import paper
 from tests.computed import stored
-from tests.energies import codes, rollover
+from tests.energies import codes, rollover, sure
 from tests.records import ENERGY, TIME, vibration
 
 rows = st.lists(
@@ -93,10 +93,8 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
     known, found = Fits(), []
     for td in np.arange(0.141, 0.1502, 0.0007).tolist():
         situation = examine(car(parts), td, Settings(), known)
-        best = rank(find_candidates(situation)).chosen
-        assert best is not None
-        assert best.level_error is not None
-        assert best.level_error < 0.06
+        best = sure(rank(find_candidates(situation)).chosen)
+        assert sure(best.level_error) < 0.06
         found.append(best.tr)
     assert max(found) - min(found) < 3e-3
     assert min(found) > 0.0384  # the flight begins there
@@ -149,8 +147,7 @@ def test_the_residual_of_a_known_vibration_decides(td: float) -> None:
     answer = suggest(RECORD, td, Settings())
     if answer.chosen is None or answer.quality is None:
         return
-    residual = answer.chosen.residual
-    assert residual is not None
+    residual = sure(answer.chosen.residual)
     assert answer.quality.grade == ("good" if residual <= 0.2 else "fair" if residual <= 0.5 else "poor")
     assert bool(answer.quality.reasons) == (answer.quality.grade != "good")
 
@@ -162,8 +159,7 @@ def test_the_energy_alone_is_fair_at_best() -> None:
     assert grade(record, at_a_peak) == "good"
     assert grade(record, at_a_peak, replay=False, after=0.005) == "fair"
     answer = suggest(record, at_a_peak, Settings(replay=False, after=0.005))
-    assert answer.quality is not None
-    (reason,) = answer.quality.reasons
+    (reason,) = sure(answer.quality).reasons
     assert reason.startswith("the sign of the deformation is unknown, and with a wrong one")
 
 
@@ -193,8 +189,7 @@ def test_a_flight_that_is_not_certain_is_no_better_than_fair() -> None:
     energy = np.where(time < 0.2, 50 * (0.2 - time), 0) + waves
     answer = suggest(History(time, energy, ("x",), "made", "E"), 0.8, Settings())
     assert answer.situation.flight.source == "energy"
-    assert answer.quality is not None
-    assert answer.quality.grade in ("poor", "fair")
+    assert sure(answer.quality).grade in ("poor", "fair")
 
 
 def test_rest_is_good() -> None:
@@ -205,11 +200,8 @@ def test_rest_is_good() -> None:
 def test_a_pair_is_graded_the_same_whether_it_is_suggested_or_verified() -> None:
     for td in (0.064, 0.0687534, 0.07):
         answer = suggest(RECORD, td, Settings())
-        assert answer.recommended is not None
-        verdict = verify(RECORD, answer.recommended.tr, td, Settings())
-        assert verdict.quality is not None
-        assert answer.quality is not None
-        assert verdict.quality.grade == answer.quality.grade
+        verdict = verify(RECORD, sure(answer.recommended).tr, td, Settings())
+        assert sure(verdict.quality).grade == sure(answer.quality).grade
         assert quality_of(verdict.situation, verdict.candidate, None).grade in GRADES
     assert verify(RECORD, 0.02, 0.064, Settings()).quality is None
 
@@ -217,8 +209,7 @@ def test_a_pair_is_graded_the_same_whether_it_is_suggested_or_verified() -> None
 @given(st.integers(4, 40), st.integers(3, 30))
 def test_states_per_period_are_counted_over_whole_periods(states: int, periods: int) -> None:
     wave = 1 + np.sin(2 * np.pi * np.arange(states * periods) / states + 0.4)
-    found = states_per_period(wave)
-    assert found is not None
+    found = sure(states_per_period(wave))
     assert found == pytest.approx(states, rel=2 / periods)
     noise = 0.02 * np.random.default_rng(1).standard_normal(wave.size)
     noisy = states_per_period(wave + noise)
@@ -237,10 +228,9 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     found = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(after=0.25))
     assert found.situation.at_rest
     assert found.quality == Quality("good")
-    assert found.chosen is not None
     guessed = replace(found.situation, flight=found.situation.flight._replace(source="energy"))
     assert guessed.at_rest
-    assert quality_of(guessed, found.chosen, None) == Quality("fair", ("the flight is not certain",))
+    assert quality_of(guessed, sure(found.chosen), None) == Quality("fair", ("the flight is not certain",))
 
 
 @pytest.mark.parametrize("vibration", [0.05, 0.5, 2.6])
@@ -273,11 +263,9 @@ def test_what_a_wrong_sign_would_cost_is_told() -> None:
     time = np.linspace(0, 1, 801)
     energy = np.sum([np.sin(rate * time + rate) ** 2 for rate in (31.0, 47.0, 66.0)], axis=0)
     answer = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(replay=False, after=0.0))
-    assert answer.quality is not None
-    assert answer.expected is not None
-    cost = f"{(4 - 3 * answer.expected.kinetic_share) ** 0.5:.0%}"
+    cost = f"{(4 - 3 * sure(answer.expected).kinetic_share) ** 0.5:.0%}"
     told = f"the sign of the deformation is unknown, and with a wrong one the vibration after td is off by {cost}"
-    assert answer.quality.reasons == (told,)
+    assert sure(answer.quality).reasons == (told,)
 
 
 def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
@@ -288,11 +276,9 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
         best, quality = answer.chosen, answer.quality
         assert best is not None
         assert quality is not None
-        assert best.tr_high is not None
-        assert best.timing_tolerance is not None
         assert best.residual == pytest.approx(0, abs=1e-3)
         assert quality.grade == wanted
-        assert (best.tr_high - best.tr > 4 * best.timing_tolerance) is (wanted == "fair")
+        assert (sure(best.tr_high) - best.tr > 4 * sure(best.timing_tolerance)) is (wanted == "fair")
         verdict = verify(history, best.tr, answer.situation.td, Settings()).quality
         assert verdict == quality
     assert "further mode" not in as_table(early, 1)
@@ -334,8 +320,7 @@ def test_where_nothing_vibrates_there_is_no_residual() -> None:
     assert found.situation.vibration.unknown is None
     assert found.situation.at_rest
     assert found.situation.kinetic_share is None
-    best = found.chosen
-    assert best is not None
+    best = sure(found.chosen)
     assert (best.residual, best.sign_match, best.notes) == (None, None, ())
     assert found.quality == Quality("good")
     verdict = verify(found.situation.history, 0.7, 0.95, Settings(after=0.6))

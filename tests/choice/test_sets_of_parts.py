@@ -20,6 +20,7 @@ from d2rpick.vibration.measures import run_time_share
 from tests import made_car
 from tests.command import ROOT, answer, run
 from tests.computed import starter, stored
+from tests.energies import sure
 from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
 from tests.text_files import matsum_text
@@ -49,13 +50,11 @@ def test_parts_of_the_box_are_one_body_and_the_sled_is_rigid_already() -> None:
     found = asked(BOX, str(DECK))
     assert [(row.verdict, row.merge_with) for row in found.rows] == [("switch", None), ("merge", 1), ("keep", None)]
     assert found.rows[2].reasons == ("already rigid",)
-    best = found.recommended
-    assert best is not None
+    best = sure(found.recommended)
     assert (best.parts, best.bodies) == ((1, 2), ((1, 2),))
     assert best.step_growth == float("inf")
-    assert best.rigid_fraction is not None
     assert best.cost_share is not None
-    assert best.run_time_share == pytest.approx(run_time_share(best.rigid_fraction, best.cost_share, 1.0))
+    assert best.run_time_share == pytest.approx(run_time_share(sure(best.rigid_fraction), best.cost_share, 1.0))
 
 
 def variant(folder: Path, *changes: tuple[str, str]) -> str:
@@ -160,8 +159,7 @@ def test_savings_of_the_car_are_within_five_points_and_in_order(car: Parts) -> N
     run = (0.1464 - 0.0496) / 0.24  # the runs that were measured ended at 0.24
     predicted = {}
     for name, (per_step, saving) in measured.items():
-        share = found[name].cost_share
-        assert share is not None
+        share = sure(found[name].cost_share)
         assert share == pytest.approx(per_step, abs=0.08)
         predicted[name] = 1 - run_time_share(run, share, 1.0)
         assert predicted[name] == pytest.approx(saving, abs=0.05)

@@ -19,6 +19,7 @@ from d2rpick.histories.opening import Selection
 from tests import variants
 from tests.command import BOX
 from tests.computed import stored
+from tests.energies import sure
 from tests.reading import read_history
 
 ASKED = Question(variants.TD, Settings())
@@ -42,8 +43,7 @@ def test_a_row_says_what_suggest_says(tmp_path: Path) -> None:
     found = ask(ASKED, name)
     assert (found.status, found.message, found.basis, found.warnings) == ("ok", None, "oscillator", ())
     assert found.tr == pytest.approx(0.0135866683619825, rel=1e-6)
-    assert found.tr_low is not None
-    assert found.tr_low < 0.0135866683619825 < (found.tr_high or 0)
+    assert sure(found.tr_low) < 0.0135866683619825 < (found.tr_high or 0)
     assert found.energy_td == pytest.approx(6.05508394485761, rel=1e-6)
     assert found.files == ((str(tmp_path / "run.csv"), Path(name).stat().st_size, Path(name).stat().st_mtime_ns),)
 
@@ -107,9 +107,8 @@ def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(energies: tuple[s
     question = Question(0.238, Settings(), Selection(energy=energies))
     found = ask(question, name)
     answer = summarise(0.238, [found, found])
-    assert answer.common.tr is not None
     history = read_history([name], question.selection)
-    assert verify(history, answer.common.tr, 0.238, Settings()).verified
+    assert verify(history, sure(answer.common.tr), 0.238, Settings()).verified
 
 
 def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(tmp_path: Path) -> None:
@@ -201,8 +200,7 @@ def test_the_errors_at_the_common_tr_are_those_of_verify(tmp_path: Path) -> None
     names = variants.variants(tmp_path)
     for question in (ASKED, replace(ASKED, settings=Settings(replay=False, after=0.01))):
         answer = summarise(variants.TD, [ask(question, name) for name in names])
-        tr = answer.common.tr
-        assert tr is not None
+        tr = sure(answer.common.tr)
         for name, error in zip(names, answer.common.errors, strict=True):
             own = verify(read_history([name]), tr, variants.TD, question.settings).candidate.error
             assert error == pytest.approx(own, abs=1e-3)
@@ -217,9 +215,8 @@ def test_each_run_chooses_its_own_td_in_a_window(tmp_path: Path) -> None:
     times = [found.td for found in rows if found.td is not None]
     assert len(set(times)) == len(names)
     assert all(window[0] <= td <= window[1] for td in times)
-    assert answer.common.tr is not None
     for name, td in zip(names, times, strict=True):
-        assert verify(read_history([name]), answer.common.tr, td, Settings()).verified
+        assert verify(read_history([name]), sure(answer.common.tr), td, Settings()).verified
 
 
 def test_different_bases_and_units_are_told() -> None:

@@ -30,7 +30,7 @@ from tests import chain, paper
 from tests.command import ENERGY, ROLLOVER, answer, run
 from tests.computed import results, stored
 from tests.counted_fits import CountedFits
-from tests.energies import of
+from tests.energies import of, sure
 
 if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
@@ -50,8 +50,7 @@ def test_both_times_of_the_published_oscillator() -> None:
     assert found.recommended is not None
     assert found.recommended.td == pytest.approx(paper.BETTER_TD, abs=1e-8)
     assert found.recommended.tr == pytest.approx(paper.BETTER_TR, abs=1e-8)
-    assert found.recommended.residual is not None
-    assert found.recommended.residual < 1e-3
+    assert sure(found.recommended.residual) < 1e-3
     assert found.td_window == (0.06, 0.07)
     assert all(candidate.rigid_time > 1e-4 for candidate in found.candidates)  # td itself is none
 
@@ -110,9 +109,7 @@ def test_what_is_given_up_for_a_higher_level_is_told() -> None:
     energy = np.where(high, 1 + 0.3 * np.sin(5 * np.pi * time), 0.1 + 0.05 * np.sin(5 * np.pi * time))
     history = History(time, energy, source=("test",), format="csv", channel="E")
     found = suggest_in_window(history, (1.0, 9.5), Settings(after=0.05, replay=False))
-    assert found.recommended is not None
-    assert found.longer is not None
-    assert found.longer.rigid_time > 1.5 * found.recommended.rigid_time
+    assert sure(found.longer).rigid_time > 1.5 * sure(found.recommended).rigid_time
     lines = dict(outlook(found))
     assert "is given up for quality" in lines["longer"]
 
@@ -147,9 +144,8 @@ def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:
     history = History(time, energy, source=("test",), format="csv", channel="E")
     found = suggest_in_window(history, (8.0, 9.0), Settings(after=0.5))
     assert found.recommended is not None
-    assert found.expected is not None
     for t in (found.recommended.tr, found.recommended.td):
-        assert history.energy_at(t) <= 2 * found.expected.mean_energy
+        assert history.energy_at(t) <= 2 * sure(found.expected).mean_energy
 
 
 def test_a_known_oscillator_expects_nothing_of_the_energy_alone() -> None:
@@ -164,9 +160,8 @@ def test_a_window_outside_the_record_is_refused(window: tuple[float, float]) -> 
 
 def test_a_window_that_reaches_over_the_next_contact_ends_there() -> None:
     found = suggest_in_window(rollover(), (0.36, 0.43), PLAIN)
-    assert found.recommended is not None
     assert found.situation.flight.end == pytest.approx(0.3819, abs=1e-3)
-    assert found.recommended.td < 0.3819
+    assert sure(found.recommended).td < 0.3819
 
 
 def test_no_td_is_taken_before_a_window_that_the_margin_cuts_off() -> None:
@@ -180,8 +175,7 @@ def test_the_record_ends_before_the_flight_of_an_oscillator_is_left() -> None:
     energy = np.sin(2 * np.pi * time) ** 2 + np.where(time > 2.5, 40 * (time - 2.5), 0)
     history = History(time, energy, source=("test",), format="csv", channel="E")
     found = suggest_in_window(history, (2.0, 2.9), PLAIN)
-    assert found.recommended is not None
-    assert found.recommended.td == pytest.approx(2.25, abs=1e-3)
+    assert sure(found.recommended).td == pytest.approx(2.25, abs=1e-3)
 
 
 # ---- the computed rollover
@@ -210,12 +204,10 @@ def test_the_means_of_the_computed_car_are_expected() -> None:
     flying = [row for row in rows if float(row["tr_s"]) > 0.0386]
     assert len(flying) == 12
     for row in flying:
-        expected = expectation(situation, history.energy_at(float(row["tr_s"])))
-        assert expected is not None
+        expected = sure(expectation(situation, history.energy_at(float(row["tr_s"]))))
         computed = float(row["meanIEstruct_td_landing_ratio"])
         assert expected.ratio == pytest.approx(computed, abs=0.03)
-        assert expected.ratio_low is not None
-        assert expected.ratio_low < computed
+        assert sure(expected.ratio_low) < computed
 
 
 @pytest.mark.parametrize("alpha", [0.0, 1.0])
@@ -242,11 +234,8 @@ def test_what_many_modes_give_back_is_expected(alpha: float) -> None:
     after = (time > td) & (time < td + 0.2)
     released = deformations(np.array([tr])) * np.cos(rates[:, None] * (time[after] - td))
     switched = rest + np.mean(np.sum(released**2, axis=0) * np.exp(-alpha * (time[after] - td)))
-    expected = expectation(suggest(history, td, PLAIN).situation, float(locked))
-    assert expected is not None
-    assert expected.ratio_low is not None
-    assert expected.ratio is not None
-    assert expected.ratio_low < switched / energy[after].mean() < expected.ratio
+    expected = sure(expectation(suggest(history, td, PLAIN).situation, float(locked)))
+    assert sure(expected.ratio_low) < switched / energy[after].mean() < sure(expected.ratio)
     assert expected.resting_energy == pytest.approx(energy[time <= td].min())
 
 

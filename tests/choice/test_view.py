@@ -14,6 +14,7 @@ from d2rpick.choice.view import view
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import History
 from tests.command import ENERGY
+from tests.energies import sure
 from tests.reading import read_history
 
 TIME = np.linspace(0, 10, 1001)
@@ -71,11 +72,9 @@ def test_the_motion_is_that_of_the_record_until_tr_rigid_then_and_continuous() -
     situation = examine(read_history([ENERGY]), 0.064, Settings())
     tr = 0.0128853
     time = np.linspace(0.0, 0.1, 4001)
-    motion = replayed_motion(situation, tr, time)
-    assert motion is not None
+    motion = sure(replayed_motion(situation, tr, time))
     states = np.linspace(0.0, 0.1, 1001)  # those of the record
-    whole = replayed_motion(situation, tr, states)
-    assert whole is not None
+    whole = sure(replayed_motion(situation, tr, states))
     np.testing.assert_allclose(whole.reference**2, situation.history.energies_at(states), rtol=1e-5, atol=1e-6)
     before, rigid = time <= tr, (time >= tr) & (time <= 0.064)
     np.testing.assert_array_equal(motion.switched[before], motion.reference[before])
