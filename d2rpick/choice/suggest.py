@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.choice.candidates import find_candidates
@@ -52,20 +53,16 @@ class AcceptableWindow(NamedTuple):
 class Suggestion:
     """Answer of ``suggest``: ranked candidates, the recommended pair, a better one at another td, warnings.
 
-    ``windows`` are those of acceptable tr, on basis "energy", ``td_window`` is where td was chosen, if it was;
-    ``expected`` what the energy alone tells of the time after td.  ``longer`` is the longest acceptable pair in that
-    window, where much saving was given up for quality.
+    ``td_window`` is where td was chosen, if it was; ``longer`` is the longest acceptable pair in it, where much saving
+    was given up for quality.
     """
 
     situation: Situation
     candidates: Candidates
-    recommended: Pair | None
     better_pair: Pair | None
     cautions: tuple[Caution, ...]
     health: Health | None = None
     td_window: tuple[float, float] | None = None
-    expected: Expectation | None = None
-    windows: tuple[AcceptableWindow, ...] | None = None
     longer: Pair | None = None
 
     @property
@@ -79,15 +76,37 @@ class Suggestion:
         return "; ".join(one.message for one in self.cautions if one.code == "no-candidate")
 
     @property
+    def recommended(self) -> Pair | None:
+        """The recommended pair."""
+        best = self.chosen
+        return Pair(best.tr, self.situation.td, best.residual) if best else None
+
+    @cached_property
+    def expected(self) -> Expectation | None:
+        """What the energy alone tells of the time after td, where it is all there is."""
+        if self.situation.basis != "energy":
+            return None
+        from d2rpick.choice.expectation import expectation  # not above: an oscillator does without it
+
+        return expectation(self.situation, self.chosen.energy if self.chosen else None)
+
+    @cached_property
     def acceptable_windows(self) -> tuple[tuple[float, float], ...]:
         """First and last acceptable tr of each window of them, on any basis [time]."""
-        if self.windows is not None:
-            return tuple((one.start, one.end) for one in self.windows)
-        from d2rpick.choice.acceptable_windows import acceptable_windows  # not above: a table does without it
+        if not self.situation.in_flight:
+            return ()
+        from d2rpick.choice.acceptable_windows import acceptable_windows  # not above: an oscillator does without it
 
-        best = self.recommended
-        found = acceptable_windows(self.situation, self.candidates, best.tr if best else None).tolist()
-        return tuple((start, end) for start, end in found)
+        found = acceptable_windows(self.situation, self.candidates, self.chosen.tr if self.chosen else None)
+        return tuple((start, end) for start, end in found.tolist())
+
+    @cached_property
+    def windows(self) -> tuple[AcceptableWindow, ...] | None:
+        """The same where the level alone decides, None on another basis: any tr in one is as good as a crossing."""
+        if self.situation.basis != "energy":
+            return None
+        flown = self.situation.td - (self.situation.earliest_tr or 0.0)
+        return tuple(AcceptableWindow(low, high, (high - low) / flown) for low, high in self.acceptable_windows)
 
     @property
     def quality(self) -> Quality | None:
@@ -132,10 +151,7 @@ def suggest_at(situation: Situation, *, with_better: bool = True, found: Candida
         cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
     if with_better and not better:
         cautions.append(Caution("no-better-td", "no peak of the energy in the flight has an acceptable tr"))
-    recommended = Pair(best.tr, situation.td, best.residual) if best else None
-    expected = _expected(situation, best)
-    windows = _windows(situation, candidates, best)
-    return Suggestion(situation, candidates, recommended, better, tuple(cautions), expected=expected, windows=windows)
+    return Suggestion(situation, candidates, better, tuple(cautions))
 
 
 def find_better_pair(situation: Situation) -> Pair | None:
@@ -172,30 +188,6 @@ def _saving(situation: Situation) -> Candidate | None:
 def _anew(situation: Situation, td: float) -> Situation:
     """Look at the same record for another td, as if that had been asked for."""
     return examine(situation.history, td, situation.settings, situation.fits)
-
-
-def _expected(situation: Situation, best: Candidate | None) -> Expectation | None:
-    """What the level alone lets expect after td, where it is all there is."""
-    if situation.basis != "energy":
-        return None
-    from d2rpick.choice.expectation import expectation  # not above: an oscillator does without it
-
-    return expectation(situation, best.energy if best else None)
-
-
-def _windows(
-    situation: Situation, candidates: Candidates, best: Candidate | None
-) -> tuple[AcceptableWindow, ...] | None:
-    """Windows of acceptable tr where the level alone decides: any tr in one is as good as a crossing."""
-    if situation.basis != "energy":
-        return None
-    start = situation.earliest_tr
-    if start is None or not situation.in_flight:
-        return ()
-    from d2rpick.choice.acceptable_windows import acceptable_windows  # not above: an oscillator does without it
-
-    found = acceptable_windows(situation, candidates, best.tr if best else None).tolist()
-    return tuple(AcceptableWindow(low, high, (high - low) / (situation.td - start)) for low, high in found)
 
 
 def _holds_as_printed(situation: Situation, tr: float, td: float) -> bool:
