@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.histories.history import Given, History
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import from_mode, lacking_energy
 from tests import paper
 
 if TYPE_CHECKING:
-    from d2rpick.histories.history import Samples
+    from d2rpick.histories.history import Balance, Momenta, Samples
     from d2rpick.vibration.modes import Modes
 
 # y - z = -V0 exp(-alpha t/2) sin(omega t)/omega, eq. (7), with V0 = 6 m/s and k = 660e3 N/m
@@ -24,6 +25,11 @@ def vibration(parameters: Samples) -> Mode:
     """Mode without plastic work and preload, from omega, alpha, cosine and sine."""
     omega, alpha, cosine, sine = parameters.tolist()
     return Mode(omega, alpha, cosine, sine, 0.0)
+
+
+def table(time: Samples, energy: Samples, *momenta: Momenta, balance: Balance | None = None) -> History:
+    """A record of an energy, with momenta and energies of the model where there are any."""
+    return History(time, energy, ("made.csv",), "csv", "E", evidence=Given(momenta, balance))
 
 
 def printed(values: Samples, digits: int = 6) -> Samples:
