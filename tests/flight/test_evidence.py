@@ -26,6 +26,7 @@ from d2rpick.models.files import BOX_WRITERS
 from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, run
 from tests.computed import columns, stored
 from tests.json_schemas import check_by_schema
+from tests.records import table
 from tests.sample_box import t01
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(rolled
     whole = open_run([str(rolled.files["glstat"])]).history(Selection())
     assert whole.balance
     silent = Balance(whole.time, sliding=whole.balance.sliding, external_work=whole.balance.external_work)
-    history = History(whole.time, whole.energy, ("run",), "made", "E", evidence=Given((), silent))
+    history = table(whole.time, whole.energy, balance=silent)
     flight = examine(history, rolled.end - 0.01, Settings()).flight
     assert flight.source == "contact-energy"
     assert (flight.start, flight.end) == pytest.approx((rolled.start, rolled.end), abs=MILLISECOND)
@@ -142,7 +143,7 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(rolled: Roll
     whole = open_run([str(rolled.files["glstat"])]).history(Selection())
     assert whole.balance
     parts = {name: getattr(whole.balance, name) for name in ("internal", "kinetic", "external_work", "precision")}
-    history = History(whole.time, whole.energy, ("run",), "made", "E", evidence=Given((), Balance(whole.time, **parts)))
+    history = table(whole.time, whole.energy, balance=Balance(whole.time, **parts))
     flight = examine(history, (rolled.start + rolled.end) / 2, Settings(replay=False)).flight
     assert flight.source == "energy-balance"
     assert flight.start is not None
@@ -154,7 +155,7 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(rolled: Roll
 
 def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(rolled: Rolled) -> None:
     whole = open_run([str(rolled.files["csv"])]).history(Selection())
-    history = History(whole.time, whole.energy, ("run",), "made", "E")
+    history = table(whole.time, whole.energy)
     td = rolled.end - 0.01
     found = suggest(history, td, Settings(replay=False))
     if found.recommended:
@@ -199,7 +200,7 @@ def test_in_a_free_fall_there_is_nothing_to_match() -> None:
     assert found.windows
     assert found.windows[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
     assert all(verify(history, tr, 0.2838, Settings()).verified for tr in (0.0, 0.1, 0.28))
-    alone = suggest(History(history.time, history.energy, ("drop",), "csv", "E"), 0.2838, Settings())
+    alone = suggest(table(history.time, history.energy), 0.2838, Settings())
     assert alone.recommended
     assert alone.recommended.tr == 0.0
 
@@ -217,7 +218,7 @@ def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
     source: str, energy: str, start: float, end: float, share: float
 ) -> None:
     time, values = columns(source, energy)
-    quiet = quiet_time(History(time, values, (source,), "csv", energy), start + share * (end - start))
+    quiet = quiet_time(table(time, values), start + share * (end - start))
     assert quiet is None or quiet.start >= start
 
 
@@ -225,7 +226,7 @@ def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.85, 0.95, 0.98])
 def test_the_energy_alone_of_a_tumbling_box_never_begins_before_an_impact(part: str, share: float) -> None:
     whole = history_of(DROP, part)
-    history = History(whole.time, whole.energy, ("drop",), "csv", "E")
+    history = table(whole.time, whole.energy)
     for start, end in ((0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)):
         quiet = quiet_time(history, start + share * (end - start))
         assert quiet is None or quiet.start >= start
@@ -236,7 +237,7 @@ def test_a_contact_between_two_flights_on_one_level_ends_the_first() -> None:
     load = 400 * np.exp(-(((time - 0.2) / 0.05) ** 2))
     contact = 80 * np.exp(-(((time - 0.8) / 0.01) ** 2))  # brief, in the last quarter before td
     energy = 190 + 5 * np.sin(250 * time) + load + contact
-    quiet = quiet_time(History(time, np.where(time < 0.1, 0, energy), ("run",), "csv", "E"), 0.95)
+    quiet = quiet_time(table(time, np.where(time < 0.1, 0, energy)), 0.95)
     assert quiet
     assert quiet.start > 0.81
 
@@ -246,7 +247,7 @@ def test_what_stays_of_a_contact_energy_is_no_flight_where_a_load_of_another_kin
     touched = np.where(time < 0.2, 5 * time, 1.0)
     for work, flies in ((np.zeros_like(time), True), (40 * np.maximum(0, time - 0.5), False)):
         balance = Balance(time, sliding=touched, external_work=work, kinetic=np.full_like(time, 10.0))
-        history = History(time, 1 + 0.3 * np.sin(200 * time), ("run",), "made", "E", evidence=Given((), balance))
+        history = table(time, 1 + 0.3 * np.sin(200 * time), balance=balance)
         assert examine(history, 0.9, Settings(replay=False)).in_flight is flies
 
 

@@ -13,10 +13,10 @@ from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around
-from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Precision
+from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision
 from d2rpick.histories.names import Part
 from tests.benchmarks import flights as campaign
-from tests.records import printed
+from tests.records import printed, table
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -37,8 +37,7 @@ def momenta(*columns: Samples, masses: tuple[float, ...] = (10.0, 4.0), axis: in
 
 def totals(internal: Samples, kinetic: Samples, **terms: Samples) -> History:
     """A table of energies."""
-    evidence = Given((), Balance(TIME, internal, kinetic, **terms))  # type: ignore[arg-type]
-    return History(TIME, internal, ("totals.csv",), "csv", "E", evidence=evidence)
+    return table(TIME, internal, balance=Balance(TIME, internal, kinetic, **terms))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("load", campaign.CLASSES)
@@ -194,7 +193,7 @@ def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor() -> No
 
 def test_the_landing_is_found_where_the_end_of_the_load_is_given() -> None:
     ringing = 2 + np.sin(300 * TIME) ** 2
-    history = History(TIME, ringing + 500 * np.maximum(TIME - 0.6, 0), ("run.csv",), "csv", "E")
+    history = table(TIME, ringing + 500 * np.maximum(TIME - 0.6, 0))
     for td in (0.5, 0.8):
         flight = examine(history, td, Settings(after=0.1, replay=False)).flight
         assert flight.end == pytest.approx(0.6, abs=0.01)
@@ -204,7 +203,7 @@ def test_the_landing_is_found_where_the_end_of_the_load_is_given() -> None:
 def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_it_begins() -> None:
     hit = np.clip((TIME - 0.5) / 0.02, 0, 5)
     both = momenta(np.where(TIME < 0.1, 10 * np.sin(60 * TIME), 10 * np.sin(6)) - hit**1.5)
-    history = History(TIME, 1 + np.sin(300 * TIME) ** 2, ("made",), "made", "E", evidence=Given((both,)))
+    history = table(TIME, 1 + np.sin(300 * TIME) ** 2, both)
     flight = examine(history, 0.3, Settings(after=0.7, replay=False)).flight
     assert flight.start is None
     assert flight.refusal

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.histories.history import History
 from d2rpick.vibration import measures
 from d2rpick.vibration.identify import identify_several
 from d2rpick.vibration.model import Evidence, energy_at
 from d2rpick.vibration.modes import Mode, Modes
 from d2rpick.vibration.moments import Moment, Moments, Profile
 from d2rpick.vibration.span import Span
+from tests.records import table
 
 MODE = Mode(omega=2 * np.pi, alpha=0.2, cosine=0.0, sine=1.0, origin=0.0)
 TD = 5.1
@@ -54,7 +54,7 @@ def test_an_error_that_grows_at_once_leaves_the_way_to_the_next_time() -> None:
 def test_a_td_at_which_two_modes_set_in_has_nothing_before_it_to_compare() -> None:
     modes = Modes((Mode(8.0, 0.05, 1.0, 0.4, 0.0), Mode(19.0, 0.05, 0.3, 0.6, 0.0)))
     time = np.linspace(0.0, 6.0, 1201)
-    history = History(time, np.asarray(modes.energy(time)), ("made",), "made", "energy")
+    history = table(time, np.asarray(modes.energy(time)))
     fit = identify_several(time, history.energy)
     vibration = energy_at(history, 2.0, Evidence(fit, Span(2.0, 6.0)))
     crossings = vibration.moments(0.2)

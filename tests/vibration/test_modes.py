@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,14 +13,18 @@ from scipy.optimize import approx_fprime
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest
-from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, identify_several
 from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual
 from d2rpick.vibration.modes import Mode, Modes, sum_and_jacobian
 from tests import chain, paper
 from tests.command import ROLLOVER
 from tests.computed import columns
-from tests.records import MODE, noisy, printed, replayed_residual
+from tests.records import MODE, noisy, printed, replayed_residual, table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from d2rpick.histories.history import Samples
 
 MODES = st.builds(
     Mode,
@@ -30,6 +36,10 @@ MODES = st.builds(
     energy_plastic=st.floats(0, 3),
     preload=st.floats(-3, 3),
 )
+SEVERAL = st.builds(
+    lambda rates, alpha, sine: Modes(tuple(Mode(rate, alpha, 1.0 + i, sine, 0.0) for i, rate in enumerate(rates))),
+    st.lists(st.floats(0.5, 50), min_size=2, max_size=3, unique=True), st.floats(0, 5), st.floats(-2, 2),
+)  # fmt: skip
 T = np.linspace(-0.5, 2.0, 101)
 
 
@@ -61,28 +71,35 @@ def test_the_level_of_a_peak_is_crossed_before_it_but_not_at_it() -> None:
     assert max(crossings) < peak - 1e-3
 
 
+def slope(function: Callable[[Samples], Samples], mode: Mode | Modes) -> tuple[Samples, float]:
+    """Its central difference at T, and how exact that is for energies of the mode."""
+    rate = mode.fastest + mode.alpha
+    h = 1e-5 / rate
+    return (function(T + h) - function(T - h)) / (2 * h), 1e-6 * rate * float(np.max(mode.energy(T)) + 1e-9)
+
+
 @given(MODES)
 def test_velocity_is_the_slope_of_the_deformation(mode: Mode) -> None:
-    h = 1e-5 / (mode.omega + mode.alpha)
-    slope = (mode.deformation(T + h) - mode.deformation(T - h)) / (2 * h)
-    np.testing.assert_allclose(slope, mode.velocity(T), atol=1e-7 * np.max(np.abs(mode.velocity(T))))
-
-
-@given(MODES)
-def test_energy_is_plastic_and_elastic_and_its_slope_2_q_velocity(mode: Mode) -> None:
+    found, _ = slope(mode.deformation, mode)
+    np.testing.assert_allclose(found, mode.velocity(T), atol=1e-7 * np.max(np.abs(mode.velocity(T))))
     np.testing.assert_array_equal(mode.energy(T), mode.energy_plastic + mode.deformation(T) ** 2)
-    h = 1e-5 / (mode.omega + mode.alpha)
-    slope = (mode.energy(T + h) - mode.energy(T - h)) / (2 * h)
-    expected = 2 * mode.deformation(T) * mode.velocity(T)
-    np.testing.assert_allclose(slope, expected, atol=1e-6 * (mode.omega + mode.alpha) * np.max(mode.energy(T)))
 
 
-@given(MODES)
-def test_damping_takes_twice_alpha_times_the_kinetic_energy(mode: Mode) -> None:
-    h = 1e-5 / (mode.omega + mode.alpha)
-    slope = (mode.vibration_energy(T + h) - mode.vibration_energy(T - h)) / (2 * h)
-    scale = (mode.omega + mode.alpha) * np.max(mode.vibration_energy(T))
-    np.testing.assert_allclose(slope, -2 * mode.alpha * mode.kinetic_energy(T), atol=1e-6 * scale)
+@given(MODES | SEVERAL)
+def test_energies_are_those_of_their_modes_and_damping_takes_them(mode: Mode | Modes) -> None:
+    found, room = slope(mode.energy, mode)
+    np.testing.assert_allclose(found, mode.energy_slopes(T)[0], atol=room)
+    elastic, kinetic = np.sum((mode.amplitudes(T) - mode.preload) ** 2, axis=0), mode.kinetic_energy(T)
+    np.testing.assert_allclose(mode.vibration_energy(T), elastic + kinetic, rtol=1e-9, atol=1e-12)
+    found, _ = slope(mode.vibration_energy, mode)
+    scale = (mode.fastest + mode.alpha) * np.max(mode.vibration_energy(T))
+    np.testing.assert_allclose(found, -2 * mode.alpha * kinetic, atol=1e-6 * scale)
+
+
+@given(MODES | SEVERAL)
+def test_the_second_slope_of_an_energy_is_that_of_its_first(mode: Mode | Modes) -> None:
+    found, room = slope(lambda t: mode.energy_slopes(t)[0], mode)
+    np.testing.assert_allclose(found, mode.energy_slopes(T)[1], atol=10 * room * (mode.fastest + mode.alpha))
 
 
 @given(MODES)
@@ -142,29 +159,6 @@ def random_modes(rng: np.random.Generator, count: int) -> Modes:
 
 
 TWO = random_modes(np.random.default_rng(5), 2)
-
-
-def of(modes: Modes) -> History:
-    return History(TIME, modes.energy(TIME), source=("test",), format="csv", channel="E")
-
-
-# ---- closed form
-
-
-def test_energies_add_up_and_decay_by_the_damping() -> None:
-    np.testing.assert_allclose(TWO.energy(TIME), np.sum(TWO.amplitudes(TIME) ** 2, axis=0), rtol=1e-13)
-    np.testing.assert_allclose(TWO.vibration_energy(TIME), TWO.energy(TIME) + TWO.kinetic_energy(TIME), rtol=1e-12)
-    h = 1e-5
-    slope = (TWO.vibration_energy(TIME + h) - TWO.vibration_energy(TIME - h)) / (2 * h)
-    np.testing.assert_allclose(slope, -2 * TWO.alpha * TWO.kinetic_energy(TIME), atol=1e-6)
-
-
-def test_slopes_are_those_of_the_energy() -> None:
-    first, second = TWO.energy_slopes(TIME)
-    h = 1e-5
-    np.testing.assert_allclose((TWO.energy(TIME + h) - TWO.energy(TIME - h)) / (2 * h), first, atol=1e-5)
-    before, after = TWO.energy_slopes(TIME - h)[0], TWO.energy_slopes(TIME + h)[0]
-    np.testing.assert_allclose((after - before) / (2 * h), second, atol=1e-3)
 
 
 def test_crossings_and_extrema_are_where_the_energy_says() -> None:
@@ -257,7 +251,7 @@ def test_records_without_several_modes_say_so(time: np.ndarray, energy: np.ndarr
 
 
 def test_several_modes_are_chosen_by_and_replayed() -> None:
-    answer = suggest(of(TWO), TWO.peaks(4.0, 5.0)[0], Settings(tolerance=0.5))
+    answer = suggest(table(TIME, TWO.energy(TIME)), TWO.peaks(4.0, 5.0)[0], Settings(tolerance=0.5))
     situation = answer.situation
     assert (situation.basis, situation.evidence.fit and situation.evidence.fit.describes_record) == ("oscillator", True)
     assert isinstance(situation.vibration.whole.mode, Modes)
@@ -279,10 +273,6 @@ def test_the_total_energy_of_the_chain_tells_its_two_modes() -> None:
     for run in chain.scan():
         there = situation.at(run["td_s"])
         assert there.vibration.whole.mode is not None
-        errors.append(
-            abs(
-                float(replayed_residual(there.vibration.whole.mode, np.array([run["tr_s"]]), there.td)[0])
-                - run["R_sim"]
-            )
-        )
+        told = replayed_residual(there.vibration.whole.mode, np.array([run["tr_s"]]), there.td)
+        errors.append(abs(float(told[0]) - run["R_sim"]))
     assert max(errors) < 0.025

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
-from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, identify_several, judge_given
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.span import Fits, Span, described_span, span_of
 from tests import paper
-from tests.records import ENERGY, MODE, TIME, noisy
+from tests.records import ENERGY, MODE, TIME, noisy, table
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import History
 
 
 def of(energy: np.ndarray) -> History:
-    return History(TIME, energy, source=("test",), format="csv", channel="E")
+    return table(TIME, energy)
 
 
 def by_convolution(energy: np.ndarray, anchor: float) -> tuple[float, float]:

@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.histories.history import History
 from d2rpick.vibration.swings import count_swings
+from tests.records import table
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -71,7 +71,7 @@ def test_noise_and_too_few_swings_are_not_counted() -> None:
 @pytest.mark.parametrize("lifted", [0.0 * TIME, 5.0 + 0.01 * TIME])
 def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) -> None:
     x, energy = stiffening(1.0, 0.02)
-    record = History(TIME, energy + lifted, ("made",), "made", "E")
+    record = table(TIME, energy + lifted)
     for td in (20.0, 23.0, 27.5):
         answer = suggest(record, td, Settings(after=2.0))
         assert answer.situation.basis == "swings"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,17 +11,13 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.histories.history import History, Precision
+from d2rpick.histories.history import Precision
 from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Mode, Modes
 from d2rpick.vibration.uncertainty import curvature, fitted_reach, reach, residual_bound, resolved, sampled_reach
 from tests.benchmarks.identification import small_second_modes
-from tests.records import ENERGY, TIME, noisy, printed, replayed_residual
-
-
-def rounded(values: np.ndarray, digits: int) -> np.ndarray:
-    return np.array([float(f"{value:.{digits - 1}e}") for value in values])
+from tests.records import ENERGY, TIME, noisy, printed, replayed_residual, table
 
 
 def random_mode(rng: np.random.Generator) -> Mode:
@@ -37,10 +35,9 @@ def covered(samples_per_period: int, digits: int, *, jitter: float, runs: int) -
         time = step * (np.arange(6 * samples_per_period) + jitter * rng.uniform(-0.5, 0.5, 6 * samples_per_period))
         td = float(rng.uniform(4, 5))
         true = [t for level in (1, -1) for t in mode.crossings(level * float(mode.deformation(td)), time[0], td - step)]
-        printed = Precision(digits=digits)
-        history = History(
-            rounded(time, digits), rounded(mode.energy(time), digits), source=("test",), format="csv", channel="E",
-            time_precision=printed, energy_precision=printed,
+        history = replace(
+            table(printed(time, digits), printed(mode.energy(time), digits)),
+            time_precision=Precision(digits), energy_precision=Precision(digits),
         )  # fmt: skip
         times, rises = find_crossings(history.time, history.energy, history.energy_at(td))
         times = times[times < td - step]
@@ -76,7 +73,7 @@ def test_intervals_of_a_fit_hold_the_true_crossing() -> None:
         mode = random_mode(rng)
         time = np.arange(0, 6, 1 / 40)
         noise = 0.01 * float(np.max(mode.energy(time))) * rng.normal(size=time.size)
-        history = History(time, mode.energy(time) + noise, source=("test",), format="csv", channel="E")
+        history = table(time, mode.energy(time) + noise)
         fit = identify(history.time, history.energy)
         if not fit.describes_record or not isinstance(fit.mode, Mode):
             continue
@@ -100,7 +97,7 @@ def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(sample
         other = Mode(2 * np.pi * rng.uniform(1.6, 2.7), main.alpha, 0.04 * rng.normal(), 0.04 * rng.normal(), 0.0)
         both = Modes((main, other))
         time = np.arange(0, 6, 1 / samples_per_period)
-        history = History(time, both.energy(time), source=("test",), format="csv", channel="E")
+        history = table(time, both.energy(time))
         found = suggest(history, 4.3, Settings(after=0.0))
         true = np.array(both.level_crossings(4.3, 0.0))
         sharp = [c for c in found.candidates if c.kind == "crossing" and (c.timing_tolerance or 0) < 0.02]
@@ -115,7 +112,7 @@ def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(sample
 
 def test_an_interval_from_samples_grows_by_what_the_level_is_off_them() -> None:
     time = np.linspace(0, 1, 101)
-    history = History(time, 3 * time, source=("test",), format="csv", channel="E")
+    history = table(time, 3 * time)
     (exact,), (off,) = (sampled_reach(history, np.array([0.3]), 0.755, 2.265 + error) for error in (0.0, 0.009))
     assert off - exact == pytest.approx(0.009 / 3)
 
@@ -192,7 +189,7 @@ def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
 
 def test_candidates_state_how_large_their_residual_may_be() -> None:
     energy = noisy(MAIN.energy(TIMES), 0.03, seed=3)
-    found = suggest(History(TIMES, energy, source=("test",), format="csv", channel="E"), 5.3, Settings(after=0.0))
+    found = suggest(table(TIMES, energy), 5.3, Settings(after=0.0))
     assert found.candidates
     for one in found.candidates:
         assert one.residual is not None
