@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from hypothesis import strategies as st
 
 from d2rpick.histories.history import Given, History
 from d2rpick.vibration.modes import Mode
@@ -17,6 +18,15 @@ if TYPE_CHECKING:
 
 # y - z = -V0 exp(-alpha t/2) sin(omega t)/omega, eq. (7), with V0 = 6 m/s and k = 660e3 N/m
 MODE = Mode(paper.OMEGA_2, 50.0, 0.0, -6.0 / paper.OMEGA_2 * (660e3 / 2) ** 0.5, 0.0)
+MODES = st.builds(
+    Mode,
+    omega=st.floats(1, 50),
+    alpha=st.floats(0, 2),
+    cosine=st.floats(-2, 2),
+    sine=st.floats(0.1, 2),
+    origin=st.floats(-1, 1),
+    preload=st.one_of(st.just(0.0), st.floats(-1, 1)),
+)
 TIME: Samples = np.linspace(0.0, 0.15, 1501)
 ENERGY: Samples = MODE.energy(TIME)
 

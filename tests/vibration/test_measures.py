@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.vibration import measures
-from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import from_mode, to_mode
 from d2rpick.vibration.replay import Replay
 from tests import paper
-from tests.records import replayed_residual
+from tests.records import MODES, replayed_residual
 
-modes = st.builds(
-    Mode,
-    omega=st.floats(1, 50),
-    alpha=st.floats(0, 2),
-    cosine=st.floats(-2, 2),
-    sine=st.floats(0.1, 2),
-    origin=st.floats(-1, 1),
-    preload=st.one_of(st.just(0.0), st.floats(-1, 1)),
-)
+if TYPE_CHECKING:
+    from d2rpick.vibration.modes import Mode
 
 
 @settings(max_examples=80, deadline=None)
-@given(modes, st.floats(0, 3), st.floats(0, 3))
+@given(MODES, st.floats(0, 3), st.floats(0, 3))
 def test_measures_by_formula_are_those_of_the_motion(mode: Mode, tr: float, window: float) -> None:
     td = tr + window
     oscillator, start = from_mode(mode, tr)
@@ -53,7 +47,7 @@ def test_the_published_pair_loses_nearly_all_vibration() -> None:
 
 
 @settings(max_examples=60, deadline=None)
-@given(modes, st.floats(0, 3), st.floats(0, 3))
+@given(MODES, st.floats(0, 3), st.floats(0, 3))
 def test_the_timing_tolerance_is_where_the_error_has_grown(mode: Mode, tr: float, window: float) -> None:
     td = tr + window
     assume(float(mode.vibration_energy(td)) > 1e-6)

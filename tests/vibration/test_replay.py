@@ -12,16 +12,7 @@ from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import Oscillator, State, from_mode, to_mode
 from d2rpick.vibration.replay import Replay, trajectory
 from tests import paper
-
-modes = st.builds(
-    Mode,
-    omega=st.floats(1, 50),
-    alpha=st.floats(0, 2),
-    cosine=st.floats(-2, 2),
-    sine=st.floats(0.1, 2),
-    origin=st.floats(-1, 1),
-    preload=st.one_of(st.just(0.0), st.floats(-1, 1)),
-)
+from tests.records import MODES
 
 
 @pytest.mark.parametrize(
@@ -52,7 +43,7 @@ def test_the_spring_back_is_the_published_formula() -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(modes, st.floats(0, 3), st.floats(0.01, 2))
+@given(MODES, st.floats(0, 3), st.floats(0.01, 2))
 def test_the_residual_stays_what_it_is_at_td_while_nothing_damps(mode: Mode, tr: float, window: float) -> None:
     still = Mode(mode.omega, 0.0, mode.cosine, mode.sine, mode.origin)
     oscillator, start = from_mode(still, tr)
