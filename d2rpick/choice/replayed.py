@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.oscillator import State, from_mode
-from d2rpick.vibration.replay import Replay
+from d2rpick.vibration.oscillator import Replay, State, from_mode
 
 if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation

@@ -16,7 +16,7 @@ from d2rpick.histories.digits import sum_as_read
 from d2rpick.histories.samples import window
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, describing, doubtful, energy_at, model_at
-from d2rpick.vibration.span import Fits, Span, described_span, identify_within, span_of
+from d2rpick.vibration.span import Fits, Span, described_span, span_of
 from d2rpick.vibration.uncertainty import resolved
 
 if TYPE_CHECKING:
@@ -229,7 +229,7 @@ def _oscillator(
         bounds = bounds._replace(start=min(settings.after, td))
     if settings.fit_window:
         history.check(*settings.fit_window, argument="fit_window")
-        fit = identify_within(history, Span(*settings.fit_window))
+        fit = identify(*history.between(*settings.fit_window))
         return _resolved(history, fit, fits), span_of(history, td, fit, bounds) if fit.describes_record else None
     if settings.oscillator:
         given = fits.remembered("given", partial(judge_given, settings.oscillator))

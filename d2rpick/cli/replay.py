@@ -57,7 +57,7 @@ def command(
     """
     from d2rpick.histories.opening import format_of
     from d2rpick.models import files
-    from d2rpick.vibration.replay import Replay, trajectory
+    from d2rpick.vibration.oscillator import Replay, trajectory
 
     start = _start(**options)
     oscillator = shared.oscillator({**options, "v0": float(start.vz)})

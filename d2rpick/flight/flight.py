@@ -45,9 +45,9 @@ class Flight(NamedTuple):
     ``start`` is given up for safety.  ``described``: one oscillator describes the energy in it.
     """
 
-    start: float | None
-    end: float | None
-    source: str | None
+    start: float | None = None
+    end: float | None = None
+    source: str | None = None
     parts: tuple[Part, ...] | None = None
     damping: float = 0.0
     refusal: str | None = None
@@ -124,8 +124,8 @@ class Seen(NamedTuple):
     ``held``: supports do, which hold also where the end of the load is given.
     """
 
-    flight: FreeFlight | None
-    source: str | None
+    flight: FreeFlight | None = None
+    source: str | None = None
     refusal: str | None = None
     doubts: tuple[str, ...] = ()
     held: bool = False
@@ -138,35 +138,31 @@ def find_flight(history: History, td: float, after: float | None, seen: Seen, sp
     oscillator describes.
     """
     if seen.held:
-        return Flight(None, None, None, refusal=seen.refusal)
+        return Flight(refusal=seen.refusal)
     if seen.flight:
         first, last, parts, end_seen, damping, gravity = seen.flight
         given = after is not None and not (seen.refusal and first > td)
         start, source = (after, "given") if given else (first, seen.source)
         if given and start is not None and start >= last:
             landed = f"the {_spoken(seen.source)} shows that the flight had ended at {last:.6g}, before `after`"
-            return Flight(None, None, None, refusal=seen.refusal or landed, doubts=seen.doubts)
+            return Flight(refusal=seen.refusal or landed, doubts=seen.doubts)
         end = last if end_seen else None
         return Flight(
             start, end, source, parts, damping, seen.refusal, seen.doubts, gravity=gravity, described=span is not None
         )
     if after is not None:
-        ends = [
-            span.end if span and span.end < history.time[-1] else None,
-            None if span else landing_after(history, after),
-        ]
-        end = min(filter(None, ends), default=None)
+        end = landing_after(history, after) if span is None else span.end if span.end < history.time[-1] else None
         return Flight(after, None if seen.refusal else end, "given", refusal=seen.refusal, doubts=seen.doubts)
     if seen.refusal:
-        return Flight(None, None, None, refusal=seen.refusal, doubts=seen.doubts)
+        return Flight(refusal=seen.refusal, doubts=seen.doubts)
     quiet = None if span else quiet_time(history, td)
     found = span or quiet
     if found is None:
-        return Flight(None, None, None)
+        return Flight()
     end = found.end if found.end is not None and found.end < history.time[-1] else None
     refusal = _fed(history, found.start, td if quiet else found.end or td)
     if refusal:
-        return Flight(None, None, None, refusal=refusal)
+        return Flight(refusal=refusal)
     if span:
         return Flight(found.start, end, "oscillator", described=True)
     known = history.balance is not None and history.balance.kinetic_and_internal is not None
@@ -205,7 +201,7 @@ def seen_flight(history: History, td: float) -> Seen:
     if held is None:
         return _seen(history, td)
     seen = None if history.parts else _seen(history, td)
-    return seen if seen and seen.flight and seen.flight.parts else Seen(None, None, held, held=True)
+    return seen if seen and seen.flight and seen.flight.parts else Seen(refusal=held, held=True)
 
 
 def _seen(history: History, td: float) -> Seen:
@@ -219,7 +215,7 @@ def _seen(history: History, td: float) -> Seen:
             doubts = tuple(f"the {source} shows a flight there, but {refusal}" for source, _ in found)
             return _nearest(witness, td, refusal, doubts)
     if not found:
-        return Seen(None, None)
+        return Seen()
     return history.known.once(("confirmed", *found), lambda: _confirmed(history, found))  # many td lie in the same
 
 
@@ -334,7 +330,7 @@ def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> See
     source, best = found[0]
     refusal = _driven(history, source, best)
     if refusal:
-        return Seen(None, None, refusal)
+        return Seen(refusal=refusal)
     start, end, end_seen = best.start, best.end, best.end_seen
     doubts = []
     room = max(_SAME * (end - start), _SAME_STATES * history.step)

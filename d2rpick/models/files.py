@@ -12,8 +12,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.opening import Table
     from d2rpick.models.box_run import Record
-    from d2rpick.vibration.oscillator import Oscillator
-    from d2rpick.vibration.replay import Trajectory
+    from d2rpick.vibration.oscillator import Oscillator, Trajectory
 
 
 def oscillator_table(motion: Trajectory) -> Table:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.vibration import measures
-from d2rpick.vibration.oscillator import Oscillator, State, to_mode
-from d2rpick.vibration.replay import Replay
+from d2rpick.vibration.oscillator import Oscillator, Replay, State, to_mode
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -20,7 +20,7 @@ from d2rpick.models.published import (
     residual,
     switched,
 )
-from d2rpick.vibration.replay import integrated
+from d2rpick.vibration.oscillator import integrated
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

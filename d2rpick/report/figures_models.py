@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from d2rpick.models.box_run import Record, RigidWindow
     from d2rpick.models.box_scan import Outcome
     from d2rpick.models.published_figures import Exhibit, Panel
-    from d2rpick.vibration.replay import Replay, Trajectory
+    from d2rpick.vibration.oscillator import Replay, Trajectory
 
 
 # Okabe and Ito's palette goes on.

@@ -7,7 +7,8 @@ module are that paper's.  Frame mass ``m`` with displacement ``z``, suspended ma
 The closed forms here take any initial state.  They split the motion into the centre of mass, which damping
 alone slows down, and the spring deformation ``r = y - z`` with ``r'' + alpha r' + omega_0^2 r = 0``.  The
 paper's formulas (7) are the case z = y = y' = 0, z' = V0; its spring-back (18) is the free motion that starts
-from the frozen deformation with both masses at one speed.
+from the frozen deformation with both masses at one speed.  A `Replay` runs it through tr and td, in closed form or,
+independent of it, step by step.
 """
 
 from __future__ import annotations
@@ -23,8 +24,6 @@ from d2rpick.vibration.modes import LARGEST_ENERGY, Mode
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-    from d2rpick.histories.history import Samples
 
 
 # in quotes: numpy.typing costs start-up
@@ -215,13 +214,13 @@ def _drift(alpha: float, t: Values) -> Values:
     return np.where(np.abs(damping) < 1e-8, t * (1 - damping / 2), -np.expm1(-damping) / (alpha or 1.0))
 
 
-def lacking_energy(oscillator: Oscillator, reference: State, switched: State) -> Samples:
+def lacking_energy(oscillator: Oscillator, reference: State, switched: State) -> Values:
     """Energy of the vibration that ``switched`` lacks against ``reference``, states at td, numbers or arrays."""
     lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
     return oscillator.vibration_energy(lack)
 
 
-def from_mode(mode: Mode, time: Samples | float) -> tuple[Oscillator, State]:
+def from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]:
     """Give an oscillator whose deformation is that of ``mode`` about its preload, and its state at ``time``.
 
     An energy history tells neither masses nor the motion of the whole; they are chosen so that the deformation
@@ -249,3 +248,124 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
     if not abs(sine) <= sqrt(LARGEST_ENERGY):
         raise RangeError(f"v0 is {v0:g}: it gives energies above {LARGEST_ENERGY:g}; choose units of moderate numbers")
     return Mode(omega=omega, alpha=oscillator.alpha, cosine=0.0, sine=sine, origin=0.0)
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Motion from ``start`` at time ``origin`` on, rigid from ``tr`` to ``td``; RangeError unless origin <= tr <= td.
+
+    Times in the unit of the run.
+    """
+
+    oscillator: Oscillator
+    start: State
+    origin: float
+    tr: float
+    td: float
+
+    def __post_init__(self) -> None:
+        if not self.origin <= self.tr <= self.td:
+            raise RangeError(
+                f"tr {self.tr:g} and td {self.td:g} must be in this order after the start at {self.origin:g}"
+            )
+
+    def reference(self, time: Values | float) -> State:
+        """States of the run without switching at ``time`` (7)."""
+        return self.oscillator.free(self.start, np.asarray(time) - self.origin)
+
+    def motion(self, time: Values | float) -> State:
+        """States of the switched run at ``time``: free (7), rigid (9)-(12), free again (18).
+
+        At tr itself the state after the switch.
+        """
+        time = np.asarray(time, dtype=np.float64)
+        released = self.oscillator.rigid(self.reference(self.tr), self.td - self.tr)
+        phases = (
+            self.reference(np.minimum(time, self.tr)),
+            self.oscillator.rigid(self.reference(self.tr), np.clip(time - self.tr, 0, self.td - self.tr)),
+            self.oscillator.free(released, np.maximum(time - self.td, 0)),
+        )
+        phase = np.where(time < self.tr, 0, np.where(time < self.td, 1, 2))
+        return State(*(np.choose(phase, values) for values in zip(*phases, strict=True)))
+
+    def residual(self) -> float:
+        """Energy norm of what the switched run lacks at td, over that of the reference vibration [-]."""
+        reference = self.reference(self.td)
+        lack = lacking_energy(self.oscillator, reference, self.motion(self.td))
+        return float(np.sqrt(lack / self.oscillator.vibration_energy(reference)))
+
+
+class Trajectory(NamedTuple):
+    """Motion on an even grid of ``time`` (n,): ``state`` and both energies, arrays of the same shape."""
+
+    time: Values
+    state: State
+    internal_energy: Values
+    kinetic_energy: Values
+
+
+def trajectory(
+    oscillator: Oscillator, start: State, t_end: float, dt: float, switched: Replay | None = None
+) -> Trajectory:
+    """Compute the motion at 0, dt, 2 dt, ... up to ``t_end``, of ``switched`` where it is given [time].
+
+    Times are rounded to the 14th digit of ``t_end``, so that a multiple of dt meets the switch time that is
+    written the same.
+    """
+    count = int(np.floor(t_end / dt * (1 + 1e-12))) + 1
+    with np.errstate(all="ignore"):
+        time = np.round(dt * np.arange(count), 13 - int(np.floor(np.log10(t_end))))
+        state = oscillator.free_on_grid(start, dt, count) if switched is None else switched.motion(time)
+        motion = Trajectory(time, state, oscillator.internal_energy(state), oscillator.kinetic_energy(state))
+    if not all(np.isfinite(column).all() for column in (time, *state, motion.internal_energy, motion.kinetic_energy)):
+        raise RangeError("the motion exceeds the range of numbers; choose units that give moderate numbers")
+    return motion
+
+
+# Of each step, relative and absolute: far below what a figure shows, far above rounding.
+_RELATIVE, _ABSOLUTE = 1e-11, 1e-14
+
+
+def integrated(switched: Replay, time: Values) -> State:
+    """Integrate the equations of motion (1) through a switched run and give its states at ``time``.
+
+    Free up to tr; rigid up to td, when both masses have the velocity that keeps the momentum and only damping acts;
+    then free again from what that leaves.  An explicit Runge-Kutta method of order 8 (scipy's DOP853) knows nothing of
+    the closed forms.
+
+    Parameters
+    ----------
+    switched : Replay
+        Oscillator, start and switch times.
+    time : array of shape (n,)
+        Ascending, from the start on [time].
+
+    Returns
+    -------
+    State
+        Arrays of shape (n,); at tr and td the state before the switch.
+    """
+    from scipy.integrate import solve_ivp
+
+    o = switched.oscillator
+    masses = np.array([o.frame_mass, o.mass])
+
+    def free(_: float, x: Values) -> Values:
+        force = o.stiffness * (x[1] - x[0])
+        return np.concatenate([x[2:], np.array([force, -force]) / masses - o.alpha * x[2:]])
+
+    def rigid(_: float, x: Values) -> Values:
+        return np.concatenate([x[2:], -o.alpha * x[2:]])
+
+    x = np.array(switched.start, dtype=np.float64)
+    found = np.empty((4, time.size))
+    bounds = (switched.origin, switched.tr, switched.td, max(switched.td, float(time[-1])))
+    for phase, (motion, start, end) in enumerate(zip((free, rigid, free), bounds, bounds[1:], strict=False)):
+        if phase == 1:
+            x[2:] = masses @ x[2:] / masses.sum()  # (8)
+        steps = solve_ivp(motion, (start, end), x, "DOP853", dense_output=True, rtol=_RELATIVE, atol=_ABSOLUTE)
+        inside = (time >= start) & (time <= end)
+        if inside.any():
+            found[:, inside] = steps.sol(time[inside])
+        x = steps.y[:, -1]
+    return State(*found)

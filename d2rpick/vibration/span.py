@@ -125,11 +125,6 @@ def _means(values: Samples, first: int, behind: int, ahead: int) -> Samples:
     return np.asarray((sums[high - begin] - sums[low - begin]) / (behind + 1 + ahead))
 
 
-def identify_within(history: History, window: Span) -> Identification:
-    """Identify the oscillator from the samples in a window."""
-    return identify(*history.between(*window))
-
-
 def _windows(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
     """Windows to try: around td, the longest first, then before td."""
     start, end = bounds

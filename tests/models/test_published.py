@@ -12,8 +12,7 @@ from d2rpick.models import published, published_box, published_figures, saving
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.published import MISPRINTS, table
 from d2rpick.report.figures_models import draw_exhibit
-from d2rpick.vibration.oscillator import Oscillator, State
-from d2rpick.vibration.replay import Replay, integrated
+from d2rpick.vibration.oscillator import Oscillator, Replay, State, integrated
 from tests import paper
 from tests.command import ENERGY, ROOT, answer, run
 from tests.json_schemas import check_by_schema

@@ -10,8 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.vibration import measures
-from d2rpick.vibration.oscillator import from_mode, to_mode
-from d2rpick.vibration.replay import Replay
+from d2rpick.vibration.oscillator import Replay, from_mode, to_mode
 from tests import paper
 from tests.records import MODES, replayed_residual
 
