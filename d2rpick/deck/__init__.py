@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.deck.parts import Parts, read_parts
 from d2rpick.deck.reader import Deck, read_deck
-from d2rpick.deck.switching import SwitchSet, read_switching
-from d2rpick.deck.windows import Window, Windows, find_windows
+from d2rpick.deck.switching import SwitchSet, Window, Windows, find_windows, read_switching
 
 if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory

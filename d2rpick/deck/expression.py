@@ -7,6 +7,7 @@ Source: LS-DYNA Vol I R17, pages 36-7 to 36-9, as quoted by a converter (seconda
 from __future__ import annotations
 
 import math
+import operator
 import re
 from typing import TYPE_CHECKING, Final
 
@@ -45,8 +46,8 @@ def number(text: str) -> Number:
         raise ExpressionError(f"{text[:_LONGEST]!r} is not a number")
     mantissa, exponent = found[1], found[2] or found[3]
     if exponent is None and "." not in mantissa:
-        return _bounded(int(mantissa))
-    return _finite(float(f"{mantissa}e{exponent or 0}"))
+        return _checked(int(mantissa))
+    return _checked(float(f"{mantissa}e{exponent or 0}"))
 
 
 def names_in(text: str) -> tuple[str, ...]:
@@ -112,6 +113,21 @@ _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., Number]]]] = {
 _CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi}
 
 
+def _quotient(x: Number, y: Number) -> Number:
+    if isinstance(x, int) and isinstance(y, int):
+        whole = abs(x) // abs(y)
+        return whole if (x < 0) == (y < 0) else -whole
+    return x / y
+
+
+_OPERATIONS: Final[dict[str, Callable[[Number, Number], Number]]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": _quotient,
+}
+
+
 class _Parser:
     """Recursive descent: sum = product {± product}; product = power {*/ power}; power = signed [** power]."""
 
@@ -131,20 +147,18 @@ class _Parser:
         self.depth += 1
         if self.depth > _DEEPEST:
             raise ExpressionError(f"an expression is nested deeper than {_DEEPEST} levels")
-        value = self.product()
-        while self.tokens[0] in ("+", "-"):
-            sign = self.tokens.pop(0)
-            other = self.product()
-            value = _checked(value + other if sign == "+" else value - other)
+        value = self.chain(self.product, "+", "-")
         self.depth -= 1
         return value
 
     def product(self) -> Number:
-        value = self.power()
-        while self.tokens[0] in ("*", "/"):
+        return self.chain(self.power, "*", "/")
+
+    def chain(self, operand: Callable[[], Number], *signs: str) -> Number:
+        value = operand()
+        while self.tokens[0] in signs:
             sign = self.tokens.pop(0)
-            other = self.power()
-            value = _checked(value * other if sign == "*" else _quotient(value, other))
+            value = _checked(_OPERATIONS[sign](value, operand()))
         return value
 
     def power(self) -> Number:
@@ -156,9 +170,7 @@ class _Parser:
         exponent = self.power() if self.depth <= _DEEPEST else self.signed()
         self.depth -= 1
         result = math.pow(base, exponent)
-        if isinstance(base, int) and isinstance(exponent, int):
-            return _bounded(int(result))
-        return _finite(result)
+        return _checked(int(result) if isinstance(base, int) and isinstance(exponent, int) else result)
 
     def signed(self) -> Number:
         negative = False
@@ -220,24 +232,9 @@ def _tokens(text: str) -> Iterator[str]:
         position = found.end()
 
 
-def _quotient(x: Number, y: Number) -> Number:
-    if isinstance(x, int) and isinstance(y, int):
-        whole = abs(x) // abs(y)
-        return whole if (x < 0) == (y < 0) else -whole
-    return x / y
-
-
 def _checked(value: Number) -> Number:
-    return _bounded(value) if isinstance(value, int) else _finite(value)
-
-
-def _bounded(value: int) -> int:
-    if abs(value) >= _INTEGER_LIMIT:
+    if isinstance(value, int) and abs(value) >= _INTEGER_LIMIT:
         raise ExpressionError("an integer leaves the 64-bit range")
-    return value
-
-
-def _finite(value: float) -> float:
     if not math.isfinite(value):
         raise ExpressionError("a number leaves the range of doubles")
     return value

@@ -259,6 +259,7 @@ class Mesh(NamedTuple):
     @classmethod
     def of(cls, blocks: Sequence[tuple[str, Places, Places]], ids: Places, coordinates: Reals) -> Mesh:
         """Put together blocks of elements (kind, parts, node ids) and all nodes with coordinates."""
+        blocks = [one for one in blocks if len(one[1])]
         kinds = sorted({(kind, nodes.shape[1]) for kind, _, nodes in blocks})
         alike = [[one for one in blocks if (one[0], one[2].shape[1]) == kind] for kind in kinds]
         nodes = [np.concatenate([own for _, _, own in those]) for those in alike]

@@ -21,14 +21,14 @@ from d2rpick.deck.radioss_starter import SOLIDS
 from d2rpick.deck.reader import cuts, holds_mesh
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card, Row
     from d2rpick.deck.mesh import Integers
     from d2rpick.deck.model import Formulation
     from d2rpick.deck.radioss_run import Run
     from d2rpick.deck.radioss_starter import Starter
-    from d2rpick.deck.windows import Window
+    from d2rpick.deck.switching import Window
 
 _WIDTH, _REAL = 10, 20
 
@@ -82,10 +82,9 @@ def read(run: Run) -> Inventory:
     )  # fmt: skip
 
 
-def _switched(run: Run, starter: Starter) -> set[int]:
+def _switched(run: Run, starter: Starter) -> Collection[int]:
     """Main nodes that the legs switch; of all bodies where there is no engine file."""
-    named = {node.value for leg in run.legs for _, _, nodes in leg.switched for node in nodes}
-    return named if run.legs else {body.node.value for body in starter.bodies}
+    return run.named if run.legs else {body.node.value for body in starter.bodies}
 
 
 def _watched(cards: Sequence[Card]) -> Integers:

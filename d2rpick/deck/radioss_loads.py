@@ -92,9 +92,8 @@ def _motion(card: Card, rows: Sequence[Row]) -> Hold:
 
 def _of_bodies(run: Run, starter: Starter, holds: Sequence[Hold]) -> Iterator[Hold]:
     """What holds the main node of a rigid body that is on holds all of its nodes."""
-    off = {node.value for leg in run.legs for _, _, nodes in leg.switched for node in nodes}
     for body in starter.bodies:
-        members = None if body.sensor or body.node.value in off else starter.group_members(body.group)
+        members = None if body.sensor or body.node.value in run.named else starter.group_members(body.group)
         for one in holds if members else ():
             if members and body.node.value in one.nodes:
                 yield one._replace(nodes=ids(members[0]), parts=frozenset(members[1]))
@@ -157,9 +156,8 @@ def joints_of(run: Run, starter: Starter, cards: Sequence[Card]) -> Joints:
             found.append(tie)
         elif interface or card.words[0] in _OTHER_OF_RADIOSS:
             unknown.append(_name(card))
-    named = {value.value for leg in run.legs for _, _, nodes in leg.switched for value in nodes}
     for body in starter.bodies:
-        always = bool(run.legs) and not body.sensor and body.node.value not in named
+        always = bool(run.legs) and not body.sensor and body.node.value not in run.named
         members = starter.group_members(body.group)
         if members:
             held = Joint("rigid body", ids(members[0] | {body.node.value}), frozenset(members[1]))

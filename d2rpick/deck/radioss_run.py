@@ -18,10 +18,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.deck.card import Value
 from d2rpick.deck.radioss_engine import Leg, blocks, card_of, keyword, read_legs
 from d2rpick.deck.radioss_starter import Starter
-from d2rpick.deck.reader import Deck, Unread
+from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
-from d2rpick.deck.switching import Switched, SwitchSet
-from d2rpick.deck.windows import Event, Unit, Window, Windows
+from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows
 from d2rpick.errors import DeckError, are, in_rows, name_units
 
 if TYPE_CHECKING:
@@ -57,7 +56,6 @@ _STARTER: Final = re.compile(rb"^/BEGIN", re.MULTILINE | re.IGNORECASE)
 _ENGINE: Final = re.compile(rb"^/RUN/", re.MULTILINE | re.IGNORECASE)
 _NUMBERED: Final = re.compile(r"(.+)_(\d{4})\.rad", re.IGNORECASE | re.DOTALL)
 _NAME: Final = re.compile(rb"^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)", re.MULTILINE | re.IGNORECASE)
-_DEEPEST = 60  # includes in includes
 
 
 @dataclass(eq=False)
@@ -68,6 +66,11 @@ class Run:
     starter: Starter | None = None
     legs: list[Leg] = field(default_factory=list)
     included: dict[str, SourceFile] = field(default_factory=dict)  # by path: one that is included twice is read once
+
+    @cached_property
+    def named(self) -> frozenset[int]:
+        """Main nodes that the legs switch."""
+        return frozenset(node.value for leg in self.legs for _, _, nodes in leg.switched for node in nodes)
 
 
 def recognises(head: bytes) -> bool:
@@ -156,26 +159,16 @@ def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
 def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
     asked = card.block.head.split(maxsplit=1)[1:]
     name = asked[0].strip() if asked else ""
-    path = next(
-        (
-            str(folder / name)
-            for folder in (Path(source.name).parent, Path(run.deck.path).parent)
-            if os.path.isfile(folder / name)  # noqa: PTH113 - Path.is_file raises on names too long
-        ),
-        None,
-    )
-    real = os.path.realpath(path) if path else ""
-    if path is None:
-        run.deck.unread.append(Unread(card.here._replace(text=name), "no such file"))
-    elif real in chain or real == os.path.realpath(source.name) or len(chain) >= _DEEPEST:
-        run.deck.unread.append(Unread(card.here._replace(text=name), "the file includes itself"))
-    elif not os.access(path, os.R_OK):
-        run.deck.unread.append(Unread(card.here._replace(text=name), "no permission to read it"))
-    else:
+    folders = (Path(source.name).parent, Path(run.deck.path).parent)
+    there = (str(folder / name) for folder in folders if os.path.isfile(folder / name))  # noqa: PTH113  long names
+    path, chain = next(there, None), (*chain, os.path.realpath(source.name))
+    if reason := why_unread(path, chain):
+        run.deck.unread.append(Unread(card.here._replace(text=name), reason))
+    elif path is not None:
         if path not in run.included:
             run.included[path] = SourceFile(path)
         run.deck.sources.append(run.included[path])
-        _read_starter(run.included[path], run, (*chain, os.path.realpath(source.name)))
+        _read_starter(run.included[path], run, chain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,8 +325,7 @@ def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
     """Find the bodies that no leg names, of a run with ``windows``, where they hold whole parts."""
     if run.starter is None or run.starter.moved or not windows:
         return None
-    named = {node.value for leg in run.legs for _, _, nodes in leg.switched for node in nodes}
-    bodies = [body for body in run.starter.bodies if not body.sensor and body.node.value not in named]
+    bodies = [body for body in run.starter.bodies if not body.sensor and body.node.value not in run.named]
     parts = rigid_parts(run.starter, {body.node.value: body.group for body in bodies}) if bodies else {}
     bodies = [body for body in bodies if parts.get(body.node.value)]
     held = sorted({part for body in bodies for part in parts[body.node.value]})

@@ -16,7 +16,7 @@ from d2rpick.deck.source import Block, SourceFile
 from d2rpick.errors import DeckError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.deck.card import Field, Problem, Row
     from d2rpick.deck.source import Block
@@ -279,22 +279,24 @@ class _Reader:
         for asked in asked_by(card):
             self.deck.problems += asked.problems
             path = self.folders.find(asked.name)
-            real = os.path.realpath(path) if path else ""
-            if path is None:
-                reason = "no such file"
-            elif real in context.chain or real == os.path.realpath(card.file):
-                reason = "the file includes itself"
-            elif len(context.chain) >= _DEEPEST:
-                reason = f"includes are nested deeper than {_DEEPEST} files"
-            elif not os.access(path, os.R_OK):
-                reason = "no permission to read it"
-            else:
-                chain = (*context.chain, os.path.realpath(card.file))
+            chain = (*context.chain, os.path.realpath(card.file))
+            if reason := why_unread(path, chain):
+                self.deck.unread.append(Unread(asked.name, reason))
+            elif path is not None:
                 if path not in self.sources:
                     self.sources[path] = SourceFile(path)
                 self.read(self.sources[path], _Context(Scope(context.scope), width, asked.transform, chain))
-                continue
-            self.deck.unread.append(Unread(asked.name, reason))
+
+
+def why_unread(path: str | None, chain: Sequence[str]) -> str:
+    """Say why an include is not read, empty where it is; ``chain`` are the files that include it, by real paths."""
+    if path is None:
+        return "no such file"
+    if os.path.realpath(path) in chain:
+        return "the file includes itself"
+    if len(chain) > _DEEPEST:
+        return f"includes are nested deeper than {_DEEPEST} files"
+    return "" if os.access(path, os.R_OK) else "no permission to read it"
 
 
 def _keyword(head: str) -> tuple[str, str]:

@@ -1,4 +1,6 @@
-"""Switching cards: *DEFORMABLE_TO_RIGID and its variants, and their restart relatives, field by field.
+"""Switching cards field by field, and the windows in which they make parts rigid.
+
+The cards are *DEFORMABLE_TO_RIGID and its variants, and their restart relatives.
 
 Columns and defaults: the vendor's keyword data as published in its Python library, and two independent
 sources; which of the D2R and R2D lines hold PTYPE in which column is a trap several writers fell into.
@@ -7,18 +9,20 @@ sources; which of the D2R and R2D lines hold PTYPE in which column is a trap sev
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from d2rpick.deck.card import Value
 from d2rpick.deck.reader import SWITCHING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.deck.card import Card, Field, Row
+    from d2rpick.deck.parts import Parts
     from d2rpick.deck.reader import Deck
 
 Kind = Literal["automatic", "plain", "inertia", "restart"]
@@ -49,9 +53,8 @@ class Switched:
     lead: Value[int] | None = None  # LRB; a D2R line only
 
 
-@dataclass(frozen=True)
-class Header:
-    """The two first lines of *DEFORMABLE_TO_RIGID_AUTOMATIC."""
+class Header(NamedTuple):
+    """The two first lines of *DEFORMABLE_TO_RIGID_AUTOMATIC; counts are D2R and R2D."""
 
     swset: Value[int]
     code: Value[int]
@@ -65,16 +68,9 @@ class Header:
     time3: Value[float]
     nrbf: Value[int]
     ncsf: Value[int]
-    others: tuple[Value[float], ...]  # RWF, DTMAX, OFFSET
-
-    @property
-    def values(self) -> tuple[Value[int] | Value[float], ...]:
-        """All fields, in the order of the card."""
-        return (
-            *(self.swset, self.code, self.time1, self.entno, self.relsw, self.paired),
-            *(self.to_rigid, self.to_deformable, self.time2, self.time3, self.nrbf, self.ncsf),
-            *self.others,
-        )
+    rwf: Value[float]
+    dtmax: Value[float]
+    offset: Value[float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +133,7 @@ def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
 
 
 def _simple(card: Card, kind: Kind) -> SwitchSet:
-    rows = [row for row in card.rows if not row.blank]
+    rows = card.lines
     if kind == "inertia":
         part = [_moved(card.integer(rows[0], 0), card.transform.part)] if rows else []
         reals = [card.real(row, at) for row, count in zip(rows[1:], _REALS[kind], strict=False) for at in range(count)]
@@ -227,7 +223,9 @@ def _header(card: Card, first: Row, second: Row) -> Header:
         time3=card.real(first, 4),
         nrbf=card.integer(second, 0),
         ncsf=card.integer(second, 1),
-        others=tuple(card.real(second, at) for at in (2, 3, 6)),
+        rwf=card.real(second, 2),
+        dtmax=card.real(second, 3),
+        offset=card.real(second, 6),
     )
 
 
@@ -263,7 +261,121 @@ def _moved(value: Value[int], offset: int) -> Value[int]:
 
 
 def _with(card: Card, kind: Kind, header: Header | None, lines: Sequence[_Line], count_problem: str = "") -> SwitchSet:
-    values: list[Value[int] | Value[float] | Value[str]] = list(header.values) if header else []
+    values: list[Value[int] | Value[float] | Value[str]] = list(header or ())
     for switched, ptype in lines:
         values += [switched.part, ptype] if switched.lead is None else [switched.part, switched.lead, ptype]
     return SwitchSet(card, kind, header, tuple(line for line, _ in lines), tuple(values), count_problem)
+
+
+# Windows.
+
+
+class Unit(NamedTuple):
+    """A part; or a part set or a rigid body (by its main node) whose parts cannot be known."""
+
+    id: int
+    is_set: bool = False
+    is_body: bool = False
+
+    @property
+    def kind(self) -> str:
+        """What the id is one of."""
+        return "part set" if self.is_set else "main node" if self.is_body else "part"
+
+
+class Event(NamedTuple):
+    """A unit is switched by a line of a card."""
+
+    unit: Unit
+    by: SwitchSet
+    line: Switched
+
+
+@dataclass(frozen=True)
+class Window:
+    """A unit is rigid from ``tr`` to ``td`` [time of the deck]; ``td`` is None when it stays rigid.
+
+    ``td`` may lie before ``tr``: that is what the cards say, and a finding.
+    """
+
+    unit: Unit
+    tr: float
+    td: float | None
+    opened: Event
+    closed: Event | None
+
+    @property
+    def part(self) -> int | None:
+        """The part; None for a part set or rigid body whose parts cannot be known."""
+        return self.unit.id if self.unit.kind == "part" else None
+
+
+@dataclass(frozen=True)
+class Windows:
+    """All windows of a deck by unit and time; ``orphans`` switch back what nothing made rigid before.
+
+    ``other_rigid`` and ``other_deformable`` are switched at times that no clock tells (CODE 1-5, restarts).
+    """
+
+    windows: tuple[Window, ...]
+    orphans: tuple[Event, ...]
+    events: tuple[Event, ...]
+    other_rigid: frozenset[Unit]
+    other_deformable: frozenset[Unit]
+
+
+def find_windows(sets: Iterable[SwitchSet], parts: Parts) -> Windows:
+    """Follow every part through the cards in the order of their times.
+
+    Part sets are resolved to their parts.  A part that is made rigid while it is rigid (a new lead) stays in
+    its window.  When a part is switched back first and made rigid later and nothing else matches, the two
+    belong to one inverted window.
+    """
+    events = tuple(event for card in sets for event in _events(card, parts))
+    timed: dict[Unit, list[tuple[float, Event]]] = defaultdict(list)
+    for event in events:
+        if event.by.time is not None:
+            timed[event.unit].append((event.by.time, event))
+    windows: list[Window] = []
+    orphans: list[Event] = []
+    for unit in sorted(timed):
+        found, left = _follow(unit, timed[unit])
+        windows += found
+        orphans += left
+    return Windows(
+        tuple(windows),
+        tuple(orphans),
+        events,
+        frozenset(event.unit for event in events if event.by.time is None and event.line.to_rigid),
+        frozenset(event.unit for event in events if event.by.time is None and not event.line.to_rigid),
+    )
+
+
+def _events(card: SwitchSet, parts: Parts) -> Iterable[Event]:
+    for line in card.switched:
+        if line.part.problem:
+            continue
+        members = parts.members(line.part.value) if line.by_set else (line.part.value,)
+        if members is None:
+            yield Event(Unit(line.part.value, is_set=True), card, line)
+        else:
+            yield from (Event(Unit(part), card, line) for part in members)
+
+
+def _follow(unit: Unit, events: list[tuple[float, Event]]) -> tuple[list[Window], list[Event]]:
+    windows: list[Window] = []
+    orphans: list[tuple[float, Event]] = []
+    opened: tuple[float, Event] | None = None
+    # at equal times the way back counts as the earlier one: both at once is no window
+    for time, event in sorted(events, key=lambda timed: (timed[0], timed[1].line.to_rigid)):
+        if event.line.to_rigid:
+            opened = opened or (time, event)
+        elif opened is None:
+            orphans.append((time, event))
+        else:
+            windows.append(Window(unit, opened[0], time, opened[1], event))
+            opened = None
+    if opened is not None:
+        td, closed = orphans.pop() if orphans else (None, None)
+        windows.append(Window(unit, opened[0], td, opened[1], closed))
+    return windows, [event for _, event in orphans]

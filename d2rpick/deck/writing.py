@@ -12,8 +12,7 @@ from d2rpick.deck.radioss_engine import blocks, kept_off, keyword, read_legs
 from d2rpick.deck.radioss_run import read_run, run_files
 from d2rpick.deck.reader import cure, cuts, read_deck
 from d2rpick.deck.source import SourceFile
-from d2rpick.deck.switching import read_switching
-from d2rpick.deck.windows import find_windows
+from d2rpick.deck.switching import find_windows, read_switching
 from d2rpick.errors import DeckError
 from d2rpick.files import write_whole
 

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card, Field, Value
     from d2rpick.deck.radioss_run import Flaw, Run, RunWindows
     from d2rpick.deck.reader import Unread
-    from d2rpick.deck.switching import Header
-    from d2rpick.deck.windows import Event
+    from d2rpick.deck.switching import Event, Header
 
 
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"
@@ -228,7 +227,7 @@ class RunCase(Case):
     def unread(self) -> Sequence[Unread]:
         """Includes that were not read, where a main node that is switched may stand in them."""
         bodies = {body.node.value for body in self.run.starter.bodies} if self.run.starter else set()
-        return self.deck.unread if self.named - bodies - {0} else ()
+        return self.deck.unread if self.run.named - bodies - {0} else ()
 
     @cached_property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
@@ -247,21 +246,16 @@ class RunCase(Case):
         return self.run.starter.unturned if self.run.starter else {}
 
     @cached_property
-    def named(self) -> frozenset[int]:
-        """Main nodes that the legs switch."""
-        return frozenset(node.value for leg in self.run.legs for _, _, nodes in leg.switched for node in nodes)
-
-    @cached_property
     def flaws(self) -> tuple[Flaw, ...]:
         """What the starter does to the nodes of the bodies that the legs switch."""
         starter, legs = self.run.starter, self.run.legs
-        if not self.named or starter is None:
+        if not self.run.named or starter is None:
             return ()
         if not (starter.walls or starter.velocities or any(leg.starts for leg in legs)):
             return ()
         from d2rpick.deck.radioss_flaws import flaws_of  # loads numpy
 
-        return flaws_of(self.run, self.named)
+        return flaws_of(self.run, self.run.named)
 
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[Window]]]:

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.constraints import Entities, Entity
-    from d2rpick.deck.switching import Header, SwitchSet
-    from d2rpick.deck.windows import Unit
+    from d2rpick.deck.switching import Header, SwitchSet, Unit
     from d2rpick.rules.base import Case, Objection
 
 _FAMILIES: Final = ({1, 3}, {2, 4})  # rigid wall, contact

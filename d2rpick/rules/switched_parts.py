@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from d2rpick.deck import Parts, SwitchSet
     from d2rpick.deck.card import Field
     from d2rpick.deck.constraints import Constraint
-    from d2rpick.deck.switching import Header, Switched
-    from d2rpick.deck.windows import Event, Unit
+    from d2rpick.deck.switching import Event, Header, Switched, Unit
     from d2rpick.rules.base import Case, Objection
 
 _NEAREST = 3  # ids that are named in place of one that the deck does not have

@@ -1,4 +1,4 @@
-"""The reader: where keywords and fields stand, formats, comments, parameters, includes."""
+"""The reader: where keywords and fields stand, formats, comments, parameters, includes, and what tells of a cut."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.deck import read_deck, read_switching
-from d2rpick.deck.source import find_marks
+from d2rpick.deck.radioss_mesh import KINDS, NOT_COUNTED
+from d2rpick.deck.reader import holds_mesh
+from d2rpick.deck.source import Block, SourceFile, find_marks
 from d2rpick.deck.stored import Held
 from d2rpick.errors import DeckError
 from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
@@ -258,3 +260,9 @@ def test_a_parameter_defined_below_its_card_is_a_problem_with_both_places(tmp_pa
     assert place.text == "&a"
     assert "defined only below, at" in problem
     assert "main.k:8" in problem
+
+
+@pytest.mark.parametrize("keyword", [*KINDS, *sorted(NOT_COUNTED), "NODE"])
+def test_all_elements_of_radioss_are_mesh(keyword: str) -> None:
+    """Their names stand twice: a check does without the inventory, which takes time to load."""
+    assert holds_mesh(Block(SourceFile("run_0000.rad", b""), 0, None, f"/{keyword}/1"))

@@ -1,0 +1,256 @@
+"""Printed cards: numbers in columns, windows that follow each other, LS-DYNA cards and Radioss engine files."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.deck.printed_card import LONGEST, Printing, check_windows, read_windows, shortest
+from d2rpick.deck.printing import SOLVERS, cards, solver_of
+from d2rpick.errors import DeckError
+from d2rpick.histories.opening import READERS
+from d2rpick.rules import check_deck
+from tests.command import run
+from tests.decks import found, read, spans, write
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+TIMES = st.floats(1e-9, 1e9)
+ALL = Printing(part=(11,), node=(1001,), end=1e6)
+
+
+@given(st.integers(-9999, 99999), st.integers(-3, 3))
+def test_few_digits_read_back(digits: int, exponent: int) -> None:
+    value = float(f"{digits}e{exponent}")
+    assert float(shortest(value)) == value
+    assert len(shortest(value)) <= LONGEST
+
+
+@given(TIMES)
+def test_the_nearest_text_is_taken(value: float) -> None:
+    text = shortest(value)
+    assert len(text) <= LONGEST
+    others = [f"{value:.{n}f}" for n in range(12)] + [f"{value:.{n}g}" for n in range(1, 12)]
+    others += [other.removeprefix("0") for other in others if "." in other]
+    assert abs(float(text) - value) <= min(abs(float(other) - value) for other in others if len(other) <= LONGEST)
+
+
+def test_a_number_too_wide_is_refused() -> None:
+    with pytest.raises(DeckError, match="cannot be written"):
+        shortest(1e300, 4)
+
+
+@pytest.mark.parametrize(
+    ("windows", "message"),
+    [
+        ([], "no window"),
+        ([(0.09, 0.02)], "0 <= tr < td"),
+        ([(0.02, 0.02)], "0 <= tr < td"),
+        ([(-1.0, 1.0)], "0 <= tr < td"),
+        ([(0.0, float("inf"))], "0 <= tr < td"),
+        ([(0.02, float("nan"))], "0 <= tr < td"),
+        ([(0.02, 0.09), (0.05, 0.2)], "overlaps or touches"),
+        ([(0.02, 0.09), (0.09, 0.2)], "overlaps or touches"),
+        ([(0.2, 0.3), (0.02, 0.09)], "lies before"),
+    ],
+)
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_windows_that_do_not_follow_each_other_are_refused(
+    windows: list[tuple[float, float]], message: str, solver: str
+) -> None:
+    with pytest.raises(DeckError, match=message):
+        cards(windows, ALL, solver)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_every_solver_prints_what_it_is_given(solver: str) -> None:
+    windows = [(0.0, 0.09), (0.2, 0.3), (0.5, 0.75)]
+    card = cards(windows, ALL, solver, ["a\nremark"])
+    assert card.windows == tuple(windows)
+    assert " a\\nremark\n" in card.text
+    assert card.notes == ()
+    assert all(content in card.text for content in card.files.values())
+    assert hasattr(ALL, SOLVERS[solver].switches)
+    assert all(hasattr(ALL, name) for name in SOLVERS[solver].takes)
+
+
+def test_the_solver_is_that_of_the_history() -> None:
+    formats = {name: solver_of(name) for name in READERS}
+    assert {name for name, solver in formats.items() if solver == "radioss"} == {"radioss-th"}
+    assert solver_of("glstat + matsum") == "ls-dyna"
+    claimed = [name for solver in SOLVERS.values() for name in solver.histories]
+    assert len(claimed) == len(set(claimed))
+
+
+def test_the_command_line_offers_the_solvers_there_are() -> None:
+    assert f"[{'|'.join(SOLVERS)}]" in run("card", "--help").stdout
+    refused = run("card", "--solver", "abaqus", "--tr", "1", "--td", "2", "--part", "1")
+    assert refused.exit_code == 2
+    assert f"'abaqus' was found, one of {', '.join(SOLVERS)} was expected" in refused.stderr
+
+
+def test_a_file_of_windows() -> None:
+    assert read_windows("# tr td\n0.02 0.09\n\n .2  3e-1\n", "w.txt") == ((0.02, 0.09), (0.2, 0.3))
+    assert check_windows([(-0.0, 1.0)])[0][0].hex() == "0x0.0p+0"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"), [("0.02\n", "w.txt:1: '0.02'"), ("1 2\na b\n", "w.txt:2"), ("", "w.txt: no")]
+)
+def test_what_is_not_a_file_of_windows(text: str, message: str) -> None:
+    with pytest.raises(DeckError, match=message):
+        read_windows(text, "w.txt")
+
+
+PARTS = Printing(part=(11, 12))
+MERGED = replace(PARTS, merge=11)
+CARD = """\
+*DEFORMABLE_TO_RIGID_AUTOMATIC
+$#   swset      code     time1     time2     time3     entno     relsw    paired
+       901         0      0.02       0.0       0.0         0         0         0
+$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset
+         0         0         0       0.0         2         0       0.0
+$#     pid       lrb     ptype
+        11         0      PART
+        12        11      PART
+*DEFORMABLE_TO_RIGID_AUTOMATIC
+$#   swset      code     time1     time2     time3     entno     relsw    paired
+       902         0      0.09       0.0       0.0         0         0         0
+$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset
+         0         0         0       0.0         0         2       0.0
+$#     pid     ptype
+        11      PART
+        12      PART
+"""
+
+
+def rows(text: str) -> list[str]:
+    """Data lines of a card."""
+    return [line for line in text.splitlines() if line[0] not in "$*"]
+
+
+def test_the_card_to_the_letter() -> None:
+    text = cards([(0.02, 0.09)], MERGED).text
+    assert text[text.index("*") :] == CARD
+
+
+@given(
+    TIMES,
+    st.lists(st.floats(1.001, 100), min_size=1, max_size=7),
+    st.lists(st.integers(1, 10**9 - 1), min_size=1, max_size=30, unique=True),
+)
+def test_the_check_finds_in_a_card_what_was_asked_for(
+    tmp_path_factory: pytest.TempPathFactory, start: float, factors: list[float], parts: list[int]
+) -> None:
+    times = [start]
+    for factor in factors:
+        times.append(times[-1] * factor)
+    windows = list(zip(times[::2], times[1::2], strict=False))
+    card = cards(windows, Printing(part=tuple(parts), merge=parts[-1]))
+    folder = tmp_path_factory.mktemp("card")
+    assert check_deck(write(folder, card.text)).findings == ()
+    assert spans(read(folder, card.text)) == [(part, tr, td) for part in sorted(parts) for tr, td in card.windows]
+    assert all(len(line) <= 100 for line in card.text.split("\n"))
+    assert all(a == " " or b == " " for row in rows(card.text) for a, b in zip(row[9::10], row[10::10], strict=False))
+
+
+def test_rounding_is_reported() -> None:
+    card = cards([(0.0128853793630525, 0.064)], PARTS)
+    assert card.windows == ((0.01288538, 0.064),)
+    assert ".01288538" in card.notes[0]
+    assert card.notes[0] in card.text
+    assert cards([(0.02, 0.09)], PARTS).notes == ()
+
+
+def test_warnings_are_those_that_apply() -> None:
+    def text(printing: Printing) -> str:
+        return cards([(0.02, 0.09)], printing).text
+
+    assert "d2rpick card --merge" in text(PARTS)
+    assert "merged" not in text(MERGED)
+    assert "merged" not in text(Printing(part=(11,)))
+    assert "already" in text(replace(PARTS, merge=5))
+    assert "DTMAX is 0" in text(PARTS)
+    assert "d2rpick card --step-cap" in text(PARTS)
+    assert "DTMAX is 0" not in text(replace(PARTS, step_cap=1e-5))
+
+
+@pytest.mark.parametrize(
+    ("times", "printing"),
+    [
+        ((0.02, 0.09), Printing()),
+        ((0.02, 0.09), Printing(part=(0,))),
+        ((0.02, 0.09), Printing(part=(10**10,))),
+        ((0.02, 0.09), replace(PARTS, merge=10**9)),
+        ((0.02, 0.09), replace(PARTS, swset=(5, 5))),
+        ((1.0000000001, 1.0000000002), PARTS),
+    ],
+)
+def test_what_is_not_a_card(times: tuple[float, float], printing: Printing) -> None:
+    with pytest.raises(DeckError):
+        cards([times], printing)
+
+
+def test_windows_that_only_printing_makes_touch_are_refused() -> None:
+    with pytest.raises(DeckError, match="different times"):
+        cards([(1.0, 2.00000000001), (2.00000000002, 3.0)], PARTS)
+
+
+def test_every_window_has_sets_of_its_own(tmp_path: Path) -> None:
+    text = cards([(0.02, 0.09), (0.2, 0.3), (0.4, 0.5)], replace(MERGED, swset=(8, 7))).text
+    assert re.findall(r"^ +(\d+) +0 +\S+ +0.0 +0.0 +0 +0 +0$", text, flags=re.MULTILINE) == [
+        *("8", "7", "9", "10", "11", "12")
+    ]
+    assert not found(tmp_path, text)
+
+
+radioss_cards = partial(cards, solver="radioss")
+BOX = Printing(node=tuple(range(1, 13)), end=0.15, name="run")
+
+
+def test_three_engine_files() -> None:
+    card = radioss_cards([(0.0128853793630525, 0.064)], BOX)
+    parts = [leg.split("\n") for leg in card.files.values()]
+    assert list(card.files) == ["run_0001.rad", "run_0002.rad", "run_0003.rad"]
+    assert [leg[:3] for leg in parts] == [
+        ["/RUN/run/1", "  0.0128853793630525", "/RBODY/OFF"],
+        ["/RUN/run/2", "               0.064", "/RBODY/ON"],
+        ["/RUN/run/3", "                0.15", "/RBODY/OFF"],
+    ]
+    assert [leg[3:5] for leg in parts] == [["1 2 3 4 5 6 7 8 9 10", "11 12"]] * 3
+    assert ["/DTIX\n5.1e-05 5.1e-05" in leg for leg in card.files.values()] == [False, True, False]
+    assert re.findall(r"# ---- (\S+)", card.text) == list(card.files)
+    capped = radioss_cards([(0.01, 0.02)], Printing(node=(1,), end=0.03, step_cap=1e-6))
+    assert "/DTIX\n1e-06 1e-06" in capped.text
+
+
+def test_every_window_has_a_leg_and_one_from_the_start_none_before_it() -> None:
+    card = radioss_cards([(0.0, 0.02), (0.05, 0.09)], BOX)
+    found = re.findall(r"/RUN/run/(\d)\n +(\S+)\n/RBODY/(\w+)", card.text)
+    assert found == [("1", "0.02", "ON"), ("2", "0.05", "OFF"), ("3", "0.09", "ON"), ("4", "0.15", "OFF")]
+
+
+@pytest.mark.parametrize(
+    ("end", "message"), [(0.05, "the run ends at 0.05"), (None, "not given"), (float("inf"), "the run ends")]
+)
+def test_the_end_comes_last(end: float | None, message: str) -> None:
+    with pytest.raises(DeckError, match=message):
+        radioss_cards([(0.02, 0.09)], Printing(node=(1,), end=end))
+
+
+@pytest.mark.parametrize("printing", [Printing(end=1.0), Printing(node=(1,), end=1.0, name="a/b")])
+def test_what_is_not_a_run(printing: Printing) -> None:
+    with pytest.raises(DeckError):
+        radioss_cards([(0.02, 0.09)], printing)
+
+
+def test_more_legs_than_the_solver_numbers_are_refused() -> None:
+    with pytest.raises(DeckError, match="at most 99"):
+        radioss_cards([(i, i + 0.5) for i in range(1, 60)], Printing(node=(1,), end=100.0))
