@@ -10,18 +10,18 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from pathlib import Path
-from statistics import median
+from functools import partial
+from importlib import import_module
 from tempfile import TemporaryDirectory
-from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
+
+from tests.benchmarks.timing import ROOT, ratio
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from d2rpick.histories.history import Samples
 
-ROOT = Path(__file__).resolve().parents[2]
 SUGGEST = ("suggest", "--td", "0.064", "sample_data/energy.csv")
 CHECK = ("check", "sample_data/switching.k")
 THREADS = "OPENBLAS_NUM_THREADS"
@@ -30,26 +30,6 @@ ONE_THREAD = {THREADS: "1"}
 _PROCESSES = 25
 _POINTS = 1_000_000
 _ROUNDS = 5
-
-
-def seconds(call: Callable[[], object]) -> float:
-    """How long a call takes."""
-    start = perf_counter()
-    call()
-    return perf_counter() - start
-
-
-def ratio(one: Callable[[], object], other: Callable[[], object], rounds: int, repeats: int = 1) -> float:
-    """Time of ``one`` over that of ``other``, taking turns of so many repeats.
-
-    With more than one repeat each turn begins with an unmeasured call, so that the measured ones find their memory.
-    """
-    times: tuple[list[float], list[float]] = ([], [])
-    for _ in range(rounds):
-        for call, found in zip((one, other), times, strict=True):
-            turn = [seconds(call) for _ in range(repeats + (repeats > 1))]
-            found += turn[1:] or turn
-    return median(times[0]) / median(times[1])
 
 
 def process_ratio(libraries: str, *args: str, env: Mapping[str, str] | None = None) -> float:
@@ -67,20 +47,6 @@ def process_ratio(libraries: str, *args: str, env: Mapping[str, str] | None = No
         clean["PYTHONPYCACHEPREFIX"] = compiled  # an installed package is compiled; a working copy may not be
         ours(), least()
         return ratio(ours, least, _PROCESSES)
-
-
-def identification_ratio() -> float:
-    """One identification over one fit of scipy that starts at the right answer."""
-    from tests.benchmarks import identification
-
-    return identification.ratio()
-
-
-def residual_error(kind: str, count: int) -> float:
-    """How far the stated residual is off at most in 95 % of so many random records [-]."""
-    from tests.benchmarks import identification
-
-    return identification.within(identification.small_second_modes(kind, range(count)))[0]
 
 
 def integration_ratio(repeats: int) -> float:
@@ -115,63 +81,19 @@ def integration_ratio(repeats: int) -> float:
     return ratio(integrated, closed_form, _ROUNDS, repeats)
 
 
-def deck_ratio(*, numbered: bool) -> float:
-    """Finding the cards of a 50 MB deck, and the numbers of their lines, over a plain loop over all lines."""
-    from tests.benchmarks import deck
-
-    ours = deck.number_cards if numbered else deck.find_cards
-    with deck.large_deck() as path:
-        return ratio(lambda: ours(path), lambda: deck.line_loop(path), _ROUNDS)
-
-
-def check_ratio() -> float | None:
-    """Checking a 50 MB deck over parsing it with dynars; None where that is not installed."""
-    from tests.benchmarks import deck
-
-    parse = deck.dynars_parser()
-    if parse is None:
-        return None
-    with deck.large_deck() as path:
-        return ratio(lambda: deck.check(path), lambda: parse(path), 5 * _ROUNDS)  # of milliseconds only
-
-
-def inventory_ratio() -> float:
-    """Reading the parts and elements of a 50 MB deck over a plain loop over all lines."""
-    from tests.benchmarks import deck
-
-    with deck.large_deck() as path:
-        return ratio(lambda: deck.inventory(path), lambda: deck.line_loop(path), _ROUNDS)
-
-
-def deck_memory() -> float:
-    """Memory that it takes [MB]."""
-    from tests.benchmarks import deck
-
-    return deck.memory()
-
-
-def reading(name: str, *args: int | str | None) -> Callable[[], float | None]:
-    """Measure of the module `reading`, which makes its big files when it is asked."""
+def measured(module: str, name: str, *args: int | str | None) -> Callable[[], float | None]:
+    """Give a measure of a module here, which is imported, and makes its files, when it is asked."""
 
     def measure() -> float | None:
-        from tests.benchmarks import reading
-
-        found: float | None = getattr(reading, name)(*args)
+        found: float | None = getattr(import_module(f"tests.benchmarks.{module}"), name)(*args)
         return found
 
     return measure
 
 
-def choosing(name: str, *args: str) -> Callable[[], float | None]:
-    """Measure of the module `choosing`, which makes its records when it is asked."""
-
-    def measure() -> float | None:
-        from tests.benchmarks import choosing
-
-        found: float | None = getattr(choosing, name)(*args)
-        return found
-
-    return measure
+reading, choosing, deck, identification = (
+    partial(measured, module) for module in ("reading", "choosing", "deck", "identification")
+)
 
 
 class Row(NamedTuple):
@@ -215,17 +137,17 @@ ROWS = (
     Row("study: speed-up with 2 processes", choosing("study_speed_up"), least=1.8),
     Row("rollover --scan: speed-up with 2 processes", choosing("scan_speed_up"), least=1.6),
     Row("--report / matplotlib and one Figure to svg", choosing("report_to_matplotlib"), most=1.5),
-    Row("identification / least_squares from the right answer", identification_ratio, most=3.0),
-    Row("residual off by, 95 % of 600 records of one mode", lambda: residual_error("one", 600), most=0.05),
-    Row("  of 200 with 0.3 to 3 % in a second mode", lambda: residual_error("small", 200), most=0.05),
-    Row("  of 200 with 3 to 30 % in a second mode", lambda: residual_error("large", 200), most=0.05),
+    Row("identification / least_squares from the right answer", identification("to_scipy"), most=3.0),
+    Row("residual off by, 95 % of 600 records of one mode", identification("residual_error", "one", 600), most=0.05),
+    Row("  of 200 with 0.3 to 3 % in a second mode", identification("residual_error", "small", 200), most=0.05),
+    Row("  of 200 with 3 to 30 % in a second mode", identification("residual_error", "large", 200), most=0.05),
     Row("DOP853 / closed form, 1e6 points", lambda: integration_ratio(repeats=3), least=20.0),
     Row("  alternating call by call, in memory just freed", lambda: integration_ratio(repeats=1)),
-    Row("cards of a 50 MB deck / loop over its lines", lambda: deck_ratio(numbered=False), most=1 / 3),
-    Row("  with the number of each card's line", lambda: deck_ratio(numbered=True)),
-    Row("parts and elements of a 50 MB deck / loop over its lines", inventory_ratio, most=15.0),
-    Row("check of a 50 MB deck / dynars.parse_deck", check_ratio, most=1.0),
-    Row("  memory for the cards [MB]", deck_memory, most=32.0),
+    Row("cards of a 50 MB deck / loop over its lines", deck("to_loop", "cards"), most=1 / 3),
+    Row("  with the number of each card's line", deck("to_loop", "lines of cards")),
+    Row("parts and elements of a 50 MB deck / loop over its lines", deck("to_loop", "inventory"), most=15.0),
+    Row("check of a 50 MB deck / dynars.parse_deck", deck("check_to_dynars"), most=1.0),
+    Row("  memory for the cards [MB]", deck("memory"), most=32.0),
     Row("check / import click: processes", lambda: process_ratio("click", *CHECK)),
     Row("loop over lines / glstat, 1e5 states", reading("glstat_to_loop"), least=8.0),
     Row("glstat, 1e5 states / bare read", reading("glstat_to_bare_read"), most=4.0),

@@ -8,20 +8,17 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
-from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.histories.formats import csv_table
 from tests.benchmarks.study import LOOP, write_runs
+from tests.benchmarks.timing import output, ratio, seconds
 from tests.records import MODE
 from tests.text_files import matsum_text
 
@@ -30,7 +27,6 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-ROOT = Path(__file__).resolve().parents[2]
 _ROUNDS = 3
 _PARTS, _PART_STATES = 500, 2000
 _RUNS, _RUN_STATES, _RUN_TD = 1000, 10_000, 0.0687534
@@ -56,7 +52,7 @@ MATSUM = (
 def noisy_to_pandas() -> float:
     """`suggest --td` of 1e5 noisy states over pandas, which reads that csv and does nothing else."""
     file = str(_noisy(100_000))
-    found = json.loads(_output("-m", "d2rpick", "suggest", "--td", str(_TD), "-f", "json", file))
+    found = json.loads(output("-m", "d2rpick", "suggest", "--td", str(_TD), "-f", "json", file))
     assert 10_000 < len(found["candidates"]) < 20_000, len(found["candidates"])
     return _ratio(_suggest(file), ("-c", PANDAS, file))
 
@@ -71,7 +67,7 @@ def window_to_td(kind: str, width: str, *options: str) -> float:
     file = str({"noisy": _noisy, "clean": _clean, "parts": _two_parts}[kind](100_000))
     if kind == "parts":
         options = (*options, "--energy", "IE_left", "--energy", "IE_right")
-        found = json.loads(_output(*_suggest(file, *options, "-f", "json")))
+        found = json.loads(output(*_suggest(file, *options, "-f", "json")))
         assert found["basis"] == "parts"
     return _ratio(_suggest(file, *options, window=_WINDOWS[width]), _suggest(file, *options))
 
@@ -198,16 +194,12 @@ def _runs() -> list[str]:
 
 def _ratio(one: Sequence[str], other: Sequence[str], rounds: int = _ROUNDS) -> float:
     """Processor time of the first process over that of the second, in turns."""
-    times: tuple[list[float], list[float]] = ([], [])
-    for _ in range(rounds):
-        for command, found in zip((one, other), times, strict=True):
-            found.append(_processor_seconds(command))
-    return median(times[0]) / median(times[1])
+    return ratio(lambda: output(*one), lambda: output(*other), rounds, cost=_processor_seconds)
 
 
-def _processor_seconds(command: Sequence[str]) -> float:
+def _processor_seconds(call: Callable[[], object]) -> float:
     before = getrusage(RUSAGE_CHILDREN)
-    _output(*command)
+    call()
     after = getrusage(RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
@@ -219,22 +211,5 @@ def _speed_up(command: Callable[[str], Sequence[str]], rounds: int) -> float | N
     times: dict[str, list[float]] = {"1": [], "2": []}
     for _ in range(rounds):
         for jobs, found in times.items():
-            start = perf_counter()
-            _output("-m", "d2rpick", *command(jobs))
-            found.append(perf_counter() - start)
+            found.append(seconds(partial(output, "-m", "d2rpick", *command(jobs))))
     return min(times["1"]) / min(times["2"])
-
-
-def _output(*command: str) -> bytes:
-    return subprocess.run(
-        [sys.executable, *command], check=True, capture_output=True, cwd=ROOT, env=environment()
-    ).stdout
-
-
-@cache
-def environment() -> dict[str, str]:
-    """Environment of the processes, for which the package is compiled: an installed one is, a working copy may not."""
-    own = "PYTHONDONTWRITEBYTECODE"
-    clean = {name: value for name, value in os.environ.items() if name != own and not name.startswith("D2RPICK_")}
-    subprocess.run([sys.executable, "-m", "compileall", "-q", "d2rpick"], check=True, cwd=ROOT, env=clean)
-    return clean

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING
 from d2rpick.deck import find_windows, read_deck, read_parts, read_switching
 from d2rpick.rules import check_deck
 from d2rpick.rules.examples import BACK, HEAD, PARTS, THERE
+from tests.benchmarks.timing import ratio
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 NODES = ELEMENTS = 408_321
 MEGABYTE = 1e6
+_ROUNDS = 5
 
 
 @contextmanager
@@ -85,6 +87,22 @@ def dynars_parser() -> Callable[[Path], None] | None:
         assert [card.field("time1") for card in found] == [0.02, 0.09]
 
     return parse
+
+
+def to_loop(what: str) -> float:
+    """Finding cards, the numbers of their lines, or parts and elements of the deck over a loop over all lines."""
+    ours = {"cards": find_cards, "lines of cards": number_cards, "inventory": inventory}[what]
+    with large_deck() as path:
+        return ratio(lambda: ours(path), lambda: line_loop(path), _ROUNDS)
+
+
+def check_to_dynars() -> float | None:
+    """Checking the deck over parsing it with dynars; None where that is not installed."""
+    parse = dynars_parser()
+    if parse is None:
+        return None
+    with large_deck() as path:
+        return ratio(lambda: check(path), lambda: parse(path), 5 * _ROUNDS)  # of milliseconds only
 
 
 def memory() -> float:

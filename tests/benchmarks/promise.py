@@ -22,7 +22,7 @@ import d2rpick
 from d2rpick.errors import D2RPickError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from scipy.integrate import OdeSolution
 
@@ -112,12 +112,13 @@ class Record(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """What became of one record: the true residual of the recommended pair, what was stated of it, its grade."""
+    """What became of one record: the true residual of the recommended pair, what was stated of it, grade and basis."""
 
     true: float
     low: float | None
     high: float | None
     grade: str
+    basis: str
 
     @property
     def kept(self) -> bool | None:
@@ -140,7 +141,7 @@ def tried(record: Record, folder: Path) -> Truth | None:
     if best is None:
         return None
     true = record.residual(best["tr"], answer["recommended"]["td"])
-    return Truth(true, best["residual"], best["residual_high"], answer["quality"])
+    return Truth(true, best["residual"], best["residual_high"], answer["quality"], answer["basis"])
 
 
 def made(
@@ -267,7 +268,7 @@ def counted(make: Callable[[np.random.Generator], Record], count: int, seed: int
         return [tried(make(np.random.default_rng([seed, number])), Path(folder)) for number in range(count)]
 
 
-def row(found: list[Truth | None]) -> list[str]:
+def row(found: Sequence[Truth | None]) -> list[str]:
     """What became of the records of a class, as cells below `HEAD`."""
     pairs = [one for one in found if one]
     good = [one for one in pairs if one.grade == "good"]
@@ -284,13 +285,14 @@ def row(found: list[Truth | None]) -> list[str]:
 HEAD: Final = ("records", "recommended", "good", "good, R > 0.3", "as stated", "good of R < 0.2", "< 0.5", "above")
 
 
-def main(count: int = 100, seed: int = 1, *names: str) -> None:
-    """Print a table of all classes, or of those that have one of some ``names``."""
+def table(classes: Iterable[str], found: Callable[[str, int, int], Sequence[Truth | None]], *args: str) -> None:
+    """Print a line for each class, or for those that have one of some names behind number and seed in ``args``."""
+    count, seed = int((args[:1] or ("100",))[0]), int((args[1:2] or ("1",))[0])
     print("".join(f"{head:>17}" for head in ("class", *HEAD)))
-    for name, make in CLASSES.items():
-        if not names or any(one in name for one in names):
-            print("".join(f"{cell:>17}" for cell in (name[:16], *row(counted(make, count, seed)))), flush=True)
+    for name in classes:
+        if not args[2:] or any(one in name for one in args[2:]):
+            print("".join(f"{cell:>17}" for cell in (name[:16], *row(found(name, count, seed)))), flush=True)
 
 
 if __name__ == "__main__":
-    main(int((sys.argv[1:] or ["100"])[0]), int((sys.argv[2:] or ["1"])[0]), *sys.argv[3:])
+    table(CLASSES, lambda name, count, seed: counted(CLASSES[name], count, seed), *sys.argv[1:])

@@ -15,24 +15,16 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.ranking import GRADES
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
+from tests.benchmarks.promise import Truth, table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator
 
     from d2rpick.histories.history import Samples
-
-    Truth = Callable[[float, float], float]
-
-# A true residual beyond which a good grade is a broken promise, and up to which a pair is truly good.
-BAD: Final = 0.3
-_GOOD: Final = 0.2
-# Room that the stated range is given.
-_ROOM: Final = 0.05
 
 
 class Motion(NamedTuple):
@@ -75,7 +67,7 @@ class Record(NamedTuple):
     history: History
     settings: Settings
     window: tuple[float, float]
-    residual: Truth
+    residual: Callable[[float, float], float]
 
 
 def one_each(rng: np.random.Generator) -> Motion:
@@ -152,24 +144,7 @@ def history(time: Samples, energies: Samples) -> History:
     )  # fmt: skip
 
 
-class Stated(NamedTuple):
-    """Grade of a recommended pair, its basis, its residual as stated, at most, and in truth [-]."""
-
-    grade: str
-    basis: str
-    low: float | None
-    high: float | None
-    true: float
-
-    @property
-    def within(self) -> bool:
-        """Whether the truth lies in the stated range, with room."""
-        assert self.low is not None
-        assert self.high is not None
-        return self.low - _ROOM <= self.true <= self.high + _ROOM
-
-
-def stated(record: Record) -> Stated | None:
+def stated(record: Record) -> Truth | None:
     """Ask for a pair; None where none is recommended."""
     first, last = record.window
     ask = partial(suggest, td=first) if first == last else partial(suggest_in_window, window=record.window)
@@ -178,44 +153,8 @@ def stated(record: Record) -> Stated | None:
     if best is None or quality is None:
         return None
     true = record.residual(best.tr, answer.situation.td)
-    return Stated(quality.grade, answer.situation.basis, best.residual, best.residual_high, true)
-
-
-class Counts(NamedTuple):
-    """How many of the records have a pair, a good one, a good one that is bad, a range, a truth in it, and so on."""
-
-    records: int
-    pairs: int
-    good: int
-    good_but_bad: int
-    with_a_range: int
-    within_it: int
-    truly_good: int
-    good_of_these: int
-
-
-def counted(found: Sequence[Stated | None]) -> Counts:
-    """Count what was stated of records."""
-    pairs = [one for one in found if one]
-    good, ranged = [one for one in pairs if one.grade == GRADES[-1]], [one for one in pairs if one.high is not None]
-    return Counts(
-        records=len(found),
-        pairs=len(pairs),
-        good=len(good),
-        good_but_bad=sum(one.true > BAD for one in good),
-        with_a_range=len(ranged),
-        within_it=sum(one.within for one in ranged),
-        truly_good=sum(one.true <= _GOOD for one in pairs),
-        good_of_these=sum(one.true <= _GOOD for one in good),
-    )
-
-
-def main(number: int = 300, seed: int = 1) -> None:
-    """Print the table."""
-    for kind in CLASSES:
-        counts = counted([stated(record) for record in records(kind, seed, number)])
-        print(f"{kind}: " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in counts._asdict().items()))
+    return Truth(true, best.residual, best.residual_high, quality.grade, answer.situation.basis)
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    table(CLASSES, lambda kind, number, seed: [stated(record) for record in records(kind, seed, number)], *sys.argv[1:])

@@ -14,19 +14,18 @@ from importlib import import_module
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.opening import Selection, open_run
-from tests.benchmarks.choosing import environment
+from tests.benchmarks.timing import output, ratio, seconds
 from tests.made_binout import GLSTAT, LsdaWriter, values
 from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from d2rpick.histories.history import History, Samples
 
@@ -45,13 +44,13 @@ def glstat_to_loop() -> float:
     """A loop over the lines of glstat, 1e5 states, over reading time and internal energy."""
     file = _glstat()
     _agree(_read(file), _glstat_loop(file))
-    return _ratio(lambda: _glstat_loop(file), lambda: _read(file))
+    return ratio(lambda: _glstat_loop(file), lambda: _read(file), _ROUNDS)
 
 
 def glstat_to_bare_read() -> float:
     """Reading time and internal energy of the same glstat over reading its bytes."""
     file = _glstat()
-    return _ratio(lambda: _read(file), lambda: _bare_read(file))
+    return ratio(lambda: _read(file), lambda: _bare_read(file), _ROUNDS)
 
 
 def matsum_to_loop(part: int | None) -> float:
@@ -65,7 +64,7 @@ def matsum_to_loop(part: int | None) -> float:
         return run.databases[0].part_time, run.part_energies(chosen)
 
     _agree(read(), _matsum_loop(file, start))
-    return _ratio(lambda: _matsum_loop(file, start), read)
+    return ratio(lambda: _matsum_loop(file, start), read, _ROUNDS)
 
 
 def lasso_to_binout() -> float | None:
@@ -82,10 +81,10 @@ def lasso_to_binout() -> float | None:
     found = subprocess.run([LASSO, "-c", code, str(file)], capture_output=True, text=True, check=False)
     if "ModuleNotFoundError" in found.stderr:
         return None
-    seconds, *sums = map(float, found.stdout.split())
+    taken, *sums = map(float, found.stdout.split())
     history = _read(file)
     np.testing.assert_allclose([history.time.sum(), history.energy.sum()], sums, rtol=1e-4)  # lasso adds in singles
-    return seconds / median(_seconds(lambda: _read(file)) for _ in range(_ROUNDS))
+    return taken / median(seconds(lambda: _read(file)) for _ in range(_ROUNDS))
 
 
 def binout_to_dynars() -> float | None:
@@ -103,7 +102,7 @@ def binout_to_dynars() -> float | None:
     history = _read(file)
     for ours, column in zip((history.time, history.energy), theirs(), strict=True):
         np.testing.assert_array_equal(ours, column)
-    return _ratio(lambda: _read(file), theirs)
+    return ratio(lambda: _read(file), theirs, _ROUNDS)
 
 
 def memory_over_limit(kind: str) -> float:
@@ -141,7 +140,7 @@ def csv_to_loadtxt() -> float:
     """Reading a csv of 1e6 rows and two columns over numpy.loadtxt, of the same file."""
     file = _csv(_ROWS, 2)
     np.testing.assert_array_equal(_read(file).energy, _loadtxt(file)[:, 1])
-    return _ratio(lambda: _read(file), lambda: _loadtxt(file))
+    return ratio(lambda: _read(file), lambda: _loadtxt(file), _ROUNDS)
 
 
 def csv_to_pandas() -> float:
@@ -149,7 +148,7 @@ def csv_to_pandas() -> float:
     import pandas as pd
 
     file = _csv(_ROWS, 20)
-    return _ratio(lambda: _read(file), lambda: pd.read_csv(file))
+    return ratio(lambda: _read(file), lambda: pd.read_csv(file), _ROUNDS)
 
 
 def hdf5_to_h5py() -> float:
@@ -160,7 +159,7 @@ def hdf5_to_h5py() -> float:
         file.write_bytes(hdf5_file.write({"time": time, "internal_energy": energy}))
     ours = "import sys; from d2rpick.choice.of_run import read; read(sys.argv[1:])"
     alone = "import sys, h5py; file = h5py.File(sys.argv[1]); file['time'][()], file['internal_energy'][()]"
-    return _ratio(lambda: _process("-c", ours, str(file)), lambda: _process("-c", alone, str(file)))
+    return ratio(lambda: output("-c", ours, str(file)), lambda: output("-c", alone, str(file)), _ROUNDS)
 
 
 def extract_to_pandas() -> float:
@@ -169,9 +168,10 @@ def extract_to_pandas() -> float:
 
     file, out = _csv(_ROWS, 2), str(_folder_file("out.csv"))
     frame = pd.read_csv(file)
-    return _ratio(
-        lambda: _process("-m", "d2rpick", "extract", str(file), "-o", out, "--overwrite"),
+    return ratio(
+        lambda: output("-m", "d2rpick", "extract", str(file), "-o", out, "--overwrite"),
         lambda: frame.to_csv(out, index=False),
+        _ROUNDS,
     )
 
 
@@ -183,7 +183,7 @@ def write_to_pandas() -> float:
     columns = {"time": time, "internal_energy": energy}
     frame = pd.DataFrame(columns)
     assert csv_table.write(columns).decode() == frame.to_csv(index=False)
-    return _ratio(lambda: csv_table.write(columns), lambda: frame.to_csv(index=False))
+    return ratio(lambda: csv_table.write(columns), lambda: frame.to_csv(index=False), _ROUNDS)
 
 
 def csv_memory_over_limit() -> float:
@@ -216,10 +216,6 @@ def _folder_file(name: str) -> Path:
 
 def _loadtxt(file: Path) -> Samples:
     return np.loadtxt(file, delimiter=",", skiprows=1)
-
-
-def _process(*command: str) -> None:
-    subprocess.run([sys.executable, *command], check=True, capture_output=True, env=environment())
 
 
 def _glstat_loop(file: Path) -> Numbers:
@@ -255,17 +251,6 @@ def _agree(ours: History | tuple[Samples, Samples], loop: Numbers) -> None:
     time, energy = ours if isinstance(ours, tuple) else (ours.time, ours.energy)
     assert time.tolist() == loop[0]
     assert energy.ravel().tolist() == loop[1]
-
-
-def _ratio(one: Callable[[], object], other: Callable[[], object]) -> float:
-    times = [(_seconds(one), _seconds(other)) for _ in range(_ROUNDS)]
-    return median(first for first, _ in times) / median(second for _, second in times)
-
-
-def _seconds(call: Callable[[], object]) -> float:
-    start = perf_counter()
-    call()
-    return perf_counter() - start
 
 
 def _made(name: str, content: bytes | bytearray) -> Path:

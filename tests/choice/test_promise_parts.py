@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.settings import Settings
-from tests.benchmarks.promise_parts import BAD, CLASSES, Motion, Record, Stated, counted, history, records, stated
+from tests.benchmarks.promise import BAD, Truth, row
+from tests.benchmarks.promise_parts import CLASSES, Motion, Record, history, records, stated
 from tests.energies import sure
 
 
@@ -15,7 +16,7 @@ def test_what_is_stated_of_random_records_holds(kind: str) -> None:
     asked = [record._replace(window=record.window[:1] * 2) for record in records(kind, 1, 3)]  # one td is cheap
     found = [one for record in asked if (one := stated(record))]
     assert found
-    assert all(one.within for one in found if one.high is not None)
+    assert all(one.kept is not False for one in found)
     assert not any(one.true > BAD for one in found if one.grade == "good")
 
 
@@ -25,7 +26,7 @@ def test_two_planes_turn_no_pair_upside_down() -> None:
     truth = Motion(7.7, 2 * np.pi * np.array([29.2, 70.1, 48.76]), np.array([2.95, 4.64, -0.82]), forms)
     time = np.arange(0, 0.4, 4e-4)
     found = sure(stated(Record(history(time, truth.energies(time)), Settings(after=0.0), (0.2, 0.38), truth.residual)))
-    assert (found.basis, found.grade, found.within) == ("parts", "good", True)
+    assert (found.basis, found.grade, found.kept) == ("parts", "good", True)
     assert found.true < BAD
 
 
@@ -46,6 +47,6 @@ def test_the_truth_of_the_benchmark_is_that_of_its_motion() -> None:
 
 
 def test_grades_are_counted() -> None:
-    good, bad = Stated("good", "parts", 0.1, 0.1, 0.12), Stated("good", "parts", 0.1, 0.2, 0.4)
-    unknown = Stated("fair", "energy", None, None, 0.1)
-    assert tuple(counted([good, bad, unknown, None])) == (4, 3, 2, 1, 2, 1, 2, 1)
+    good, bad = Truth(0.12, 0.1, 0.1, "good", "parts"), Truth(0.4, 0.1, 0.2, "good", "parts")
+    unknown = Truth(0.1, None, None, "fair", "energy")
+    assert row([good, bad, unknown, None]) == ["4", "3", "2", "1", "0.500 of 2", "1/2", "1/1", "0/0"]
