@@ -7,23 +7,36 @@ From a row of fields follow the JSON of a thing, its line of csv, the columns of
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Final, Literal, NamedTuple
 
 from d2rpick.report import tables
 from d2rpick.version import __version__
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(NamedTuple):
     """What values a key has: ``schema`` says it to a validator, ``plain`` makes of one what JSON can hold.
 
     Within ``schema`` other kinds stand for their schemas; one with a ``name`` is a definition that is referred to.
+    A row, an object, has ``fields``, in their order.
     """
 
     schema: Mapping[str, Any]
     plain: Callable[[Any], Any] = lambda value: value
     name: str = ""
+    fields: tuple[Field, ...] = ()
+
+    @property
+    def keys(self) -> list[str]:
+        """Names of the fields: columns of a csv or a frame."""
+        return [field.key for field in self.fields]
+
+    def of_part(self, part: Callable[[Any], Any], keys: Iterable[str] = ()) -> list[Field]:
+        """Take the fields with these ``keys``, or all, into the row of things with such a ``part``."""
+        return [_in_part(self.field(key), part) for key in (keys or self.keys)]
+
+    def field(self, key: str) -> Field:
+        """Give a field by its key."""
+        return next(field for field in self.fields if field.key == key)
 
 
 # Kinds that many fields have; with a question mark they may be None.  A size is a number that is not negative.
@@ -52,31 +65,11 @@ class Field(NamedTuple):
         return thing[self.key] if isinstance(thing, Mapping) else getattr(thing, self.key)
 
 
-@dataclass(frozen=True)
-class Row(Kind):
-    """Kind of an object with these fields, in their order."""
-
-    fields: tuple[Field, ...] = ()
-
-    @property
-    def keys(self) -> list[str]:
-        """Names of the fields: columns of a csv or a frame."""
-        return [field.key for field in self.fields]
-
-    def of_part(self, part: Callable[[Any], Any], keys: Iterable[str] = ()) -> list[Field]:
-        """Take the fields with these ``keys``, or all, into the row of things with such a ``part``."""
-        return [_in_part(self[key], part) for key in (keys or self.keys)]
-
-    def __getitem__(self, key: str) -> Field:
-        """Give a field by its key."""
-        return next(field for field in self.fields if field.key == key)
-
-
 def _in_part(field: Field, part: Callable[[Any], Any]) -> Field:
     return field._replace(get=lambda thing: None if (found := part(thing)) is None else field.taken(found))
 
 
-def row(*fields: Field, name: str = "", later: Iterable[str] = (), closed: bool = False, **more: Any) -> Row:
+def row(*fields: Field, name: str = "", later: Iterable[str] = (), closed: bool = False, **more: Any) -> Kind:
     """Make a row; keys that came ``later`` than its schema may be missing from results, a ``closed`` one has no others.
 
     ``more`` goes into its schema as it is.
@@ -95,7 +88,7 @@ def row(*fields: Field, name: str = "", later: Iterable[str] = (), closed: bool 
         **({"additionalProperties": False} if closed else {}),
         **more,
     }
-    return Row(schema, lambda thing: {field.key: field.of(thing) for field in fields}, name, fields)
+    return Kind(schema, lambda thing: {field.key: field.of(thing) for field in fields}, name, fields)
 
 
 def kind_of(kind: Kind | Name, **limits: Any) -> Kind:
@@ -144,8 +137,7 @@ _KNOWN: Final = {
 _KINDS: Final = {**_KNOWN, **{f"{name}?": maybe(kind) for name, kind in _KNOWN.items()}}
 
 
-@dataclass(frozen=True)
-class Document:
+class Document(NamedTuple):
     """A result as JSON: the ``name`` of its schema, what it is, and its fields below schema, version and command.
 
     No object of a ``closed`` one has other keys; its schema defines ``also`` what other forms of the result hold.
@@ -153,12 +145,12 @@ class Document:
 
     name: str
     meaning: str
-    row: Row
+    row: Kind
     closed: bool = False
     also: tuple[Kind, ...] = ()
 
     @property
-    def whole(self) -> Row:
+    def whole(self) -> Kind:
         """All its fields."""
         head = (Field("schema", Kind({"const": self.name})), Field("tool_version", "text"), Field("command", "texts"))
         known = self.row.schema

@@ -45,12 +45,12 @@ WINDOW: Final = row(
     Field("td", "number?", get=lambda row: _times(row, 1)),
     Field("rigid_time", "number?"),
     Field("rigid_fraction", "number?", "of the record"),
-    _BEST["run_time_share"]._replace(
+    _BEST.field("run_time_share")._replace(
         kind="number?", meaning="of the reference, with this window alone; null without a cost share"),
     Field("locks_in", "flag?", "whether the window locks in energy, so that landings after it move"),
     Field("basis", maybe(keys.BASIS), get=lambda row: (now := _situation(row)) and now.basis),
-    _BEST["kind"]._replace(kind=maybe(keys.KIND)),
-    *(_BEST[key]._replace(kind="number?") for key in ("level_error", "lock_in_error", "residual")),
+    _BEST.field("kind")._replace(kind=maybe(keys.KIND)),
+    *(_BEST.field(key)._replace(kind="number?") for key in ("level_error", "lock_in_error", "residual")),
     Field("kinetic_share", "number?", get=lambda row: (now := _situation(row)) and now.kinetic_share),
     Field("margin", "number?", "kept clear before the contact, null for a window that is done", _margin("time")),
     Field("margin_source", maybe(one_of("given", "flight", "landing", "no-contact")),
@@ -60,9 +60,9 @@ WINDOW: Final = row(
     Field("landing", "number?", "of a window that is done", lambda row: row.done and row.done.landing),
     Field("landing_planned", "number?", "in the run that it was planned from",
           lambda row: row.done and row.done.planned),
-    *(_BEST[key] for key in _POSITION),
+    *(_BEST.field(key) for key in _POSITION),
     keys.QUALITY[0]._replace(meaning="of the pair; null without one, and for a window that is done"),
-    _BEST["position_error_is_lower_bound"],
+    _BEST.field("position_error_is_lower_bound"),
     closed=True, later=("position_error_is_lower_bound",),
 )  # fmt: skip
 DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in the unit of the history.", row(
