@@ -17,20 +17,20 @@ TYPE_CHECKING = False  # type checkers take it for theirs; importing typing is l
 if TYPE_CHECKING:
     from typing import Any
 
-    from d2rpick.api.answers import Suggestion as Suggestion
-    from d2rpick.api.answers import Verdict as Verdict
-    from d2rpick.api.answers import suggest as suggest
-    from d2rpick.api.answers import verify as verify
-    from d2rpick.api.calibrations import Calibration as Calibration
-    from d2rpick.api.calibrations import calibrate as calibrate
     from d2rpick.api.checking import Findings as Findings
     from d2rpick.api.checking import check as check
-    from d2rpick.api.explorations import Exploration as Exploration
-    from d2rpick.api.explorations import explore as explore
-    from d2rpick.api.part_tables import PartTable as PartTable
-    from d2rpick.api.part_tables import parts as parts
-    from d2rpick.api.plans import Plan as Plan
-    from d2rpick.api.plans import plan as plan
+    from d2rpick.api.choices import Suggestion as Suggestion
+    from d2rpick.api.choices import Verdict as Verdict
+    from d2rpick.api.choices import suggest as suggest
+    from d2rpick.api.choices import verify as verify
+    from d2rpick.api.costs import Calibration as Calibration
+    from d2rpick.api.costs import PartTable as PartTable
+    from d2rpick.api.costs import calibrate as calibrate
+    from d2rpick.api.costs import parts as parts
+    from d2rpick.api.flights import Exploration as Exploration
+    from d2rpick.api.flights import Plan as Plan
+    from d2rpick.api.flights import explore as explore
+    from d2rpick.api.flights import plan as plan
     from d2rpick.api.runs import Run as Run
     from d2rpick.api.runs import from_frame as from_frame
     from d2rpick.api.runs import read as read
@@ -59,12 +59,10 @@ _HOME = {
         ),
         "errors",
     ),
-    **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "api.answers"),
-    **dict.fromkeys(("Calibration", "calibrate"), "api.calibrations"),
+    **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "api.choices"),
+    **dict.fromkeys(("Calibration", "PartTable", "calibrate", "parts"), "api.costs"),
     **dict.fromkeys(("Findings", "check"), "api.checking"),
-    **dict.fromkeys(("Exploration", "explore"), "api.explorations"),
-    **dict.fromkeys(("PartTable", "parts"), "api.part_tables"),
-    **dict.fromkeys(("Plan", "plan"), "api.plans"),
+    **dict.fromkeys(("Exploration", "Plan", "explore", "plan"), "api.flights"),
     **dict.fromkeys(("Run", "from_frame", "read"), "api.runs"),
     **dict.fromkeys(("Study", "study"), "api.studies"),
     "Oscillator": "vibration.oscillator",

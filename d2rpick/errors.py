@@ -38,6 +38,10 @@ class DeckError(D2RPickError):
     """A deck cannot be read, or a card cannot be written."""
 
 
+class ArgumentError(TypeError, ValueError):
+    """What is asked contradicts itself, said with the names of arguments in backticks."""
+
+
 class ConfigurationError(D2RPickError):
     """The configuration of the deck check is wrong: an unknown rule, key or severity."""
 

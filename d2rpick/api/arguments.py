@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from d2rpick.api.request import OPTIONS, Number, Request
+from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from typing import Any
 
-    from d2rpick.choice.settings import Settings
+    from d2rpick.api.runs import Run
+    from d2rpick.choice.cost import Weights
     from d2rpick.vibration.oscillator import Oscillator
 
     Path = str | os.PathLike[str]
@@ -45,20 +48,6 @@ class Choosing(TypedDict, total=False):
     step_ratio: float
 
 
-# Limits of the numbers, both included; those that are None must be given or left out.
-_LIMITS = {
-    "after": (-math.inf, math.inf),
-    "margin": (0.0, math.inf),
-    "tolerance": (0.0, 1.0),
-    "max_kinetic_share": (0.0, math.inf),
-    "max_residual": (0.0, math.inf),
-    "v0": (-math.inf, math.inf),
-    "cost_share": (0.0, 1.0),
-    "step_ratio": (1.0, math.inf),
-}
-_OPTIONAL = {"after", "margin", "max_kinetic_share", "max_residual", "v0", "cost_share"}
-
-
 def number(name: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
     """Give a finite number within its limits.
 
@@ -82,14 +71,21 @@ def number(name: str, value: object, low: float = -math.inf, high: float = math.
     return found
 
 
-def window(name: str, value: object) -> tuple[float, float]:
-    """Give a window of time, the lower time first.
+def optional(name: str, value: object) -> float | None:
+    """Give a finite number, None where none is given."""
+    return None if value is None else number(name, value)
+
+
+def window(name: str, value: object) -> tuple[float, float] | None:
+    """Give a window of time, the lower time first; None where none is given.
 
     Examples
     --------
     >>> window("td_window", [0.06, 0.07])
     (0.06, 0.07)
     """
+    if value is None:
+        return None
     if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != 2:
         raise TypeError(f"{name} is {value!r}, a pair of times was expected")
     found = number(f"{name}[0]", value[0]), number(f"{name}[1]", value[1])
@@ -170,33 +166,56 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
     return found
 
 
-def settings(choosing: Choosing, *, with_deck: bool = False) -> Settings:
-    """Collect the arguments that say how to choose and judge; TypeError for one that does not exist.
+def check_run(name: str, run: object) -> None:
+    """Raise TypeError for what is not a run that was read."""
+    if not hasattr(run, "files"):
+        raise TypeError(f"{name} is {run!r}, what read() or from_frame() gives was expected")
 
-    ``with_deck``: a deck tells the cost share, unless it is given.
-    """
-    from d2rpick.choice.settings import Settings
-    from d2rpick.vibration.oscillator import to_mode
 
+def request_of(
+    run: Run | None,
+    parts: Parts | None,
+    flying: Parts | None,
+    deck: Path | None,
+    weights: Weights | Path | None,
+    choosing: Choosing,
+) -> Request:
+    """Ask as the arguments say; TypeError for one that is not of its kind or does not exist."""
+    if run is not None:
+        check_run("run", run)
+    chosen = run.chosen if run else Selection()
+    return Request(
+        deck=None if deck is None else one_path("deck", deck),
+        weights=one_path("weights", weights) if isinstance(weights, str | os.PathLike) else weights,
+        history=run.sources if run else (),
+        input_format=run.input_format if run else "auto",
+        time=chosen.time,
+        energy=chosen.energy,
+        part=part_names("parts", parts),
+        flying=part_names("flying", flying),
+        channel=tuple(f"{quantity}={name}" for quantity, name in chosen.channels),
+        **_chosen(choosing),
+    )
+
+
+def _chosen(choosing: Choosing) -> dict[str, Any]:
+    """Give the fields of a request that say how to choose."""
     known = Choosing.__annotations__
     if unknown := [name for name in choosing if name not in known]:
         raise TypeError(f"there is no argument {unknown[0]!r}; expected one of {', '.join(known)}")
     given: dict[str, Any] = dict(choosing)
-    for name in _LIMITS.keys() & given.keys():
-        if not (given[name] is None and name in _OPTIONAL):
-            given[name] = number(name, given[name], *_LIMITS[name])
-    if given.get("fit_window") is not None:
-        given["fit_window"] = window("fit_window", given["fit_window"])
-    oscillator, v0 = given.pop("oscillator", None), given.pop("v0", None)
-    if (oscillator is None) != (v0 is None):
+    oscillator = given.pop("oscillator", None)
+    if (oscillator is None) != (given.get("v0") is None):
         raise ValueError("oscillator and v0 go together: the one vibrates because of the other")
-    ways = {"oscillator": oscillator, "fit_window": given.get("fit_window"), "replay=False": not given.get("replay", 1)}
-    chosen = [name for name, value in ways.items() if value]
-    if len(chosen) > 1:
-        raise ValueError(f"{chosen[0]} and {chosen[1]} exclude each other")
-    if "step_ratio" in given and given.get("cost_share") is None and not with_deck:
-        raise ValueError("step_ratio needs cost_share or a deck too: the run time needs both")
-    return Settings(**given, oscillator=to_mode(oscillator, v0) if oscillator else None)
+    for name in given.keys() - {"replay", "strict", "fit_window"}:
+        limits = OPTIONS[name].kind
+        if given[name] is not None or name == "tolerance":
+            given[name] = number(name, given[name], *limits[:2] if isinstance(limits, Number) else ())
+    given["fit_window"] = window("fit_window", given.get("fit_window"))
+    given["no_verify"] = not given.pop("replay", True)
+    given["strict"] = bool(given.get("strict"))
+    of_oscillator = ("stiffness", "mass", "frame_mass", "alpha")
+    return given | {name: float(getattr(oscillator, name)) for name in of_oscillator if oscillator is not None}
 
 
 def _each(name: str, value: Any, expected: str) -> Iterable[Any]:
@@ -204,3 +223,11 @@ def _each(name: str, value: Any, expected: str) -> Iterable[Any]:
         raise TypeError(f"{name} is {value!r}; {expected} were expected")
     found: Iterable[Any] = value
     return found
+
+
+def one_path(name: str, value: Path) -> str:
+    """Give the name of one file."""
+    found = paths(name, value)
+    if len(found) > 1:
+        raise ValueError(f"{name} names {len(found)} files, one was expected")
+    return found[0]

@@ -1,118 +1,151 @@
-"""What is asked about a run, with what its deck adds: the same for every answer, and as on the command line."""
+"""The way from a request to what a choice needs: open, let the deck tell, take the energy, cost it.
+
+The commands of one run and Python go this one way, and get the same numbers.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from d2rpick.api import arguments
-from d2rpick.api.repeat import asking
+from d2rpick.choice.of_run import Reference
+from d2rpick.errors import ArgumentError, listing, name_units
 
 if TYPE_CHECKING:
-    from typing import Any
+    from collections.abc import Sequence
 
-    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
-    from d2rpick.choice.cost import CostModel, Weights
-    from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.cost import CostModel
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.warnings import Caution
+    from d2rpick.histories import run as histories
     from d2rpick.histories.names import Selection
 
-# Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
-_IN_MEMORY: Final = "<weights in memory>"
 
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A run that is open, the energy in it that is meant, and how it is judged.
 
-class Asked(NamedTuple):
-    """Which energy of a run is meant and how it is judged; ``cautions`` are what the deck left unknown.
-
-    ``options`` follow the times in the command line that asks the same.
+    ``cautions`` are what the deck left unknown, ``selection`` the columns and parts, with those that the deck names;
+    ``on_card`` are parts that stand on the card alone.
     """
 
+    run: Run
+    request: Request
     reference: Reference
     selection: Selection
     settings: Settings
-    cautions: tuple[Caution, ...]
-    options: tuple[str, ...]
+    model: CostModel | None = None
+    on_card: tuple[str, ...] = ()
+    cautions: tuple[Caution, ...] = ()
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """What follows the times in the command line that asks the same."""
+        from d2rpick.report.shell import positional  # not above: most answers repeat no command
+
+        return (*self.request.asking(), *positional(self.request.history))
 
 
-def asked_of(
-    run: Run,
-    parts: Parts | None,
-    flying: Parts | None,
-    deck: arguments.Path | None,
-    weights: Weights | arguments.Path | None,
-    choosing: Choosing,
-) -> Asked:
-    """Check the arguments, then read the deck and the energy that is meant.
+def open_run(request: Request, names: Sequence[str] = ()) -> Run:
+    """Open the run that is asked about, or other files as its files are opened."""
+    from d2rpick.api.runs import Run
+    from d2rpick.histories import opening
+
+    selection = request.selection(parts=False)
+    files = opening.open_run(names or request.history, selection, request.input_format)
+    return Run(files, selection, request.input_format)
+
+
+def judging_run(request: Request) -> Run | None:
+    """Open the history by which cards are judged; None without one, ArgumentError where options need it."""
+    if request.history:
+        return open_run(request)
+    request.without_history()
+    return None
+
+
+def on_card_only(request: Request, run: histories.Run) -> bool:
+    """Whether parts can stand on a card alone: a table knows none, and a named energy judges for all."""
+    return bool(request.energy) or not run.parts
+
+
+def ask(run: Run, request: Request, *, prints: bool = False, merge: int | None = None) -> Asked:
+    """Take the energy that is asked for of a run, with what its deck tells.
+
+    Parameters
+    ----------
+    run : Run
+    request : Request
+    prints : bool
+        A card is printed: parts that the history has not stand there alone, and the energy is that of the model.
+    merge : int, optional
+        Part into which all others are merged on the card: they become one rigid body.
 
     Raises
     ------
     D2RPickError
         If the run has no such parts or energy, or the deck or the weights cannot be read.
-    TypeError, ValueError
-        If an argument is not of its kind.
+    ArgumentError
+        If the recommended set is asked for beside other parts, or without a deck.
     """
-    from d2rpick.choice.of_run import Reference
+    settings, model, files = request.settings, model_of(request), run.files
+    selection = request.selection(parts=False)._replace(parts=request.part)
+    if request.part:
+        _check_recommended(request, files)
+    if model is not None:
+        from d2rpick.choice import by_deck
+        from d2rpick.choice.deck_of_run import in_deck
+
+        files = in_deck(files, model.inventory)
+        selection = by_deck.selected(files, selection, settings, model)
+    parts: tuple[str, ...] = ()
+    if prints and on_card_only(request, files):
+        parts, selection = selection.parts, selection._replace(parts=())
+    elif selection.parts:
+        request.selection()  # refuses a named energy beside them
+    reference = Reference.of(files, selection)
+    cautions: tuple[Caution, ...] = ()
+    if model is not None:
+        settings, cautions = by_deck.with_deck(settings, reference, model)
+    asked = Asked(run, request, reference, selection, settings, model, parts, cautions)
+    return asked if merge is None else _merged(asked, merge)
+
+
+def model_of(request: Request) -> CostModel | None:
+    """Read the deck with its weights; None without one."""
+    if request.deck is None:
+        return None
+    from d2rpick.choice.by_deck import read_model
+
+    return read_model(request.deck, request.weights)
+
+
+def _check_recommended(request: Request, run: histories.Run) -> None:
+    """Refuse the word for the recommended set beside other parts, or without a deck."""
     from d2rpick.flight.flying_parts import asks_for_recommended
 
-    settings = arguments.settings(choosing, with_deck=deck is not None)
-    chosen = selection_for(run, parts, flying)
-    if asks_for_recommended(chosen.parts, run.files):
-        if len(chosen.parts) > 1:
-            raise ValueError("parts names the recommended set and others; it stands for a whole set")
-        if deck is None:
-            raise ValueError("parts is 'recommended', which needs deck, the main deck of the run")
-    model, options = model_of(deck, weights)
-    options = (*options, *asking(run, chosen, choosing))
-    if model is None:
-        return Asked(Reference.of(run.files, chosen), chosen, settings, (), options)
-    from d2rpick.choice.by_deck import selected, with_deck
-    from d2rpick.choice.deck_of_run import in_deck
-
-    files = in_deck(run.files, model.inventory)
-    selection = selected(files, chosen, settings, model)
-    reference = Reference.of(files, selection)
-    settings, unknown = with_deck(settings, reference, model)
-    return Asked(reference, selection, settings, unknown, options)
+    if asks_for_recommended(request.part, run):
+        if len(request.part) > 1:
+            raise ArgumentError("`parts` recommended stands for a whole set; leave the other `parts` out")
+        if request.deck is None:
+            raise ArgumentError("`parts` recommended needs `deck`, the main deck of the run")
 
 
-def selection_for(run: Run, parts: Parts | None, flying: Parts | None) -> Any:
-    """Add the parts to the columns that were named when the run was read."""
-    check_run(run)
-    names = arguments.part_names("parts", parts)
-    if names and run.chosen.energy:
-        raise ValueError("parts and the energy that was named when the run was read exclude each other")
-    return run.chosen._replace(parts=names, flying=arguments.part_names("flying", flying))
+def _merged(asked: Asked, merge: int) -> Asked:
+    """Let the parts become one rigid body, with a caution where nothing joins them."""
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.flight.bodies import RigidBody
 
-
-def check_run(run: Run, name: str = "run") -> None:
-    """Raise TypeError for what is not a run that was read."""
-    if not hasattr(run, "files"):
-        raise TypeError(f"{name} is {run!r}, what read() or from_frame() gives was expected")
-
-
-def model_of(
-    deck: arguments.Path | None, weights: Weights | arguments.Path | None
-) -> tuple[CostModel | None, tuple[str, ...]]:
-    """Read a deck with its weights, None without one; and give the options that name them."""
-    if deck is None:
-        if weights is not None:
-            raise ValueError("weights needs a deck, whose elements are weighted")
-        return None, ()
-    from d2rpick.choice.by_deck import read_model
-    from d2rpick.choice.cost import Weights
-
-    main = _one_path("deck", deck)
-    if weights is None:
-        return read_model(main), ("--deck", main)
-    if isinstance(weights, Weights):
-        return read_model(main, weights), ("--deck", main, "--weights", _IN_MEMORY)
-    file = _one_path("weights", weights)
-    return read_model(main, file), ("--deck", main, "--weights", file)
-
-
-def _one_path(name: str, value: arguments.Path) -> str:
-    found = arguments.paths(name, value)
-    if len(found) > 1:
-        raise ValueError(f"{name} names {len(found)} files, one was expected")
-    return found[0]
+    parts = asked.reference.history.parts
+    if not parts:
+        return asked
+    cautions, bodies = asked.cautions, asked.settings.bodies or ()
+    if len(bodies) > 1:
+        apart = listing([name_units(body.parts) for body in bodies], between="; ")
+        found = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
+        cautions = (*cautions, Caution("merged-apart", f"{found}; leave it out to keep them apart"))
+    merged = tuple(sorted({part.id for part in parts} | {merge}))
+    whole = len(merged) > 1 or any(body.whole for body in bodies)  # a part alone may be of pieces
+    return replace(asked, settings=replace(asked.settings, bodies=(RigidBody(merged, whole=whole),)), cautions=cautions)

@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.asked import check_run
-from d2rpick.api.document import Document
-from d2rpick.api.frames import frame_of
+from d2rpick.api.answer import Answer, frame_of
 from d2rpick.report.shell import positional
 
 if TYPE_CHECKING:
@@ -18,13 +16,12 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing
     from d2rpick.api.runs import Run
-    from d2rpick.choice.warnings import Caution
     from d2rpick.deck import Window
     from d2rpick.rules import Checked, Finding
 
 
-@dataclass(frozen=True, eq=False)
-class Findings(Document):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Findings(Answer):
     """Answer of `check`; nothing of it changes.
 
     ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``; ``windows`` are those in
@@ -34,10 +31,11 @@ class Findings(Document):
     decks: tuple[str, ...]
     findings: tuple[Finding, ...]
     windows: tuple[Window, ...] = field(repr=False)
-    warnings: tuple[Caution, ...]
     command: tuple[str, ...] = field(repr=False)
     _checked: tuple[Checked, ...] = field(repr=False)
     _history: tuple[str, ...] | None = field(repr=False)
+    kind = "findings"
+    said = ("decks", "findings")
 
     def to_json(self) -> str:
         """Give the JSON document of ``d2rpick check``, schema d2rpick/check/1; paths relative to the working folder."""
@@ -101,18 +99,18 @@ def check(
     >>> [(window.part, window.td) for window in found.windows]
     [(11, 0.0687534), (12, 0.064)]
     """
-    from d2rpick.api.repeat import options_of
     from d2rpick.rules import check_deck, configuration_for
     from d2rpick.rules.configuration import Configuration
 
     names = arguments.paths("decks", decks)
-    settings = arguments.settings(choosing)
+    if history is not None:
+        arguments.check_run("history", history)
+    request = arguments.request_of(history, None, None, None, None, choosing)
     judge = None
     if history is not None:
         from d2rpick.rules.judgement import HistoryJudge
 
-        check_run(history, "history")
-        judge = HistoryJudge(history.files, history.chosen, settings)
+        judge = HistoryJudge(history.files, history.chosen, request.settings)
     asked = Configuration(arguments.rule_ids("select", select), arguments.rule_ids("ignore", ignore))
     checked = []
     for name in names:
@@ -121,12 +119,12 @@ def check(
         checked.append(check_deck(name, configuration_for(name, asked), judge))
     files = [text for name in (history.sources if history else ()) for text in ("--history", name)]
     rules = [text for name in ("select", "ignore") for one in getattr(asked, name) for text in (f"--{name}", one)]
-    judging = options_of(history.chosen, choosing, history.input_format) if history else ()
+    judging = request.asking() if history else ()
     return Findings(
         decks=names,
         findings=tuple(finding for one in checked for finding in one.findings),
         windows=tuple(window for one in checked for window in one.windows),
-        warnings=tuple(judge.cautions) if judge else (),
+        cautions=tuple(judge.cautions) if judge else (),
         command=("check", *files, *judging, *rules, *positional(names)),
         _checked=tuple(checked),
         _history=history.sources if history else None,

@@ -17,6 +17,8 @@ from d2rpick.choice.study_rows import FAILED, PLAIN, UNREADABLE, Stamp, StudyRow
 from d2rpick.errors import INTERNAL_ERROR, FormatError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from d2rpick.choice.study import Question
 
 _FIRST: Final = b'{"source": '
@@ -79,6 +81,7 @@ class Ledger:
         self.name, self.asked, self.curve = name, fingerprint(question), question.curve
         self.taken = self.outdated = self.damaged = 0
         self._rows: dict[tuple[Stamp, ...], StudyRow] = {}
+        self.known: dict[int, StudyRow] = {}
         self._known: set[tuple[str, ...]] = set()
         new = not Path(name).exists()
         if not new and not Path(name).is_file():
@@ -125,6 +128,11 @@ class Ledger:
             return replace(row, source=source)
         self.outdated += tuple(stamp.name for stamp in files) in self._known
         return None
+
+    def taking(self, sources: Sequence[str]) -> int:
+        """Count the runs that are known."""
+        self.known = {number: row for number, source in enumerate(sources) if (row := self.find(source))}
+        return len(self.known)
 
     def told(self, runs: int) -> str:
         """Say how many of so many runs were taken, and why others that the file holds were not."""

@@ -2,31 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
+from os.path import abspath
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
-from d2rpick.api.answers import written
-from d2rpick.api.document import Document
-from d2rpick.api.frames import frame_of
+from d2rpick.api.answer import Paged, frame_of
+from d2rpick.api.request import needed_time, time_or_window
+from d2rpick.choice import study as core
 from d2rpick.report.shell import positional
+from d2rpick.workers import answers, on_cores
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     import pandas as pd
     from matplotlib.figure import Figure
 
     from d2rpick.api.arguments import Choosing, Parts
-    from d2rpick.choice.study import Study as Core
-    from d2rpick.choice.study_rows import Common, StudyRow
-    from d2rpick.choice.warnings import Caution
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.request import Request
+    from d2rpick.api.resume_file import Ledger
+    from d2rpick.choice.study_rows import StudyRow
+    from d2rpick.workers import Farm
 
 
-@dataclass(frozen=True, eq=False)
-class Study(Document):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Study(Paged, core.Study):
     """Answer of `study`; nothing of it changes.
 
     ``runs`` has a row per run; ``agree`` is whether the intervals of tr intersect, None without a tr; ``common`` is one
@@ -34,19 +38,14 @@ class Study(Document):
     Times are in the unit of the runs; ``td`` is None where each run has its own.
     """
 
-    td: float | None
-    runs: tuple[StudyRow, ...] = field(repr=False)
-    agree: bool | None
-    common: Common
-    warnings: tuple[Caution, ...]
-    command: tuple[str, ...] = field(repr=False)
-    _core: Core = field(repr=False)
+    command: tuple[str, ...]
+    kind = "study"
+    said = ("td", "agree", "common")
 
-    def to_json(self) -> str:
-        """Give the JSON document of ``d2rpick study``, schema d2rpick/study/1."""
-        from d2rpick.report.study import DOCUMENT
-
-        return DOCUMENT.as_json(self._core, self.command)
+    @property
+    def runs(self) -> tuple[StudyRow, ...]:
+        """What is known of each run."""
+        return self.rows
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per run, a column per key of ``runs`` in the JSON; what is not known is NaN.
@@ -65,13 +64,13 @@ class Study(Document):
         """Draw the energies over each other, with every tr, as a matplotlib Figure."""
         from d2rpick.report.figures_study import draw_study
 
-        return draw_study(self._core)
+        return draw_study(self)
 
-    def report(self, path: arguments.Path) -> Path:
-        """Write the study to one HTML page that needs no network; an existing file is replaced."""
+    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
+        """Write the page."""
         from d2rpick.report.pages import study_page
 
-        return written(path, study_page(self._core, ("d2rpick", *self.command)))
+        return study_page(self, command)
 
 
 def study(
@@ -122,28 +121,70 @@ def study(
     >>> found.agree, round(found.common.tr, 4)
     (True, 0.0136)
     """
-    from d2rpick.api.repeat import options_of
     from d2rpick.api.runs import known_format, selection_of
-    from d2rpick.choice.study import Question, ask, failed, find_runs, summarise
-    from d2rpick.workers import answers, on_cores
 
-    if (td is None) == (td_window is None):
-        raise TypeError("td or td_window was expected, and not both")
+    asked = needed_time(time_or_window(arguments.optional("td", td), arguments.window("td_window", td_window)))
     processes = arguments.whole("jobs", jobs, 1)
-    asked = arguments.number("td", td) if td_window is None else arguments.window("td_window", td_window)
-    names = find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
-    selection = selection_of(time, energy, channels)._replace(
-        parts=arguments.part_names("parts", parts), flying=arguments.part_names("flying", flying)
-    )
-    question = Question(asked, arguments.settings(choosing), selection, known_format(input_format), True)
-    rows: dict[int, StudyRow] = {}
+    names = core.find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
+    request = arguments.request_of(None, parts, flying, None, None, choosing)
+    chosen = selection_of(time, energy, channels)
+    request = replace(
+        request, time=chosen.time, energy=chosen.energy, channel=tuple("=".join(one) for one in chosen.channels),
+        input_format=known_format(input_format),
+    )  # fmt: skip
+    question = core.Question(asked, request.settings, request.selection(), request.input_format, curve=True)
     with on_cores(min(processes, len(names)), "d2rpick.choice.study") as farm:
-        for answer in answers(farm, partial(ask, question), names):
-            row = failed(names[answer.number], answer.error) if answer.error else answer.result
-            rows[answer.number] = replace(row, source=names[answer.number])
-    core = summarise(question.td, [rows[number] for number in range(len(names))])
-    times = ("--td", repr(asked)) if isinstance(asked, float) else ("--td-window", *map(repr, asked))
-    choosing.pop("cost_share", None)  # of the run time neither the study nor its command says anything
-    choosing.pop("step_ratio", None)
-    command = ("study", *times, *options_of(selection, choosing, input_format), *positional(names))
-    return Study(core.td, core.rows, core.agree, core.common, core.cautions, command, core)
+        return summary(request, question, names, list(rows_of(question, names, farm)))
+
+
+def summary(request: Request, question: core.Question, names: Sequence[str], rows: Sequence[StudyRow]) -> Study:
+    """Hold the rows of all runs against each other."""
+    td = question.td
+    times = ("--td-window", *map(repr, td)) if isinstance(td, tuple) else ("--td", repr(td))
+    # of the run time neither the study nor its command says anything
+    options = replace(request, cost_share=None, step_ratio=None).asking()
+    return Study.of(core.summarise(td, rows), command=("study", *times, *options, *positional(names)))
+
+
+def rows_of(
+    question: core.Question,
+    sources: Sequence[str],
+    farm: Farm,
+    ledger: Ledger | None = None,
+    *,
+    absolute: bool = False,
+    told: Callable[[int], None] | None = None,
+) -> Iterator[StudyRow]:
+    """Rows in the order of the runs, each as soon as those before it are there.
+
+    Parameters
+    ----------
+    question : Question
+    sources : sequence of str
+        Files or folders of the runs.
+    farm : Farm
+        Computes the rows that are not known.
+    ledger : Ledger, optional
+        Knows rows already, and gets new ones.
+    absolute : bool
+        The processes of the farm work in other folders.
+    told : function, optional
+        Is called with the number of rows that are there, first with those that were known.
+    """
+    known = dict(ledger.known) if ledger else {}
+    new = [number for number in range(len(sources)) if number not in known]
+    done, following = len(known), 0
+    names = [abspath(sources[number]) if absolute else sources[number] for number in new]  # noqa: PTH100
+    for answer in chain((None,), answers(farm, partial(core.ask, question), names)):
+        if answer:
+            number = new[answer.number]
+            row = core.failed(sources[number], answer.error) if answer.error else answer.result
+            known[number] = replace(row, source=sources[number])
+            done += 1
+            if ledger:
+                ledger.add(known[number])
+        if told:
+            told(done)
+        while following in known:
+            yield known.pop(following)
+            following += 1

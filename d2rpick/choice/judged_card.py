@@ -94,7 +94,7 @@ def card_of_plan(
     plan: Plan, run: Run, request: CardRequest, *, every: bool = False
 ) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
     """Print the card of the run that a plan leads to, its new windows judged; None also where none is new."""
-    new = plan.windows(every=every)
+    new = plan.new_windows(every=every)
     judge = partial(verify_of, Reference(run, plan.history), settings=plan.settings)
     return judged_card(new, plan.history, judge, request.by(plan.settings), plan.done) if new else None
 

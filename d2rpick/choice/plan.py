@@ -124,17 +124,17 @@ class Plan:
         """Windows that this reference supports."""
         return tuple(row for row in self.rows if row.status == "supported")
 
-    def windows(self, *, every: bool = False) -> tuple[Times, ...]:
+    def new_windows(self, *, every: bool = False) -> tuple[Times, ...]:
         """Give (tr, td) of the supported windows, or of ``every`` one that is not done [time]."""
         wanted = ("supported", "re-plan") if every else ("supported",)
         return tuple(row.window for row in self.rows if row.status in wanted and row.window)
 
-    def next_run(self, *, every: bool = False) -> tuple[Times, ...]:
+    def run_windows(self, *, every: bool = False) -> tuple[Times, ...]:
         """Give (tr, td) of the run to be computed next: the windows that are done and the new ones, in order [time].
 
         None where nothing is new.  The next run starts at the beginning again, so it needs both.
         """
-        new = self.windows(every=every)
+        new = self.new_windows(every=every)
         return (*self.done, *new) if new else ()
 
     @property

@@ -106,7 +106,7 @@ class Parts:
     ``inventory`` is None without a deck.
     """
 
-    run: Run
+    files: Run
     inventory: Inventory | None
     weights: Weights | None
     settings: Settings

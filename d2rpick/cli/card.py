@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
 import click
 
-from d2rpick.cli import options as shared
-from d2rpick.cli.card_options import (
-    all_cautions,
-    card_options,
-    card_request,
-    check_solver,
-    energy_of,
-    need_ids,
-    needed,
-    numbers,
-    printing,
-)
-from d2rpick.cli.output import Output, finish, text_bytes
+from d2rpick.cli import options
+from d2rpick.cli.options import CARDS, FILES, REFERENCE
+from d2rpick.cli.output import text_bytes
+from d2rpick.cli.values import click_type
+from d2rpick.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.settings import Settings
-    from d2rpick.deck.printed_card import PrintedCard, Printing, Times
-    from d2rpick.histories.opening import Run
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.request import Request
+    from d2rpick.api.runs import Run
+    from d2rpick.choice.switched_run import Times
+    from d2rpick.cli.output import Output
+    from d2rpick.deck.printed_card import PrintedCard, Printing
 
 EXAMPLES = """\b
 Examples:
@@ -36,57 +31,53 @@ Examples:
   d2rpick card --solver radioss --tr 0.0135867 --td 0.0687534 --node 1001 --end 0.15
 """
 
-_ONLY_JUDGED = "--part chooses by whose energy a card for {} is judged; give a --history with parts"
+_ONLY_JUDGED: Final = "--part chooses by whose energy a card for {} is judged; give a --history with parts"
 
 
-@click.command("card", epilog=EXAMPLES)
-@click.option("--tr", type=shared.TIME, multiple=True, metavar="T", help="Switch to rigid at this time; repeatable.")
-@click.option("--td", type=shared.TIME, multiple=True, metavar="T", help="Switch back at this time, one for each --tr.")
-@click.option("--windows", type=shared.FILE, metavar="FILE", help="Instead of both: a file with lines 'tr td'.")
-@click.option(
-    "--part",
-    metavar="IDS",
-    multiple=True,
-    type=shared.NAMES,
-    help="Parts to switch, by number (3,7) or range (10-19), or with --history by title.",
+@options.command("card", EXAMPLES)
+@options.time("--tr", "Switch to rigid at this time; repeatable.", many=True)
+@options.time("--td", "Switch back at this time, one for each --tr.", many=True)
+@options.file("--windows", "Instead of both: a file with lines 'tr td'.")
+@options.takes(
+    *("part", *CARDS, *REFERENCE, *FILES, "exit_zero"),
+    part={
+        "help": "Parts to switch, by number (3,7) or range (10-19), or with --history by title.",
+        "type": click_type("names"),
+        "instead_of": (),
+    },
 )
-@card_options
-@shared.reference_options
-@shared.file_options
-@shared.EXIT_ZERO
-@click.pass_context
-def command(ctx: click.Context, /, exit_zero: bool, **options: Any) -> None:
+def command(
+    tr: tuple[float, ...], td: tuple[float, ...], windows: str | None, request: Request, cards: Cards, output: Output
+) -> None:
     """Print solver input for switching windows, ready to be pasted.
 
     With a history, the times are judged again as printed, and the verdict is added as a comment.
     """
-    from d2rpick.deck.printing import DEFAULT, cards
+    from d2rpick.api.asked import judging_run
+    from d2rpick.deck.printing import DEFAULT
+    from d2rpick.deck.printing import cards as print_cards
 
-    if options["solver"]:
-        check_solver(options, options["solver"])
-    windows = _windows(options)
-    reference = shared.reference(options)
-    output = Output.of(options, *_inputs(options), *(reference[0].sources if reference else ()))
-    if reference is None:
-        solver = options["solver"] or DEFAULT
-        card, verified = cards(windows, _alone(options, solver), solver), True
+    if cards.solver:
+        cards.check_solver(cards.solver)
+    times = _windows(tr, td, windows)
+    run = judging_run(request)
+    output = output.beside(windows, *(run.sources if run else ()))
+    if run is None:
+        solver = cards.solver or DEFAULT
+        card, verified = print_cards(times, _alone(request, cards, solver), solver), True
     else:
-        card, verified = _judged(windows, reference, options, output)
+        card, verified = _judged(times, run, request, cards, output)
     output.notes(card.notes, ())
     output.content(text_bytes(card.text))
-    finish(ctx, objection=not verified, exit_zero=exit_zero)
+    output.finish(objection=not verified)
 
 
-def _windows(options: dict[str, Any]) -> Sequence[Times]:
+def _windows(tr: Sequence[float], td: Sequence[float], file: str | None) -> Sequence[Times]:
     """Pair the times, or read them from the file; UsageError where they do not say windows."""
-    tr, td = options["tr"], options["td"]
-    if options["windows"] is not None:
+    if file is not None:
         if tr or td:
             raise click.UsageError("--windows excludes --tr and --td")
-        from d2rpick.deck.printed_card import read_windows
-
-        with click.open_file(options["windows"], encoding="utf-8", errors="replace") as stream:
-            return read_windows(stream.read(), options["windows"])
+        return options.windows_in(file)
     if not tr or not td:
         raise click.UsageError(f"a card needs {'--td' if tr else '--tr'}; or --windows, a file with lines 'tr td'")
     if len(tr) != len(td):
@@ -94,43 +85,40 @@ def _windows(options: dict[str, Any]) -> Sequence[Times]:
     return list(zip(tr, td, strict=True))
 
 
-def _inputs(options: dict[str, Any]) -> tuple[str, ...]:
-    return () if options["windows"] in (None, "-") else (options["windows"],)
-
-
-def _alone(options: dict[str, Any], solver: str) -> Printing:
-    """Say what the card needs where no history says anything; UsageError where something is missing."""
+def _alone(request: Request, cards: Cards, solver: str) -> Printing:
+    """Say what the card needs where no history says anything; ArgumentError where something is missing."""
+    from d2rpick.api.cards import needed, numbers
     from d2rpick.deck.printing import SOLVERS
 
-    check_solver(options, solver)
+    cards.check_solver(solver)
     module = SOLVERS[solver]
-    if not options[module.switches]:
-        raise click.UsageError(needed(module))
-    if options["part"] and module.switches != "part":
-        raise click.UsageError(_ONLY_JUDGED.format(module.title))
-    if "end" in module.takes and options["end"] is None:
-        raise click.UsageError(f"a card for {module.title} needs --end, the end of the run, or a --history")
-    return printing(options, numbers("--part", options["part"]))
+    if not {"part": request.part, "node": cards.node}[module.switches]:
+        raise ArgumentError(needed(module))
+    if request.part and module.switches != "part":
+        raise ArgumentError(_ONLY_JUDGED.format(module.title))
+    if "end" in module.takes and cards.end is None:
+        raise ArgumentError(f"a card for {module.title} needs --end, the end of the run, or a --history")
+    return cards.printing(numbers("--part", request.part))
 
 
 def _judged(
-    windows: Sequence[Times], reference: tuple[Run, Settings], options: dict[str, Any], output: Output
+    windows: Sequence[Times], run: Run, request: Request, cards: Cards, output: Output
 ) -> tuple[PrintedCard, bool]:
     """Write the card with the verdict of the history in its comments, and tell it on stderr too."""
+    from d2rpick.api.asked import ask
+    from d2rpick.api.cards import all_cautions, need_ids
     from d2rpick.choice.judged_card import judged_card
-    from d2rpick.choice.of_run import Reference, verify_of
+    from d2rpick.choice.of_run import verify_of
     from d2rpick.deck.printing import SOLVERS
 
-    run, settings = reference
-    history = energy_of(run, options, prints=True)
-    request = card_request(run, options, history)
-    module = SOLVERS[request.of(history)[0]]
-    if request.printing.part and module.switches != "part":
-        raise click.UsageError(_ONLY_JUDGED.format(module.title))
-    judge = partial(verify_of, Reference(run, history), settings=settings)
-    found = judged_card(windows, history, judge, request)
+    asked = ask(run, request, prints=True)
+    history, wanted = asked.reference.history, cards.request(asked)
+    module = SOLVERS[wanted.of(history)[0]]
+    if wanted.printing.part and module.switches != "part":
+        raise ArgumentError(_ONLY_JUDGED.format(module.title))
+    found = judged_card(windows, history, partial(verify_of, asked.reference, settings=asked.settings), wanted)
     if found is None:
-        raise click.UsageError(need_ids(request, history))
+        raise ArgumentError(need_ids(wanted, history))
     card, verdicts = found
     output.notes(history.notes, dict.fromkeys(caution for verdict in verdicts for caution in all_cautions(verdict)))
     return card, all(verdict.verified for verdict in verdicts)

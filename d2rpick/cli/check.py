@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output, explained, finish, tell
-from d2rpick.cli.wording import in_words
+from d2rpick.cli import options
+from d2rpick.cli.options import REFERENCE, RESULT
+from d2rpick.cli.output import explained, in_words, tell
+from d2rpick.cli.values import click_type
 from d2rpick.errors import INTERNAL_ERROR, ConfigurationError, D2RPickError, DeckError
-from d2rpick.report.formats import FORMATS
+from d2rpick.report.formats import FORMATS, write
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.api.request import Request
     from d2rpick.choice.warnings import Caution
+    from d2rpick.cli.output import Output
     from d2rpick.rules import Checked, Unreadable
+    from d2rpick.rules.configuration import Configuration
     from d2rpick.rules.judgement import HistoryJudge
 
 EXAMPLES = """\b
@@ -29,27 +33,26 @@ Examples:
 """
 
 
-@click.command("check", epilog=EXAMPLES)
-@click.argument("deck", metavar="DECK...", nargs=-1, required=True, type=shared.FILE)
-@shared.reference_options
+@options.command("check", EXAMPLES)
+@click.argument("deck", metavar="DECK...", nargs=-1, required=True, type=click_type("file"))
+@options.takes(*REFERENCE)
 @click.option(
-    "--select",
-    metavar="IDS",
-    multiple=True,
+    "--select", metavar="IDS", multiple=True,
     help="Check only these rules, by id or its beginning: D2R101,D2R2.  [default: by d2rpick.toml or pyproject.toml]",
-)
+)  # fmt: skip
 @click.option("--ignore", metavar="IDS", multiple=True, help="Skip these rules; overrules --select.")
 @click.option(
-    "--fail-on",
-    type=click.Choice(["error", "warning"]),
-    default="error",
-    show_default=True,
+    "--fail-on", type=click.Choice(["error", "warning"]), default="error", show_default=True,
     help="Least severe finding that sets exit code 1.",
-)
-@shared.output_options(*FORMATS["findings"])
-@click.pass_context
+)  # fmt: skip
+@options.takes(*RESULT, forms=FORMATS["findings"])
 def command(
-    ctx: click.Context, /, deck: tuple[str, ...], fail_on: str, output_format: str, exit_zero: bool, **options: Any
+    deck: tuple[str, ...],
+    select: tuple[str, ...],
+    ignore: tuple[str, ...],
+    fail_on: str,
+    request: Request,
+    output: Output,
 ) -> None:
     """Find the switching cards of LS-DYNA decks and Radioss runs, and check them against deck and history.
 
@@ -58,41 +61,41 @@ def command(
     line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) silences one for it.
     """
     from d2rpick.report.findings import Checks
-    from d2rpick.report.formats import Shown, write
     from d2rpick.rules import Severity
+    from d2rpick.rules.configuration import Configuration
 
-    judge = _judge(options)
-    output = Output.of(options, *deck, *(judge.run.sources if judge else ()))
-    results, failed, inputs = _checked(deck, judge, options)
+    judge = _judge(request)
+    output = output.beside(*deck, *(judge.run.sources if judge else ()))
+    results, failed, inputs = _checked(deck, judge, Configuration(_ids(select), _ids(ignore)))
     output.spare(inputs)
     cautions = _cautions(results, judge)
     output.notes(judge.notes if judge else (), cautions)
     for one in failed:
         tell(f"d2rpick: {one.reason}")
-    limit = Severity(fail_on)
-    if results or output_format != "table":
+    limit, form = Severity(fail_on), output.output_format
+    if results or form != "table":
         history = judge.run.sources if judge else None
         checks = Checks(results, failed=failed, cautions=cautions, fail_on=limit, history=history)
-        text = write("findings", output_format, checks, Shown(ctx.meta["d2rpick.command"]))
-        output.result(in_words(text, output_format))
+        output.result(in_words(write("findings", form, checks, output.shown()), form))
     if not results or any(one.code == INTERNAL_ERROR for one in failed):
-        ctx.exit(2)
+        click.get_current_context().exit(2)
     heavy = any(finding.severity.rank <= limit.rank for result in results for finding in result.findings)
-    finish(ctx, objection=heavy or bool(failed), exit_zero=exit_zero)
+    output.finish(objection=heavy or bool(failed))
 
 
-def _judge(options: dict[str, Any]) -> HistoryJudge | None:
-    reference = shared.reference(options)
-    if reference is None:
+def _judge(request: Request) -> HistoryJudge | None:
+    from d2rpick.api.asked import judging_run
+
+    run = judging_run(request)
+    if run is None:
         return None
     from d2rpick.rules.judgement import HistoryJudge
 
-    run, settings = reference
-    return HistoryJudge(run, shared.selection(options), settings)
+    return HistoryJudge(run.files, request.selection(), request.settings)
 
 
 def _checked(
-    decks: Sequence[str], judge: HistoryJudge | None, options: dict[str, Any]
+    decks: Sequence[str], judge: HistoryJudge | None, asked: Configuration
 ) -> tuple[list[Checked], list[Unreadable], list[str]]:
     """Check each deck by the configuration nearest to it, and give all files that were read.
 
@@ -100,9 +103,7 @@ def _checked(
     """
     from d2rpick.deck.source import STDIN
     from d2rpick.rules import RULES, Unreadable, check_deck, configuration_for
-    from d2rpick.rules.configuration import Configuration
 
-    asked = Configuration(_ids(options["select"]), _ids(options["ignore"]))
     asked.verify(RULES)
     results, inputs = [], []
     named, failed = _main_decks(decks)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output
-from d2rpick.cli.progress import reading
+from d2rpick.api.request import READING
+from d2rpick.cli import options
+from d2rpick.cli.options import FILES, HISTORY
+from d2rpick.cli.progress import opened
 
 if TYPE_CHECKING:
+    from d2rpick.api.request import Request
+    from d2rpick.cli.output import Output
     from d2rpick.histories.history import History, Samples
 
 EXAMPLES = """\b
@@ -20,15 +23,15 @@ Examples:
 """
 
 
-@click.command("extract", epilog=EXAMPLES)
-@shared.history_options
+@options.command("extract", EXAMPLES)
+@options.takes(HISTORY, *READING)
 @click.option(
     "--write-as",
     type=click.Choice(["csv", "hdf5"]),
     help="Format of the result.  [default: by the name of -o, else csv]",
 )
-@shared.file_options
-def command(write_as: str | None, **options: Any) -> None:
+@options.takes(*FILES)
+def command(write_as: str | None, request: Request, output: Output) -> None:
     """Write the chosen energy of HISTORY as columns time and internal_energy.
 
     With more than one part a column part_<id> for each follows, then what else is known at these times of the whole
@@ -38,12 +41,11 @@ def command(write_as: str | None, **options: Any) -> None:
     from d2rpick.choice.of_run import Reference
     from d2rpick.histories.opening import TABLES, format_of, write_table
 
-    form = write_as or format_of(options["output_file"], TABLES)
-    asked = shared.Reading.of(options)
-    with reading(asked.names, quiet=asked.quiet):
-        run = asked.open()
-        output = Output.of(options, *run.sources)
-        history = Reference.of(run, asked.selection).history
+    form = write_as or format_of(output.output_file, TABLES)
+    selection = request.selection()
+    with opened(request, output) as (opened_run, output):
+        run = opened_run.files
+        history = Reference.of(run, selection).history
         table = {"time": history.time, "internal_energy": history.energy}
         if history.parts and len(history.parts) > 1:
             energies = run.part_energies(history.parts)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
-import click
+from d2rpick.api.request import READING
+from d2rpick.cli import options
+from d2rpick.cli.options import HISTORY, RESULT
+from d2rpick.cli.output import in_words
+from d2rpick.cli.progress import opened
+from d2rpick.report.formats import FORMATS, write
 
-from d2rpick.cli import options as shared
-from d2rpick.cli.deck_cost import deck_option
-from d2rpick.cli.output import Output
-from d2rpick.cli.progress import reading
-from d2rpick.cli.wording import in_words
-from d2rpick.report.formats import FORMATS, Shown, write
+if TYPE_CHECKING:
+    from d2rpick.api.request import Request
+    from d2rpick.cli.output import Output
 
 EXAMPLES = """\b
 Examples:
@@ -20,20 +22,19 @@ Examples:
 """
 
 
-@click.command("info", epilog=EXAMPLES)
-@deck_option("Main deck of the run: tells gravity, supports and imposed motion, without which flights are found.")
-@shared.history_options
-@shared.output_options(*FORMATS["overview"])
-@click.pass_context
-def command(ctx: click.Context, /, output_format: str, exit_zero: bool, **options: Any) -> None:  # noqa: ARG001
+@options.command("info", EXAMPLES)
+@options.takes(
+    *("deck", HISTORY, *READING, *RESULT),
+    deck="Main deck of the run: tells gravity, supports and imposed motion, without which flights are found.",
+    forms=FORMATS["overview"],
+)
+def command(request: Request, output: Output) -> None:
     """Show what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health."""
     from d2rpick.choice.overview import survey
 
-    asked = shared.Reading.of(options)
-    with reading(asked.names, quiet=asked.quiet):
-        run = asked.open()
-        output = Output.of(options, *run.sources)
-        overview = survey(run, asked.selection, options["deck"])
+    selection = request.selection()
+    with opened(request, output) as (run, output):
+        overview = survey(run.files, selection, request.deck)
     output.notes((), overview.cautions)
-    text = write("overview", output_format, overview, Shown(ctx.meta["d2rpick.command"]))
-    output.result(in_words(text, output_format))
+    form = output.output_format
+    output.result(in_words(write("overview", form, overview, output.shown()), form))

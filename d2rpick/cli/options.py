@@ -1,31 +1,58 @@
-"""Options that several commands share: defined once, same name and help everywhere."""
+"""Options of the commands, made from the tables of what can be asked; ``--show-settings``, and the line to repeat."""
 
 from __future__ import annotations
 
+import os
 from functools import wraps
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 from click.core import ParameterSource
 
-from d2rpick.cli import values
-from d2rpick.cli.typed import JUDGING, dashed, judging
+from d2rpick.api.cards import Cards
+from d2rpick.api.request import CHOOSING, JUDGING, READING, TIME, Option, Request, dashed, options_of
+from d2rpick.cli.output import Output, text_bytes, with_options
+from d2rpick.cli.values import click_type
+from d2rpick.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from d2rpick.choice.ranking import Quality
-    from d2rpick.choice.settings import Settings
-    from d2rpick.histories.opening import Run, Selection
-    from d2rpick.vibration.modes import Mode
-    from d2rpick.vibration.oscillator import Oscillator
+    from d2rpick.choice.switched_run import Times
 
-# Kinds of values, under the names by which commands ask for them.
-CHANNELS, FILE, NAMES, PARTS = values.CHANNELS, values.FILE, values.NAMES, values.PARTS
-TIME, POSITIVE, NOT_NEGATIVE, FRACTION = values.TIME, values.POSITIVE, values.NOT_NEGATIVE, values.FRACTION
-STEP_RATIO = values.AT_LEAST_ONE  # elements that are rigid no longer limit the step: it cannot become smaller
-FORMATS = values.FORMATS
+WINDOW = tuple[float, float] | None
 Decorated = Any  # a command function; click's decorators do not say more
+# What commands take of the tables, and under which name they get it.
+TABLES: Final[dict[str, Any]] = {"request": Request, "cards": Cards, "output": Output}
+_OPTIONS: Final = {name: (table, one) for table, of in TABLES.items() for name, one in options_of(of).items()}
+CARDS: Final = tuple(options_of(Cards))
+FILES: Final = ("output_file", "overwrite", "quiet")
+RESULT: Final = ("output_format", "exit_zero", *FILES)
+HISTORY: Final = "HISTORY"  # stands for the argument, not the option of that name
+ONE_RUN: Final = ("deck", "weights", HISTORY, *READING, *CHOOSING)
+REFERENCE: Final = ("history", *JUDGING)
+ANSWER: Final = ("plot", "report", *CARDS, "min_quality", *RESULT)
+DECK: Final = (
+    "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): gives the cost of the parts, "
+    "and which of them become one rigid body"
+)
+DECK_OF_PARTS: Final = f"{DECK}; `--part recommended` stands for the set that d2rpick parts recommends."
+# Options that write files, which the same command would find the next time.
+_WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
+_SOURCES: Final = {ParameterSource.COMMANDLINE: "command line", ParameterSource.ENVIRONMENT: "environment"}
+
+
+class Command(click.Command):
+    """A command that can show its settings instead of running, and names options where arguments make no sense."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; UsageError for what makes no sense together."""
+        if ctx.meta.get("d2rpick.show-settings"):
+            return click.echo(text_bytes("\n".join(_settings(ctx))))
+        try:
+            return super().invoke(ctx)
+        except ArgumentError as error:
+            raise click.UsageError(with_options(str(error)), ctx) from error
 
 
 class Either(click.Option):
@@ -44,337 +71,173 @@ class Either(click.Option):
         return value, source
 
 
-def _stack(*decorators: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
-    def apply(function: Decorated) -> Decorated:
-        for decorator in reversed(decorators):
-            function = decorator(function)
-        return function
-
-    return apply
+def command(name: str, examples: str, cls: type[Command] = Command) -> Callable[[Decorated], click.Command]:
+    """Make a command of a function."""
+    return click.command(name, cls=cls, epilog=examples)
 
 
-_AFTER = click.option("--after", type=TIME, metavar="T", help="End of the load.  [default: found from the record]")
-_MARGIN = click.option(
-    "--margin", type=NOT_NEGATIVE, metavar="T",
-    help="Time to keep clear after the load and before the next contact.  [default: 0; where td is chosen, derived]",
+def takes(*names: str, forms: Iterable[str] = (), **other: Any) -> Callable[[Decorated], Decorated]:
+    """Give a command options of the tables, passed on as one object for each table that they are of.
+
+    Parameters
+    ----------
+    *names : str
+        Of options, in the order of the help.
+    forms : str
+        Forms of the result, the first by default.
+    **other : str or dict
+        Of an option by its name: the help of this command, or what click is told otherwise.
+    """
+    tables = {table: [one for one in names if one in options_of(of)] for table, of in TABLES.items()}
+    tables["request"] += ["history"] * (HISTORY in names)
+    if choices := list(forms):
+        about = {"type": click.Choice(choices), "default": choices[0], "show_default": True}
+        other["output_format"] = about
+
+    def decorate(function: Decorated) -> Decorated:
+        @wraps(function)
+        def run(*args: Any, **values: Any) -> Any:
+            ctx = click.get_current_context()
+            if "history" in values:
+                ctx.meta["d2rpick.history"] = values["history"]
+            given = {name for name in values if ctx.get_parameter_source(name) is not ParameterSource.DEFAULT}
+            for table, taken in tables.items():
+                if taken:
+                    more = {"given": given & {*taken}} if table == "request" else {}
+                    values[table] = TABLES[table](**{name: values.pop(name) for name in taken}, **more)
+            return function(*args, **values)
+
+        if "quiet" in names:
+            run = _flags(run)
+        for name in reversed(names):
+            run = _decorator(name, other.get(name, {}))(run)
+        return run
+
+    return decorate
+
+
+def takes_all(table: Any, name: str, **other: Any) -> Callable[[Decorated], Decorated]:
+    """Give a command all options of a table of its own, passed on as one object under a name; ``other`` as above."""
+
+    def decorate(function: Decorated) -> Decorated:
+        @wraps(function)
+        def run(*args: Any, **values: Any) -> Any:
+            values[name] = table(**{one: values.pop(one) for one in options_of(table)})
+            return function(*args, **values)
+
+        for one, about in reversed(options_of(table).items()):
+            run = option(one, about, **{"default": table.__dataclass_fields__[one].default, **other.get(one, {})})(run)
+        return run
+
+    return decorate
+
+
+def _decorator(name: str, other: Any) -> Callable[[Decorated], Decorated]:
+    if name == HISTORY:
+        return click.argument("history", metavar="HISTORY...", nargs=-1, required=True, type=click_type("file"))
+    table, one = _OPTIONS[name]
+    more = {"help": other} if isinstance(other, str) else other
+    return option(name, one, **{"default": TABLES[table].__dataclass_fields__[name].default, **more})
+
+
+def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decorated]:
+    """Make click's option of an entry of a table."""
+    about: dict[str, Any] = {"help": one.help, "metavar": one.metavar}
+    if one.kind == "flag":
+        about["is_flag"] = True
+    else:
+        kind = click_type(one.kind)
+        about |= {"type": kind, "nargs": 2 if one.pair else 1, "multiple": one.many}
+    about |= {"instead_of": one.instead_of} | other
+    if about["instead_of"]:
+        about["cls"] = Either
+    else:
+        del about["instead_of"]
+    if about.get("default") is None or about["default"] is False or about["default"] == ():
+        about.pop("default", None)
+    else:
+        about.setdefault("show_default", True)
+    return click.option(*one.short, f"--{dashed(name)}", name, **about)
+
+
+def time(name: str, text: str, **more: Any) -> Callable[[Decorated], Decorated]:
+    """Make an option of one command that is a time, or a window of time."""
+    pair, required = more.get("pair", False), more.pop("required", False)
+    return option(name[2:].replace("-", "_"), Option(text, TIME, "LO HI" if pair else "T", **more), required=required)
+
+
+def file(name: str, text: str, metavar: str = "FILE") -> Callable[[Decorated], Decorated]:
+    """Make an option of one command that names a file."""
+    return option(name[2:].replace("-", "_"), Option(text, "file", metavar))
+
+
+def files(name: str, text: str, metavar: str) -> Callable[[Decorated], Decorated]:
+    """Make an option of one command that names files, one each time."""
+    return option(name[2:].replace("-", "_"), Option(text, "file", metavar, many=True))
+
+
+def windows_in(file: str) -> Sequence[Times]:
+    """Read the windows in a file with lines 'tr td'."""
+    from d2rpick.deck.printed_card import read_windows
+
+    with click.open_file(file, encoding="utf-8", errors="replace") as stream:
+        return read_windows(stream.read(), file)
+
+
+LIMIT: Final = click.option(
+    "--limit", type=click.IntRange(min=1), default=10, show_default=True,
+    help="Number of rows in the table; json and csv have all.",
 )  # fmt: skip
-_TOLERANCE = click.option(
-    "--tolerance", type=FRACTION, default=0.2, show_default=True, metavar="L",
-    help="Limit on the lock-in error, or on the level error where no oscillator is known.",
-)  # fmt: skip
-EXIT_ZERO = click.option("--exit-zero", is_flag=True, help="Exit with 0 instead of 1 when the answer is an objection.")
-MIN_QUALITY = click.option(
-    "--min-quality", type=click.Choice(["good", "fair"]), help="Exit with 1 where the pair is worse than that."
-)
-_FORMAT = click.option(
-    "-F", "--input-format", type=click.Choice(["auto", *FORMATS]), default="auto", show_default=True,
-    help="Format of the history; auto recognises it by content.",
-)  # fmt: skip
-_TIME = click.option("--time", metavar="NAME|NUMBER", help="Time column, by name, number or HDF5 path.")
-_ENERGY = click.option(
-    "--energy", metavar="NAME|NUMBER", multiple=True, type=CHANNELS, cls=Either, instead_of=("part",),
-    help="Energy column, label or HDF5 path; repeat it to add several.",
-)  # fmt: skip
-_CHANNEL = click.option(
-    "--channel", metavar="QUANTITY=NAME", multiple=True, type=NAMES,
-    help="Channel of another quantity, where its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
-)  # fmt: skip
-_FLYING = click.option(
-    "--flying", metavar="IDS", multiple=True, type=PARTS, help="Parts that fly together with the switched parts."
-)
 
 
-def history_options(function: Decorated) -> Decorated:
-    """HISTORY... and how to read it; collected by ``selection`` and ``open_run``."""
-    argument = click.argument("history", metavar="HISTORY...", nargs=-1, required=True, type=FILE)
-    return _stack(argument, reading_options)(function)
+def _flags(function: Decorated) -> Decorated:
+    """What every command can be told and none asks for itself: it is kept in the context."""
+    for name, text in (
+        ("debug", "Show the traceback of an error."),
+        ("show-settings", "Print every option with its value and its source, and do nothing else."),
+        ("verbose", "Say on stderr what was read and how long it took."),
+    ):
+        short = ["-v"] if name == "verbose" else []
+        flag = click.option(*short, f"--{name}", is_flag=True, expose_value=False, callback=_remember, help=text)
+        function = flag(function)
+    return function
 
 
-def reading_options(function: Decorated) -> Decorated:
-    """How to read a history; collected by ``selection``."""
-    return _stack(
-        _FORMAT, _TIME, _ENERGY,
-        click.option(
-            "--part", metavar="IDS", multiple=True, type=PARTS, cls=Either, instead_of=("energy",),
-            help="Parts to switch: number (3,7), range (10-19), title, `flying` or `all`; energies are added.",
-        ),
-        _FLYING, _CHANNEL,
-    )(function)  # fmt: skip
+def _remember(ctx: click.Context, option: click.Parameter, value: bool) -> None:
+    ctx.meta[f"d2rpick.{dashed(option.name or '')}"] = value
 
 
-def reference_options(function: Decorated) -> Decorated:
-    """``--history``, how to read it, and how to judge by it; for commands that also do without one."""
-    return _stack(
-        click.option(
-            "--history", metavar="HISTORY", multiple=True, type=FILE,
-            help="Energy history of the run without switching to judge by: file, folder or glob; repeatable.",
-        ),
-        _FORMAT, _TIME, _ENERGY, _FLYING, _CHANNEL, _AFTER, _MARGIN, _TOLERANCE,
-    )(function)  # fmt: skip
+def repeat() -> list[str]:
+    """Give the command line that was typed, and before it the environment variables that set options.
+
+    It may replace the files that it has written, so that it can be typed again.
+    """
+    context = click.get_current_context()
+    names = [_variable(context, name) for name in context.params if _source(context, name) == "environment"]
+    variables = [f"{name}={os.environ[name]}" for name in names]
+    words = list(context.meta["d2rpick.command"])
+    if not context.params["overwrite"] and any(context.params.get(name) for name in _WRITTEN):
+        words.insert(words.index("--") if "--" in words else len(words), "--overwrite")
+    return [*(["env", *variables] if variables else []), "d2rpick", *words]
 
 
-def output_options(*formats: str) -> Callable[[Decorated], Decorated]:
-    """Where the result goes, and in which of ``formats``, the first by default."""
+def _settings(ctx: click.Context) -> Iterator[str]:
+    """Write every option with its value, and where that comes from."""
+    from d2rpick.report.tables import as_line
 
-    def apply(function: Decorated) -> Decorated:
-        return _stack(
-            click.option(
-                "-f", "--output-format", type=click.Choice(formats), default=formats[0], show_default=True,
-                help="Format of the result.",
-            ),
-            EXIT_ZERO,
-        )(file_options(function))  # fmt: skip
-
-    return apply
+    for one in ctx.command.get_params(ctx):
+        if one.expose_value and one.name:
+            value, source = ctx.params[one.name], _source(ctx, one.name)
+            named = f", {_variable(ctx, one.name)}" * (source == "environment")
+            spelled = max(one.opts, key=len).lstrip("-")
+            yield f"{spelled} = {'none' if value in (None, ()) else as_line(value)}  # {source}{named}"
 
 
-def file_options(function: Decorated) -> Decorated:
-    """Where the result goes."""
-    return _stack(
-        click.option(
-            "-o", "--output-file", metavar="FILE", type=FILE, help="Write the result to FILE, completely or not at all."
-        ),
-        click.option("--overwrite", is_flag=True, help="Replace existing files."),
-        click.option("-q", "--quiet", is_flag=True, help="Print no notes and warnings to stderr."),
-        click.option(
-            "-v", "--verbose", is_flag=True, expose_value=False, callback=_remember("verbose"),
-            help="Say on stderr what was read and how long it took.",
-        ),
-        click.option(
-            "--show-settings", is_flag=True, expose_value=False, callback=_remember("show-settings"),
-            help="Print every option with its value and its source, and do nothing else.",
-        ),
-        click.option(
-            "--debug", is_flag=True, expose_value=False, callback=_remember("debug"),
-            help="Show the traceback of an error.",
-        ),
-    )(_unless_shown(function))  # fmt: skip
+def _source(ctx: click.Context, name: str) -> str:
+    source = ctx.get_parameter_source(name)
+    return _SOURCES.get(source, "default") if source else "default"
 
 
-def oscillator_options(*, required: bool) -> Callable[[Decorated], Decorated]:
-    """Parameters of the floating oscillator."""
-    rest = "" if required else "; all else at rest"
-
-    def given(name: str, *instead_of: str, **kwargs: Any) -> Callable[[Decorated], Decorated]:
-        return click.option(name, cls=Either, instead_of=(*instead_of, "fit_window", "no_verify"), **kwargs)
-
-    return _stack(
-        given("--stiffness", type=POSITIVE, required=required, help="Spring k."),
-        given("--mass", type=POSITIVE, required=required, help="Suspended mass M."),
-        given("--frame-mass", "beta", type=POSITIVE, help="Frame mass m (or give --beta)."),
-        given("--beta", "frame_mass", type=POSITIVE, help="Mass ratio M/m (instead of --frame-mass)."),
-        given(
-            "--alpha", type=NOT_NEGATIVE, default=0.0 if required else None, show_default=required,
-            help="Rate of damping proportional to mass.",
-        ),
-        given("--v0", "vz0", type=TIME, help=f"Velocity of the frame at time 0{rest}."),
-    )  # fmt: skip
-
-
-def choosing_options(function: Decorated) -> Decorated:
-    """Options of ``suggest`` and ``verify``; collected by ``settings``."""
-    return _stack(
-        judging_options,
-        click.option(
-            "--cost-share", type=FRACTION, metavar="C",
-            help="Share of the cost of a time step spent on the elements of the switched parts; gives the run time.",
-        ),
-        click.option(
-            "--step-ratio", type=STEP_RATIO, metavar="N",
-            help="Time step while rigid over that before, 1 or more.  [default: 1]",
-        ),
-        click.option("--plot", metavar="FILE", type=FILE, help="Draw energy and motion to FILE (png, svg, pdf)."),
-        click.option(
-            "--report", metavar="FILE", type=FILE, help="Write everything to one HTML page to read, print and sign."
-        ),
-    )(function)  # fmt: skip
-
-
-def judging_options(function: Decorated) -> Decorated:
-    """How to judge a tr; collected by ``settings``."""
-    return _stack(
-        _AFTER,
-        _MARGIN,
-        _TOLERANCE,
-        click.option(
-            "--max-kinetic-share", type=NOT_NEGATIVE, metavar="K", help="Reject a td with a larger kinetic share.",
-        ),
-        click.option("--max-residual", type=NOT_NEGATIVE, metavar="R", help="Reject a pair with a larger residual."),
-        oscillator_options(required=False),
-        click.option(
-            "--fit-window", type=(TIME, TIME), metavar="LO HI", cls=Either, instead_of=("stiffness", "no_verify"),
-            help="Identify the oscillator only here.",
-        ),
-        click.option(
-            "--no-verify", is_flag=True, cls=Either, instead_of=("stiffness", "fit_window"),
-            help="Judge by the energy level alone, without an oscillator.",
-        ),
-        click.option(
-            "--strict", is_flag=True, help="Recommend nothing where the energy alone shows when the load is over."
-        ),
-    )(function)  # fmt: skip
-
-
-def selection(options: dict[str, Any]) -> Selection:
-    """Collect what of a run is asked for; UsageError when energies are asked for in two ways."""
-    from d2rpick.histories.opening import Selection
-
-    parts = options.get("part", ())
-    if options["energy"] and parts:
-        raise click.UsageError("--energy and --part exclude each other: give columns or parts")
-    return Selection(
-        options["time"], options["energy"], parts, options["flying"], _channels(options["channel"]),
-        options.get("springs"),
-    )  # fmt: skip
-
-
-def _channels(given: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
-    """Read ``QUANTITY=NAME``; UsageError for a quantity that is none, or one that is given twice."""
-    from d2rpick.histories.names import QUANTITIES
-
-    pairs = [
-        (quantity.strip().replace("-", "_"), name) for quantity, _, name in (text.partition("=") for text in given)
-    ]
-    for quantity, name in pairs:
-        if quantity not in QUANTITIES or not name:
-            raise click.UsageError(
-                f"--channel {quantity}={name}: QUANTITY=NAME was expected, with one of {', '.join(QUANTITIES)}"
-            )
-    if len({quantity for quantity, _ in pairs}) < len(pairs):
-        raise click.UsageError("--channel names a quantity twice; name each once")
-    return tuple(pairs)
-
-
-class Reading(NamedTuple):
-    """What is read, and how: the options of ``history_options``."""
-
-    names: tuple[str, ...]
-    selection: Selection
-    input_format: str
-    quiet: bool
-
-    @classmethod
-    def of(cls, options: dict[str, Any]) -> Reading:
-        """Take the options as they were given; UsageError when energies are asked for in two ways."""
-        click.get_current_context().meta["d2rpick.history"] = options["history"]
-        return cls(options["history"], selection(options), options["input_format"], options["quiet"])
-
-    def open(self) -> Run:
-        """Open the run."""
-        from d2rpick.histories.opening import open_run
-
-        return open_run(self.names, self.selection, self.input_format)
-
-
-class Extras(NamedTuple):
-    """What is written beside the result: a figure, and a page with the options that judge by the same history."""
-
-    plot: str | None
-    report: str | None
-    judging: tuple[str, ...]
-
-    @classmethod
-    def of(cls, options: dict[str, Any]) -> Extras:
-        """Take the options as they were given."""
-        return cls(options["plot"], options["report"], tuple(judging(options)))
-
-
-def reference(options: dict[str, Any]) -> tuple[Run, Settings] | None:
-    """Open what the options of ``reference_options`` name; UsageError when they say how to judge but not by what."""
-    if not options["history"]:
-        source = click.get_current_context().get_parameter_source
-        lost = [name for name in JUDGING if source(name) is not click.core.ParameterSource.DEFAULT]
-        if lost:
-            raise click.UsageError(f"--{dashed(lost[0])} needs an energy history; give one with --history")
-        return None
-    from d2rpick.choice.settings import Settings
-
-    judging = Settings(after=options["after"], margin=options["margin"], tolerance=options["tolerance"])
-    return Reading.of({**options, "part": ()}).open(), judging
-
-
-def oscillator(options: dict[str, Any]) -> Oscillator | None:
-    """Build the oscillator that the options give, None when they give none; UsageError when they give half of one."""
-    names = ("stiffness", "mass", "alpha", "v0")
-    given = [name for name in (*names, "frame_mass", "beta") if options[name] is not None]
-    if not given:
-        return None
-    missing = [name for name in names if options[name] is None]
-    if missing:
-        raise click.UsageError(
-            f"--{dashed(given[0])} needs --{dashed(missing[0])} too: give all parameters of the oscillator"
-        )
-    if (options["frame_mass"] is None) == (options["beta"] is None):
-        raise click.UsageError("the oscillator needs either --frame-mass or --beta")
-    from d2rpick.vibration.oscillator import Oscillator
-
-    mass, frame_mass = options["mass"], options["frame_mass"]
-    return Oscillator(options["stiffness"], mass, frame_mass or mass / options["beta"], options["alpha"])
-
-
-def settings(options: dict[str, Any]) -> Settings:
-    """Collect the options of ``choosing_options``; UsageError where they contradict each other."""
-    from d2rpick.choice.settings import Settings
-
-    given, window = oscillator(options), options["fit_window"]
-    ways = {"an oscillator": given, "--fit-window": window, "--no-verify": options["no_verify"]}
-    chosen = [name for name, value in ways.items() if value]
-    if len(chosen) > 1:
-        raise click.UsageError(f"{chosen[0]} and {chosen[1]} exclude each other")
-    cost_share, step_ratio = options.get("cost_share"), options.get("step_ratio")
-    if step_ratio is not None and cost_share is None and not options.get("deck"):
-        raise click.UsageError("--step-ratio needs --cost-share or --deck too: the run time needs both")
-    if window and not window[0] < window[1]:
-        raise click.UsageError(f"--fit-window {window[0]:g} {window[1]:g} is empty; give the lower time first")
-    return Settings(
-        after=options["after"],
-        margin=options["margin"],
-        tolerance=options["tolerance"],
-        max_kinetic_share=options["max_kinetic_share"],
-        max_residual=options["max_residual"],
-        oscillator=_mode_of(given, options["v0"]) if given else None,
-        fit_window=window,
-        replay=not options["no_verify"],
-        strict=options["strict"],
-        cost_share=cost_share,
-        step_ratio=step_ratio or 1.0,
-    )
-
-
-def _mode_of(oscillator: Oscillator, v0: float) -> Mode:
-    from d2rpick.vibration.oscillator import to_mode  # not above: mostly none is given
-
-    return to_mode(oscillator, v0)
-
-
-def falls_short(quality: Quality | None, wanted: str | None) -> bool:
-    """Whether a pair is worse than --min-quality asks for."""
-    if wanted is None or quality is None:
-        return False
-    from d2rpick.choice.ranking import GRADES
-
-    return GRADES.index(quality.grade) < GRADES.index(wanted)
-
-
-def _remember(name: str) -> Callable[[click.Context, click.Parameter, bool], None]:
-    """Keep a flag that no command asks for itself."""
-
-    def keep(ctx: click.Context, _: click.Parameter, value: bool) -> None:
-        ctx.meta[f"d2rpick.{name}"] = value
-
-    return keep
-
-
-def _unless_shown(function: Decorated) -> Decorated:
-    """Let a command show its settings instead of running, where that is asked for."""
-
-    @wraps(function)
-    def run(*args: Any, **kwargs: Any) -> Any:
-        context = click.get_current_context()
-        if not context.meta.get("d2rpick.show-settings"):
-            return function(*args, **kwargs)
-        from d2rpick.cli.settings_shown import show
-
-        return show(context)
-
-    return run
+def _variable(ctx: click.Context, name: str) -> str:
+    """Name of the environment variable that sets an option."""
+    return f"{ctx.auto_envvar_prefix}_{name.upper()}"

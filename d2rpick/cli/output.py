@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from d2rpick.cli.wording import with_options
-from d2rpick.errors import FORESEEN, D2RPickError, listing, one_line, printable
+from d2rpick.api.request import OPTIONS, dashed, option
+from d2rpick.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
 from d2rpick.files import write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
+    from d2rpick.api.answer import Answer, Paged
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.request import Request
+    from d2rpick.choice.ranking import Quality
     from d2rpick.choice.warnings import Caution
+    from d2rpick.report.formats import Shown
 
 OBJECTION = 1
 # Formats that names of files promise.
@@ -23,43 +30,100 @@ _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "ma
 _PRINTED: Final = (".pdf", ".doc", ".docx")
 
 
-class Output(NamedTuple):
-    """Results to stdout or ``file``, everything else to stderr unless ``quiet``; ``inputs`` are never written to."""
+# Arguments that messages name in backticks, and which options set them where these have other names.
+ARGUMENTS: Final = (*OPTIONS, "td", "td_window", "tr", "min_rigid", "overwrite", "write_as", "done", "before")
+_OTHERS: Final = {"parts": "part", "channels": "channel", "replay": "no_verify"}
+_FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 
-    file: str | None
-    overwrite: bool
-    quiet: bool
+
+@dataclass(frozen=True)
+class Output:
+    """Results to stdout or a file, everything else to stderr unless ``quiet``; ``inputs`` are never written to."""
+
+    plot: str | None = option("Draw energy and motion to FILE (png, svg, pdf).", "file", "FILE")
+    report: str | None = option("Write everything to one HTML page to read, print and sign.", "file", "FILE")
+    min_quality: str | None = option("Exit with 1 where the pair is worse than that.", ("good", "fair"))
+    output_format: str = option("Format of the result.", default="table", short=("-f",))
+    exit_zero: bool = option("Exit with 0 instead of 1 when the answer is an objection.", "flag", default=False)
+    output_file: str | None = option(
+        "Write the result to FILE, completely or not at all.", "file", "FILE", short=("-o",)
+    )
+    overwrite: bool = option("Replace existing files.", "flag", default=False)
+    quiet: bool = option("Print no notes and warnings to stderr.", "flag", default=False, short=("-q",))
     inputs: tuple[str, ...] = ()
 
-    @classmethod
-    def of(cls, options: dict[str, Any], *inputs: str) -> Output:
-        """Take the options of ``file_options``; D2RPickError when a file to be written may not be."""
-        file = None if options["output_file"] == "-" else options["output_file"]
-        read = [options[name] for name in ("deck", "weights") if options.get(name)]
-        output = cls(file, options["overwrite"], options["quiet"], (*inputs, *read))
-        plot = options.get("plot")
-        if plot is not None:
+    @property
+    def file(self) -> str | None:
+        """Where the result goes; None for stdout."""
+        return None if self.output_file == "-" else self.output_file
+
+    def beside(self, *inputs: str | None) -> Output:
+        """Give what writes beside these inputs; D2RPickError when a file to be written may not be."""
+        output = replace(self, inputs=tuple(name for name in inputs if name not in (None, "-")))
+        if self.plot is not None:
             from d2rpick.report import figures
 
-            figures.picture_format(plot)
-        _check_report(options.get("report"))
-        names = {"--output-file": options["output_file"], "--plot": plot, "--report": options.get("report")}
+            figures.picture_format(self.plot)
+        _check_report(self.report)
         claimed: dict[str, str] = {}
-        for option, name in names.items():
-            if name is not None:
-                output.claim(name)
-                other = claimed.setdefault(os.path.realpath(name), option)
-                if other != option:
-                    raise D2RPickError(f"{name}: {option} and {other} are the same file; give two")
-        is_result = "write_as" not in options  # of a history the name itself decides
-        if file is not None and not output.quiet and is_result and (form := _meant(file)):
-            tell(f"note: {file} gets the table; -f {form} writes what its name promises")
+        for name in ("output_file", "plot", "report"):
+            file, named = getattr(self, name), f"--{dashed(name)}"
+            if file is not None:
+                output.claim(file)
+                other = claimed.setdefault(os.path.realpath(file), named)
+                if other != named:
+                    raise D2RPickError(f"{file}: {named} and {other} are the same file; give two")
+        if self.file is not None and not self.quiet and (form := _meant(self.file)):
+            tell(f"note: {self.file} gets the table; -f {form} writes what its name promises")
         return output
 
+    def prints(self, cards: Cards, request: Request, *, by_itself: bool = False) -> bool:
+        """Whether a card is asked for, ``by_itself`` or in a page; ArgumentError where options do not fit that."""
+        prints = by_itself or self.output_format == "card" or self.report is not None
+        if not prints:
+            request.selection()
+            if cards.given:
+                raise ArgumentError(
+                    f"--{dashed(cards.given[0])} is about the card; ask for one with -f card or --report"
+                )
+        return prints
+
+    def shown(self, **more: Any) -> Shown:
+        """Give what a form may show beside the answer."""
+        from d2rpick.report.formats import Shown
+
+        return Shown(click.get_current_context().meta["d2rpick.command"], **more)
+
+    def answer(self, answer: Answer, below: str = "", **shown: Any) -> None:
+        """Give out an answer in the form that is asked for."""
+        text = in_words(answer.text(self.output_format, self.shown(**shown)), self.output_format)
+        self.result(f"{text}\n\n{below}" if below else text)
+
+    def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
+        """Write the figure and the page, as far as they are asked for."""
+        if self.plot:
+            from d2rpick.report import figures
+
+            self.write(self.plot, figures.render(answer.plot(), self.plot))
+        if self.report:
+            self.write(self.report, text_bytes(with_options(page())))
+
+    def finish(self, *, objection: bool, quality: Quality | None = None) -> None:
+        """Exit with 1 when the answer is an objection or worse than asked for, unless told otherwise."""
+        poor = False
+        if self.min_quality is not None and quality is not None:
+            from d2rpick.choice.ranking import GRADES
+
+            poor = GRADES.index(quality.grade) < GRADES.index(self.min_quality)
+        if (objection or poor) and not self.exit_zero:
+            click.get_current_context().exit(OBJECTION)
+
     def spare(self, inputs: Iterable[str]) -> None:
-        """Raise D2RPickError when the result would replace one of further inputs, known only since they were read."""
-        if self.file is not None:
-            self._replace(inputs=tuple(inputs)).claim(self.file)
+        """Raise D2RPickError when a file would replace one of further inputs, known only since they were read."""
+        further = replace(self, inputs=tuple(inputs))
+        for name in (self.file, self.plot, self.report):
+            if name is not None:
+                further.claim(name)
 
     def claim(self, name: str) -> None:
         """Raise D2RPickError when ``name`` cannot be written, is an input, or exists and was not to be replaced."""
@@ -127,7 +191,8 @@ def _check_report(name: str | None) -> None:
 def _meant(name: str) -> str | None:
     """Give the format that the name of a result promises, where the command has it and none was asked for."""
     ctx = click.get_current_context()
-    if ctx.get_parameter_source("output_format") is not click.core.ParameterSource.DEFAULT:
+    given = ctx.get_parameter_source("output_format") is not click.core.ParameterSource.DEFAULT
+    if given or "write_as" in ctx.params:  # of a history the name itself decides
         return None
     form = next((form for ending, form in _NAMED.items() if name.lower().endswith(ending)), None)
     (choice,) = [one.type for one in ctx.command.params if one.name == "output_format"]
@@ -158,7 +223,29 @@ def text_bytes(text: str) -> bytes:
     return text.encode(errors="surrogateescape").decode(errors="replace").encode()
 
 
-def finish(ctx: click.Context, *, objection: bool, exit_zero: bool) -> None:
-    """Exit with 1 when the answer is an objection, unless told otherwise."""
-    if objection and not exit_zero:
-        ctx.exit(OBJECTION)
+def with_options(message: str) -> str:
+    """Replace the arguments that a message names by the options that set them.
+
+    Examples
+    --------
+    >>> with_options("give it as `after` where it is known")
+    'give it as --after where it is known'
+    """
+    return re.sub(r"`(\w+)`", lambda found: option_of(found[1]) or found[0], message)
+
+
+def option_of(argument: str) -> str:
+    """Spell the option that sets an argument; nothing where there is none."""
+    name = _OTHERS.get(argument, argument)
+    return f"--{dashed(name)}" if name in ARGUMENTS else ""
+
+
+def in_words(text: str, form: str) -> str:
+    """Name the options in a result that people read; other programs get the arguments.
+
+    Examples
+    --------
+    >>> in_words("choose with `energy`", "table"), in_words("choose with `energy`", "json")
+    ('choose with --energy', 'choose with `energy`')
+    """
+    return text if form in _FOR_PROGRAMS else with_options(text)

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.cli import deck_cost, plan_deck, typed
-from d2rpick.cli import options as shared
-from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
-from d2rpick.cli.explorer import explorer_of
-from d2rpick.cli.output import Output, finish, text_bytes
-from d2rpick.cli.progress import reading
-from d2rpick.cli.wording import in_words, with_options
-from d2rpick.report.formats import FORMATS, Shown, write
+from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING
+from d2rpick.cli import options
+from d2rpick.cli.options import CARDS, DECK_OF_PARTS, HISTORY, RESULT
+from d2rpick.cli.progress import opened
+from d2rpick.cli.values import click_type
+from d2rpick.errors import ArgumentError, DeckError, printable
+from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
-    from d2rpick.choice.of_run import Reference
-    from d2rpick.choice.plan import Plan
-    from d2rpick.choice.switched_run import Times
+    from d2rpick.api.asked import Asked
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.flights import Plan
+    from d2rpick.api.request import Request
     from d2rpick.choice.verify import Verdict
+    from d2rpick.cli.output import Output
     from d2rpick.deck.printed_card import PrintedCard
 
 EXAMPLES = """\b
@@ -32,151 +33,152 @@ Examples:
 """
 
 
-@click.command("plan", epilog=EXAMPLES)
+@options.command("plan", EXAMPLES)
 @click.option(
-    "--min-rigid",
-    type=shared.NOT_NEGATIVE,
-    metavar="T",
+    "--min-rigid", type=click_type(NOT_NEGATIVE), metavar="T",
     help="Leave shorter windows out.  [default: 5% of the record; one gives way to a later one twice as long]",
-)
+)  # fmt: skip
 @click.option(
-    "--all",
-    "every",
-    is_flag=True,
+    "--all", "every", is_flag=True,
     help="With -f value, -f card and --write-deck: all windows, not only the supported ones.",
-)
-@click.option(
-    "--done", metavar="FILE", type=shared.FILE,
-    help="Windows in which HISTORY was switched, a line 'tr td' for each: plan those after.  -f value, -f card and "
+)  # fmt: skip
+@options.file(
+    "--done",
+    "Windows in which HISTORY was switched, a line 'tr td' for each: plan those after.  -f value, -f card and "
     "--write-deck hold both, as the next run needs them.",
-)  # fmt: skip
-@click.option(
-    "--before", metavar="HISTORY", multiple=True, type=shared.FILE,
-    help="The run that the windows of --done were planned from: its landings are compared; repeatable.",
-)  # fmt: skip
-@plan_deck.deck_options
-@shared.history_options
-@shared.choosing_options
-@card_options
-@shared.output_options(*FORMATS["plan"], "card")
-@click.pass_context
+)
+@options.files(
+    "--before",
+    "The run that the windows of --done were planned from: its landings are compared; repeatable.",
+    "HISTORY",
+)
+@options.file(
+    "--write-deck", "Write a copy of --deck with the cards of the windows into this folder, and check it.", "DIR"
+)
+@options.takes(
+    *("deck", "weights", HISTORY, *READING, *CHOOSING, "plot", "report", *CARDS, *RESULT),
+    deck=DECK_OF_PARTS,
+    forms=[*FORMATS["plan"], "card"],
+)
 def command(
-    ctx: click.Context,
-    /,
     min_rigid: float | None,
     every: bool,
     done: str | None,
     before: tuple[str, ...],
-    output_format: str,
-    exit_zero: bool,
-    **options: Any,
+    write_deck: str | None,
+    request: Request,
+    cards: Cards,
+    output: Output,
 ) -> None:
     """Plan the rigid windows of a run: each of its flights with tr, td, and whether HISTORY supports it.
 
     Windows are supported up to and with the first that locks in energy: it moves the landings after it.  Run with
     these, then plan the next from the switched run, with --done.
     """
-    from d2rpick.choice.of_run import Reference
-    from d2rpick.choice.plan import plan_of
+    from d2rpick.api.asked import ask, open_run
+    from d2rpick.api.flights import planned
 
-    _check_usage(output_format, options, every=every, done=done, before=before)
-    form = "card" if options["write_deck"] else output_format
-    options = plan_deck.for_deck(options) if form == "card" else options
-    prints = prints_card(options, form)
-    asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
-    with reading(asked.names, quiet=asked.quiet):
-        run = asked.open()
-        output = Output.of(options, *run.sources, *(name for name in (done, *before) if name not in (None, "-")))
-        model = deck_cost.model_of(options)
-        plan_deck.check_model(run, model, options)
-        run, options = deck_cost.with_deck(run, options, settings, model)
-        reference = Reference(run, energy_of(run, options, prints=prints))
-        settings, unknown = deck_cost.with_cost(settings, reference, model, options["merge"])
-        earlier = reference.like(asked._replace(names=before).open(), asked.selection) if before else None
-    windows = _windows(done) if done else ()
-    plan = plan_of(reference, settings, min_rigid=min_rigid, done=windows, before=earlier)
-    plan = replace(plan, cautions=(*plan.cautions, *unknown))
-    output.notes(reference.history.notes, plan.cautions)
-    _beside(plan, reference, options, output)
-    checked, passed = _deck(plan, reference, options, every=every) if options["write_deck"] else ("", True)
-    if checked and output_format != "table":
-        click.echo(checked, err=True)
-    if output_format == "card":
-        passed = _card(plan, reference, options, output, every=every) and passed
-        return finish(ctx, objection=not passed, exit_zero=exit_zero)
-    text = in_words(write("plan", output_format, plan, Shown(ctx.meta["d2rpick.command"], every=every)), output_format)
-    output.result(f"{text}\n\n{checked}" if checked and output_format == "table" else text)
-    return finish(ctx, objection=not (plan.supported and passed), exit_zero=exit_zero)
-
-
-def _check_usage(form: str, options: dict[str, Any], *, every: bool, done: str | None, before: tuple[str, ...]) -> None:
-    """Raise UsageError where options make no sense together, before a file is opened."""
-    if every and form not in ("value", "card") and not options["write_deck"]:
+    form = output.output_format
+    if every and form not in ("value", "card") and not write_deck:
         raise click.UsageError("--all belongs to -f value, -f card and --write-deck; other forms hold every window")
-    plan_deck.check_usage(options["deck"], options["write_deck"])
-    if before and done is None:
-        raise click.UsageError("--before compares the landings of a switched run; name its windows with --done")
-    if (form == "card" or options["write_deck"]) and not (options["part"] or options["node"]):
+    _check_deck(request, cards, form, write_deck)
+    cards = _by_deck(cards, request.deck) if form == "card" or write_deck else cards
+    prints = output.prints(cards, request, by_itself=bool(write_deck))
+    with opened(request, output, done, *before) as (run, output):
+        asked = ask(run, request, prints=prints, merge=cards.merge)
+        if write_deck:
+            _check_model(asked)
+        earlier = open_run(request, before) if before else None
+    answer = planned(asked, min_rigid, options.windows_in(done) if done else (), earlier)
+    output.notes(answer.history.notes, answer.cautions)
+    output.beside_answer(answer, lambda: answer.page(options.repeat(), (), cards))
+    found = _printed(answer, cards, every=every) if form == "card" or write_deck else None
+    checked, passed = _write_and_check(found[0], answer, write_deck, output) if found and write_deck else ("", True)
+    if checked and form != "table":
+        click.echo(checked, err=True)
+    if form == "card":
+        return output.finish(objection=not (_card(found, output) and passed))
+    output.answer(answer, checked if form == "table" else "", every=every)
+    return output.finish(objection=not (answer.supported and passed))
+
+
+def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
+    """Refuse to copy no deck, and a card that switches nobody, before a file is opened."""
+    if folder is not None and request.deck is None:
+        raise ArgumentError("--write-deck needs `deck`, the deck that is copied with the cards")
+    if (form == "card" or folder) and not (request.part or cards.node):
         what = "-f card" if form == "card" else "--write-deck"
-        raise click.UsageError(f"{what} needs --part, the parts that are switched (Radioss: --node, their main nodes)")
+        raise ArgumentError(f"{what} needs --part, the parts that are switched (Radioss: --node, their main nodes)")
 
 
-def _windows(file: str) -> tuple[Times, ...]:
-    """Read the windows of a file, which must follow each other."""
-    from d2rpick.deck.printed_card import check_windows, read_windows
+def _check_model(asked: Asked) -> None:
+    """Raise DeckError where the deck that is to be copied is not that of the run."""
+    from d2rpick.choice.deck_of_run import of_another_model
 
-    with click.open_file(file, encoding="utf-8", errors="replace") as stream:
-        return check_windows(read_windows(stream.read(), file))
-
-
-def _beside(plan: Plan, reference: Reference, options: dict[str, Any], output: Output) -> None:
-    """Write the figure and the page, as far as they are asked for."""
-    if options["plot"]:
-        from d2rpick.report import figures
-        from d2rpick.report.figures_choice import draw_plan
-
-        output.write(options["plot"], figures.render(draw_plan(plan), options["plot"]))
-    if options["report"]:
-        from d2rpick.choice.explored import explored_flights
-        from d2rpick.report.pages import plan_page
-
-        found = _judged(plan, reference, options, every=False)
-        card = found[0].text if found else None
-        explorer = explorer_of(explored_flights(reference, plan))
-        page = plan_page(plan, reference.run, typed.repeat(), card, explorer)
-        output.write(options["report"], text_bytes(with_options(page)))
+    foreign = of_another_model(asked.run.files, asked.model.inventory) if asked.model else None
+    if foreign:
+        raise DeckError(f"{asked.request.deck}: {foreign.message}")
 
 
-def _deck(plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool) -> tuple[str, bool]:
-    """Write the copy of the deck with the cards, and check it; nothing without a window."""
-    if not plan.windows(every=every):
-        return "", True
-    found = _judged(plan, reference, options, every=every)
+def _by_deck(cards: Cards, deck: str | None) -> Cards:
+    """Let a card take the solver and the name of the run from the deck, unless they are given."""
+    if deck is None:
+        return cards
+
+    from d2rpick.deck.radioss_run import read_run, run_files
+
+    if not run_files(deck):
+        return replace(cards, solver=cards.solver or "ls-dyna")
+    legs = read_run(deck).legs
+    return replace(cards, solver=cards.solver or "radioss", name=cards.name or (legs[0].name if legs else None))
+
+
+def _printed(plan: Plan, cards: Cards, *, every: bool) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
+    """Print the cards of the next run, judged as they are printed; None without a window."""
+    from d2rpick.api.cards import need_ids
+
+    if not plan.new_windows(every=every):
+        return None
+    found = plan.card(cards, every=every)
     if found is None:
-        raise click.UsageError(need_ids(card_request(reference.run, options, plan.history), plan.history))
-    return plan_deck.write_and_check(found[0], plan, reference.run, options)
+        raise ArgumentError(need_ids(cards.request(plan.question), plan.history))
+    return found
 
 
-def _card(plan: Plan, reference: Reference, options: dict[str, Any], output: Output, *, every: bool) -> bool:
-    """Print the cards of the windows, judged as they are printed; False where there are none or one fails."""
-    if not plan.windows(every=every):
+def _card(found: tuple[PrintedCard, tuple[Verdict, ...]] | None, output: Output) -> bool:
+    """Give out the cards; False where there are none or one fails."""
+    from d2rpick.api.cards import all_cautions
+
+    if found is None:
         output.content(b"")
         return False
-    found = _judged(plan, reference, options, every=every)
-    if found is None:
-        raise click.UsageError(need_ids(card_request(reference.run, options, plan.history), plan.history))
     card, verdicts = found
     output.notes(card.notes, dict.fromkeys(c for one in verdicts for c in all_cautions(one) if not one.verified))
     output.content(card.text.encode())
     return all(verdict.verified for verdict in verdicts)
 
 
-def _judged(
-    plan: Plan, reference: Reference, options: dict[str, Any], *, every: bool
-) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
-    """Write the cards of the next run and judge them; None without a new window, or nobody to switch."""
-    from d2rpick.choice.judged_card import card_of_plan
+def _write_and_check(card: PrintedCard, plan: Plan, folder: str, output: Output) -> tuple[str, bool]:
+    """Write the copy, and check it by the history.
 
-    if not plan.windows(every=every):
-        return None
-    return card_of_plan(plan, reference.run, card_request(reference.run, options, plan.history), every=every)
+    Returns
+    -------
+    text : str
+        The files written, and below them what ``check --history`` prints of the deck.
+    passed : bool
+        Whether no finding is an error.
+    """
+    from d2rpick.deck.writing import write_deck
+    from d2rpick.report.findings import Checks, as_table
+    from d2rpick.rules import Severity, check_deck, configuration_for
+    from d2rpick.rules.configuration import Configuration
+    from d2rpick.rules.judgement import HistoryJudge
+
+    request = plan.question.request
+    written = write_deck(request.deck or "", card, folder, overwrite=output.overwrite)
+    done = card.windows[: len(plan.done)]  # as printed
+    judge = HistoryJudge(plan.question.reference.run, request.selection(parts=False), plan.settings, done)
+    checked = check_deck(written[0], configuration_for(written[0], Configuration()), judge)
+    listed = [f"written  {printable(name)}" for name in written]
+    text = "\n".join([*listed, "", as_table(Checks([checked]))])
+    return text, all(one.severity is not Severity.ERROR for one in checked.findings)

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from threading import Event
 
+    from d2rpick.api.request import Request
+    from d2rpick.api.runs import Run
+    from d2rpick.cli.output import Output
+
 _PERIOD: Final = 1.0  # [s] before the first line, and between two
 
 
@@ -35,15 +39,33 @@ def reading(names: Sequence[str], *, quiet: bool, period: float = _PERIOD) -> It
         click.echo(f"read {what}{more} in {perf_counter() - start:.2f} s", err=True)
 
 
+@contextmanager
+def opened(request: Request, output: Output, *inputs: str | None) -> Iterator[tuple[Run, Output]]:
+    """Open the run that is asked about and give it with what writes beside it and further ``inputs``.
+
+    What reads of it belongs inside.
+    """
+    from d2rpick.api.asked import open_run
+
+    with reading(request.history, quiet=output.quiet):
+        run = open_run(request)
+        weights = request.weights if isinstance(request.weights, str) else None
+        yield run, output.beside(*run.sources, request.deck, weights, *inputs)
+
+
 class Count:
     """How many of ``total`` runs are done; ``taken`` of them cost nothing."""
 
-    def __init__(self, total: int, done: int = 0, taken: int = 0) -> None:
-        self.total, self.done, self.taken = total, done, taken
+    def __init__(self, total: int) -> None:
+        self.total, self.done, self.taken = total, 0, -1
+
+    def tell(self, done: int) -> None:
+        """Be told how many are done, first how many cost nothing."""
+        self.done, self.taken = done, done if self.taken < 0 else self.taken
 
     def told(self, seconds: float) -> str:
         """Say how far it is after so many seconds, and how long the rest will take at this pace."""
-        computed = self.done - self.taken
+        computed = self.done - max(self.taken, 0)
         left = f", {_clock(seconds / computed * (self.total - self.done))} left" if computed else ""
         return f"{self.done} of {self.total} runs{left}"
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output
+from d2rpick.api.request import NOT_NEGATIVE, OPTIONS, POSITIVE, TIME, Request, option
+from d2rpick.cli import options
+from d2rpick.cli.options import FILES
 
 if TYPE_CHECKING:
+    from d2rpick.cli.output import Output
     from d2rpick.vibration.oscillator import State
 
 MOST_STATES = 10_000_000  # their text takes some gigabytes
@@ -24,31 +27,55 @@ Examples:
 """
 
 
-@click.command("replay", epilog=EXAMPLES)
-@shared.oscillator_options(required=True)
-@click.option("--z0", type=shared.TIME, help="Displacement of the frame at time 0.  [default: 0]")
-@click.option("--y0", type=shared.TIME, help="Displacement of the suspended mass at time 0.  [default: 0]")
-@click.option(
-    "--vz0", type=shared.TIME, cls=shared.Either, instead_of=("v0",),
-    help="Velocity of the frame at time 0; the same as --v0.  [default: 0]",
-)  # fmt: skip
-@click.option("--vy0", type=shared.TIME, help="Velocity of the suspended mass at time 0.  [default: 0]")
-@click.option("--tr", type=shared.NOT_NEGATIVE, metavar="T", help="Switch to rigid at this time; with --td.")
-@click.option("--td", type=shared.NOT_NEGATIVE, metavar="T", help="Switch back to deformable at this time.")
-@click.option("--t-end", type=shared.POSITIVE, required=True, metavar="T", help="Last time.")
-@click.option("--dt", type=shared.POSITIVE, required=True, metavar="T", help="Output interval.")
-@click.option(
-    "--write-as",
-    type=click.Choice(FORMATS),
-    help="Format of the result.  [default: by the name of -o, else csv]",
+def _same(name: str, **changes: Any) -> Any:
+    """Take an option of a request."""
+    return field(default=None, metadata={"option": OPTIONS[name]._replace(**changes)})
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is computed: the oscillator, its start, and when it is rigid."""
+
+    stiffness: float = _same("stiffness")
+    mass: float = _same("mass")
+    frame_mass: float | None = _same("frame_mass")
+    beta: float | None = _same("beta")
+    alpha: float = _same("alpha")
+    v0: float | None = _same("v0", help="Velocity of the frame at time 0.")
+    z0: float | None = option("Displacement of the frame at time 0.  [default: 0]", TIME)
+    y0: float | None = option("Displacement of the suspended mass at time 0.  [default: 0]", TIME)
+    vz0: float | None = option(
+        "Velocity of the frame at time 0; the same as --v0.  [default: 0]", TIME, instead_of=("v0",)
+    )
+    vy0: float | None = option("Velocity of the suspended mass at time 0.  [default: 0]", TIME)
+    tr: float | None = option("Switch to rigid at this time; with --td.", NOT_NEGATIVE, "T")
+    td: float | None = option("Switch back to deformable at this time.", NOT_NEGATIVE, "T")
+    t_end: float = option("Last time.", POSITIVE, "T")
+    dt: float = option("Output interval.", POSITIVE, "T")
+    write_as: str | None = option("Format of the result.  [default: by the name of -o, else csv]", FORMATS)
+
+    @property
+    def start(self) -> State:
+        """The state at time 0; UsageError when nothing or the velocity of the frame twice is given."""
+        from d2rpick.vibration.oscillator import State
+
+        if self.v0 is not None and self.vz0 is not None:
+            raise click.UsageError("--v0 and --vz0 exclude each other: both are the velocity of the frame at time 0")
+        given = (self.z0, self.y0, self.v0 if self.vz0 is None else self.vz0, self.vy0)
+        if given == (None,) * 4:
+            raise click.UsageError("the motion needs a start: --v0, or some of --z0, --y0, --vz0 and --vy0")
+        return State.of(*(value or 0.0 for value in given))
+
+
+_NEEDED: Final = {"required": True}
+
+
+@options.command("replay", EXAMPLES)
+@options.takes_all(
+    *(Motion, "motion"), stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED
 )
-@click.option(
-    "--plot", metavar="FILE", type=shared.FILE, help="Draw displacements and energies to FILE (png, svg, pdf)."
-)
-@shared.file_options
-def command(
-    tr: float | None, td: float | None, t_end: float, dt: float, write_as: str | None, plot: str | None, **options: Any
-) -> None:
+@options.takes("plot", *FILES, plot="Draw displacements and energies to FILE (png, svg, pdf).")
+def command(motion: Motion, output: Output) -> None:
     """Compute the floating oscillator in closed form, with or without switching.
 
     It starts from any displacements and velocities of both masses; what is not given is 0.  Columns: time,
@@ -59,36 +86,25 @@ def command(
     from d2rpick.models import files
     from d2rpick.vibration.oscillator import Replay, trajectory
 
-    start = _start(**options)
-    oscillator = shared.oscillator({**options, "v0": float(start.vz)})
+    start, tr, td = motion.start, motion.tr, motion.td
+    of_oscillator = {name: getattr(motion, name) for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")}
+    oscillator = Request(**of_oscillator, v0=float(start.vz)).oscillator
     assert oscillator is not None  # its options are required
     if (tr is None) != (td is None):
         raise click.UsageError("--tr and --td need each other")
     if tr is not None and td is not None and not tr < td:
         raise click.UsageError(f"--tr {tr:g} is not before --td {td:g}")
-    if t_end / dt > MOST_STATES:
-        raise click.UsageError(f"--t-end {t_end:g} holds more than {MOST_STATES} intervals of --dt {dt:g}")
-    form = write_as or format_of(options["output_file"], FORMATS)
-    output = Output.of({**options, "plot": plot})
+    if motion.t_end / motion.dt > MOST_STATES:
+        raise click.UsageError(
+            f"--t-end {motion.t_end:g} holds more than {MOST_STATES} intervals of --dt {motion.dt:g}"
+        )
+    form = motion.write_as or format_of(output.output_file, FORMATS)
+    output = output.beside()
     switched = None if tr is None or td is None else Replay(oscillator, start, 0.0, tr, td)
-    motion = trajectory(oscillator, start, t_end, dt, switched)
-    if plot:
+    found = trajectory(oscillator, start, motion.t_end, motion.dt, switched)
+    if output.plot:
         from d2rpick.report import figures, figures_models
 
-        output.write(plot, figures.render(figures_models.draw_replay(motion, switched), plot))
-    if options["output_file"] or not plot:
-        output.content(files.OSCILLATOR_WRITERS[form](motion, oscillator))
-
-
-def _start(
-    *, v0: float | None, z0: float | None, y0: float | None, vz0: float | None, vy0: float | None, **_: Any
-) -> State:
-    """Collect the state at time 0; UsageError when nothing or the velocity of the frame twice is given."""
-    from d2rpick.vibration.oscillator import State
-
-    if v0 is not None and vz0 is not None:
-        raise click.UsageError("--v0 and --vz0 exclude each other: both are the velocity of the frame at time 0")
-    given = (z0, y0, v0 if vz0 is None else vz0, vy0)
-    if given == (None,) * 4:
-        raise click.UsageError("the motion needs a start: --v0, or some of --z0, --y0, --vz0 and --vy0")
-    return State.of(*(value or 0.0 for value in given))
+        output.write(output.plot, figures.render(figures_models.draw_replay(found, switched), output.plot))
+    if output.output_file or not output.plot:
+        output.content(files.OSCILLATOR_WRITERS[form](found, oscillator))

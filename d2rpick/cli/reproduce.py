@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.cli import options as shared
-from d2rpick.cli import typed
-from d2rpick.cli.output import Output, finish
+from d2rpick.cli import options
+from d2rpick.cli.options import RESULT
+from d2rpick.cli.values import click_type
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
+    from d2rpick.cli.output import Output
     from d2rpick.histories.history import Samples
     from d2rpick.models.published_figures import Exhibit
     from d2rpick.report.reproduction import Reproduction
@@ -34,12 +35,12 @@ SECTIONS = ("1", "2", "3", "4", "5")
 PICTURES = ("svg", "png")
 
 
-@click.command("reproduce", epilog=EXAMPLES)
+@options.command("reproduce", EXAMPLES)
 @click.option(
     "--output-dir",
     metavar="DIR",
     required=True,
-    type=shared.FILE,
+    type=click_type("file"),
     help="Folder for figures and tables; created if missing.",
 )
 @click.option(
@@ -53,18 +54,13 @@ PICTURES = ("svg", "png")
     "--solver",
     metavar="FILE",
     multiple=True,
-    type=shared.FILE,
+    type=click_type("file"),
     help="A solver's runs of the same oscillator to draw for comparison: a table of time_s and "
     + ", or ".join(", ".join(columns) for columns in SOLVER.values())
     + "; repeatable.",
 )
-@click.option("--report", metavar="FILE", type=shared.FILE, help="Write all of it to one HTML page.")
-@shared.output_options(*FORMATS["reproduction"])
-@click.pass_context
-def command(
-    ctx: click.Context, /, output_dir: str, section: Sequence[str], solver: Sequence[str], report: str | None,
-    output_format: str, exit_zero: bool, **options: Any,
-) -> None:  # fmt: skip
+@options.takes("report", *RESULT, report="Write all of it to one HTML page.", forms=FORMATS["reproduction"])
+def command(output_dir: str, section: Sequence[str], solver: Sequence[str], output: Output) -> None:
     """Reproduce the published results as figures (svg, png) and tables (csv), section by section.
 
     Each figure stands with what the paper shows there, what is found here, and whether the two agree; the table puts
@@ -72,22 +68,22 @@ def command(
     about half a minute.
     """
     from d2rpick.models.published import table
-    from d2rpick.report.formats import Shown, write
+    from d2rpick.report.formats import write
     from d2rpick.report.reproduction import Reproduction
 
     place = _made(output_dir)  # the page may go there
-    output = Output.of({**options, "report": report}, *solver)
+    output = output.beside(*solver)
     curves = _solver(solver)  # before the half minute that the box takes
     answer = Reproduction(table(), list(_exhibits(section, curves)))
     files = _write(output, place, answer)
-    if report:
+    if output.report:
         from d2rpick.report.pages import reproduction_page
 
-        output.write(report, reproduction_page(answer.rows, answer.exhibits, typed.repeat()).encode())
+        output.write(output.report, reproduction_page(answer.rows, answer.exhibits, options.repeat()).encode())
     answer = answer._replace(files=files)
-    output.result(write("reproduction", output_format, answer, Shown(ctx.meta["d2rpick.command"])))
+    output.result(write("reproduction", output.output_format, answer, output.shown()))
     output.notes([f"{len(files)} files in {output_dir}"], ())
-    finish(ctx, objection=not all(row.agrees for row in answer.rows), exit_zero=exit_zero)
+    output.finish(objection=not all(row.agrees for row in answer.rows))
 
 
 def _exhibits(sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]) -> Iterator[Exhibit]:

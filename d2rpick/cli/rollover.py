@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output, finish
+from d2rpick.api.request import NOT_NEGATIVE, POSITIVE, UNLIMITED, dashed, option
+from d2rpick.cli import options
+from d2rpick.cli.options import FILES
 from d2rpick.cli.progress import counting
 from d2rpick.report.formats import FORMATS
 
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.warnings import Caution
+    from d2rpick.cli.output import Output
     from d2rpick.models.box_model import Parameters
     from d2rpick.models.box_run import Record
 
@@ -35,80 +38,86 @@ Examples:
 """
 
 
-@click.command("rollover", epilog=EXAMPLES)
-@click.option(
-    "--tr",
-    type=shared.NOT_NEGATIVE,
-    multiple=True,
-    metavar="T",
-    help="Switch the box to rigid at this time; with --td, as pairs in order where there are several windows.",
+@dataclass(frozen=True)
+class Box:
+    """What is computed, in SI units: the box, its windows and the scan."""
+
+    tr: tuple[float, ...] = option(
+        "Switch the box to rigid at this time; with --td, as pairs in order where there are several windows.",
+        *(NOT_NEGATIVE, "T"), many=True,
+    )  # fmt: skip
+    td: tuple[float, ...] = option("Switch it back.  [with --scan: 0.37]", NOT_NEGATIVE, "T", many=True)
+    drop: float | None = option(
+        "Let the box fall on the ground from this height of its lowest point, m, instead of tripping it on the sled.",
+        *(NOT_NEGATIVE, "HEIGHT"),
+    )
+    tilt: float | None = option("Of the box that falls.  [default: 30]", NOT_NEGATIVE, "DEG")
+    ground_stiffness: float | None = option("Of the ground at a point, N/m.  [default: 5e5]", POSITIVE)
+    scan: bool = option("Compute many tr, and hold each run against the one without switching.", "flag", default=False)
+    jobs: int | None = option("Processes of a scan.  [default: one for each core]", range(1, UNLIMITED))
+    t_end: float | None = option("Last time.  [default: 0.42, with --drop 1.2]", POSITIVE, "T")
+    dt: float = option("Output interval.", POSITIVE, "T", default=1e-4)
+    speed: float | None = option(
+        "Of the sled at the start, m/s; of a box that falls, along x.  [default: 7, with --drop 0]", NOT_NEGATIVE
+    )
+    stiffness: float | None = option("Of the bars of the box, E A in N.  [default: 4.5e6]", POSITIVE)
+    yield_strain: float | None = option("Of the bars of the box.  [default: 4.5e-3]", POSITIVE)
+    damping: float | None = option("Rate of the mass damping, 1/s.  [default: 0.2]", NOT_NEGATIVE)
+    mesh: int | None = option("Cells along each side of the box.  [default: 16]", range(4, 201))
+    write_as: str | None = option("Format of a history.  [default: by the name of -o, else csv]", HISTORIES)
+
+    @property
+    def end(self) -> float:
+        """Last time [s]."""
+        return self.t_end or T_END[self.drop is not None]
+
+    @property
+    def parameters(self) -> Parameters:
+        """The model that is meant."""
+        from d2rpick.models.box_model import Parameters
+
+        given = {name: getattr(self, name) for name in PARAMETERS if getattr(self, name) is not None}
+        return Parameters(**({"speed": 0.0, "tilt": TILT, **given} if self.drop is not None else given))
+
+
+@options.command("rollover", EXAMPLES)
+@options.takes_all(Box, "box")
+@options.takes(
+    *("output_format", "plot", *FILES, "exit_zero"),
+    output_format={
+        "type": click.Choice(list(FORMATS["rollover"])),
+        "default": None,
+        "help": "Form of a scan.  [default: table]",
+    },
+    plot="Draw the motion of the box, or the scan, to FILE (png, svg, pdf).",
 )
-@click.option("--td", type=shared.NOT_NEGATIVE, multiple=True, metavar="T", help="Switch it back.  [with --scan: 0.37]")
-@click.option(
-    "--drop",
-    type=shared.NOT_NEGATIVE,
-    metavar="HEIGHT",
-    help="Let the box fall on the ground from this height of its lowest point, m, instead of tripping it on the sled.",
-)
-@click.option("--tilt", type=shared.NOT_NEGATIVE, metavar="DEG", help="Of the box that falls.  [default: 30]")
-@click.option("--ground-stiffness", type=shared.POSITIVE, help="Of the ground at a point, N/m.  [default: 5e5]")
-@click.option("--scan", is_flag=True, help="Compute many tr, and hold each run against the one without switching.")
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes of a scan.  [default: one for each core]")
-@click.option("--t-end", type=shared.POSITIVE, metavar="T", help="Last time.  [default: 0.42, with --drop 1.2]")
-@click.option("--dt", type=shared.POSITIVE, default=1e-4, show_default=True, metavar="T", help="Output interval.")
-@click.option(
-    "--speed",
-    type=shared.NOT_NEGATIVE,
-    help="Of the sled at the start, m/s; of a box that falls, along x.  [default: 7, with --drop 0]",
-)
-@click.option("--stiffness", type=shared.POSITIVE, help="Of the bars of the box, E A in N.  [default: 4.5e6]")
-@click.option("--yield-strain", type=shared.POSITIVE, help="Of the bars of the box.  [default: 4.5e-3]")
-@click.option("--damping", type=shared.NOT_NEGATIVE, help="Rate of the mass damping, 1/s.  [default: 0.2]")
-@click.option("--mesh", type=click.IntRange(4, 200), help="Cells along each side of the box.  [default: 16]")
-@click.option(
-    "--write-as", type=click.Choice(HISTORIES), help="Format of a history.  [default: by the name of -o, else csv]"
-)
-@click.option(
-    "-f", "--output-format", type=click.Choice(list(FORMATS["rollover"])), help="Form of a scan.  "
-    "[default: table]",
-)  # fmt: skip
-@click.option(
-    "--plot", metavar="FILE", type=shared.FILE, help="Draw the motion of the box, or the scan, to FILE (png, svg, pdf)."
-)
-@shared.file_options
-@shared.EXIT_ZERO
-@click.pass_context
-def command(ctx: click.Context, /, scan: bool, **options: Any) -> None:
+def command(box: Box, output: Output) -> None:
     """Compute a planar box that trips over the curb of a braking sled and rolls, or falls and bounces.  SI units.
 
     It is deformable throughout, or rigid from each tr to its td; the step that meets the curb stays deformable.
     Columns: time, place, roll and velocities of the box, its energies, the momentum of box and step, and the energy
     balance of the model.  glstat holds the energies of both, matsum those of each.
     """
-    options["t_end"] = options["t_end"] or T_END[options["drop"] is not None]
-    _check(scan=scan, **options)
-    if scan:
-        _scan(ctx, options)
-    else:
-        _run(options)
+    _check(box, output)
+    (_scan if box.scan else _run)(box, output)
 
 
-def _check(*, scan: bool, t_end: float, dt: float, drop: float | None, tilt: float | None, **options: Any) -> None:
+def _check(box: Box, output: Output) -> None:
     """UsageError where options contradict each other."""
-    if scan:
-        lost = [name for name in ("tr", "write_as") if options[name]] + (["drop"] if drop is not None else [])
+    if box.scan:
+        lost = [name for name in ("tr", "write_as") if getattr(box, name)] + ["drop"] * (box.drop is not None)
         if lost:
-            raise click.UsageError(f"--scan and --{lost[0].replace('_', '-')} exclude each other")
-        if len(options["td"]) > 1:
+            raise click.UsageError(f"--scan and --{dashed(lost[0])} exclude each other")
+        if len(box.td) > 1:
             raise click.UsageError("--scan takes one --td")
-    elif options["output_format"] or options["jobs"]:
-        raise click.UsageError(f"--{'output-format' if options['output_format'] else 'jobs'} needs --scan")
+    elif output.output_format or box.jobs:
+        raise click.UsageError(f"--{'output-format' if output.output_format else 'jobs'} needs --scan")
     else:
-        _check_windows(options["tr"], options["td"], t_end)
-    if tilt is not None and drop is None:
+        _check_windows(box.tr, box.td, box.end)
+    if box.tilt is not None and box.drop is None:
         raise click.UsageError("--tilt belongs to --drop; the floor of the sled keeps its own")
-    if t_end / dt > MOST_STATES:
-        raise click.UsageError(f"--t-end {t_end:g} holds more than {MOST_STATES} intervals of --dt {dt:g}")
+    if box.end / box.dt > MOST_STATES:
+        raise click.UsageError(f"--t-end {box.end:g} holds more than {MOST_STATES} intervals of --dt {box.dt:g}")
 
 
 def _check_windows(starts: Sequence[float], ends: Sequence[float], t_end: float) -> None:
@@ -126,28 +135,19 @@ def _check_windows(starts: Sequence[float], ends: Sequence[float], t_end: float)
         before = td
 
 
-def _parameters(options: dict[str, Any]) -> Parameters:
-    from d2rpick.models.box_model import Parameters
-
-    given = {name: options[name] for name in PARAMETERS if options[name] is not None}
-    if options["drop"] is not None:
-        given = {"speed": 0.0, "tilt": TILT, **given}
-    return Parameters(**given)
-
-
-def _run(options: dict[str, Any]) -> None:
+def _run(box: Box, output: Output) -> None:
     """One run; for a plot also the one without switching."""
     from d2rpick.histories.opening import format_of
     from d2rpick.models import files
     from d2rpick.models.box_run import RigidWindow, simulate
 
-    form = options["write_as"] or format_of(options["output_file"], HISTORIES)
-    output = Output.of(options)
-    parameters, plot = _parameters(options), options["plot"]
-    windows = tuple(map(RigidWindow, options["tr"], options["td"]))
+    form = box.write_as or format_of(output.output_file, HISTORIES)
+    output = output.beside()
+    parameters, plot = box.parameters, output.plot
+    windows = tuple(map(RigidWindow, box.tr, box.td))
 
     def simulated(*rigid: RigidWindow) -> Record:
-        return simulate(parameters, options["t_end"], *rigid, interval=options["dt"])
+        return simulate(parameters, box.end, *rigid, interval=box.dt)
 
     record = simulated(*windows)
     output.notes((), _unbalanced(record))
@@ -156,23 +156,23 @@ def _run(options: dict[str, Any]) -> None:
 
         reference, switched = (simulated(), record) if windows else (record, None)
         output.write(plot, figures.render(figures_models.draw_rollover(parameters, reference, switched, windows), plot))
-    if options["output_file"] or not plot:
+    if output.output_file or not plot:
         output.content(files.BOX_WRITERS[form](record))
 
 
-def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
+def _scan(box: Box, output: Output) -> None:
     """Many switched runs, the tr that the tool recommends among them."""
     from d2rpick.workers import begin, cores
 
-    begin(options["jobs"] or cores(), "d2rpick.models.box_run")
+    begin(box.jobs or cores(), "d2rpick.models.box_run")
     from d2rpick.models.box_run import simulate
     from d2rpick.models.box_scan import comparison_end, scan, scan_times, suggestion_for
-    from d2rpick.report.formats import Shown, write
+    from d2rpick.report.formats import write
     from d2rpick.report.rollover import Scan
 
-    output = Output.of(options)
-    parameters, td, plot = _parameters(options), next(iter(options["td"]), TD), options["plot"]
-    reference = simulate(parameters, options["t_end"], interval=options["dt"])
+    output = output.beside()
+    parameters, td, plot = box.parameters, next(iter(box.td), TD), output.plot
+    reference = simulate(parameters, box.end, interval=box.dt)
     comparison_end(reference, td)
     times = scan_times(reference.released or td / 3, td)
     answer = suggestion_for(reference, td)
@@ -181,8 +181,8 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
     if answer.recommended:
         times = sorted({*times, answer.recommended.tr})
     outcomes = []
-    with counting(len(times), quiet=options["quiet"]) as count:
-        for outcome in scan(parameters, reference, times, td, options["jobs"]):
+    with counting(len(times), quiet=output.quiet) as count:
+        for outcome in scan(parameters, reference, times, td, box.jobs):
             outcomes.append(outcome)
             count.done += 1
     if plot:
@@ -190,8 +190,8 @@ def _scan(ctx: click.Context, options: dict[str, Any]) -> None:
 
         output.write(plot, figures.render(figures_models.draw_scan(reference, outcomes, answer), plot))
     found = Scan(reference, outcomes, answer, cautions)
-    output.result(write("rollover", options["output_format"] or "table", found, Shown(ctx.meta["d2rpick.command"])))
-    finish(ctx, objection=answer.recommended is None, exit_zero=options["exit_zero"])
+    output.result(write("rollover", output.output_format or "table", found, output.shown()))
+    output.finish(objection=answer.recommended is None)
 
 
 def _unbalanced(record: Record) -> tuple[Caution, ...]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.cli import options as shared
-from d2rpick.cli.output import Output
+from d2rpick.cli import options
+from d2rpick.cli.options import FILES
+
+if TYPE_CHECKING:
+    from d2rpick.cli.output import Output
 
 EXAMPLES = """\b
 Examples:
@@ -16,14 +19,14 @@ Examples:
 """
 
 
-@click.command("rule", epilog=EXAMPLES)
+@options.command("rule", EXAMPLES)
 @click.argument("id", metavar="[ID]...", nargs=-1)
-@shared.file_options
-def command(id: tuple[str, ...], **options: Any) -> None:  # noqa: A002  the name is that of the argument in usage
+@options.takes(*FILES)
+def command(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name is that of the argument in usage
     """Explain a rule of `d2rpick check`, with decks that pass and fail; without ID, list all rules."""
     from d2rpick.report import findings as report
     from d2rpick.rules import find_rules
 
-    output = Output.of(options)
+    output = output.beside()
     rules = [rule for name in id for rule in find_rules(name)]
     output.result("\n\n\n".join(map(report.as_text, rules)) if rules else report.as_list())

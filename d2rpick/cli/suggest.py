@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import click
-
-from d2rpick.cli import deck_cost, typed
-from d2rpick.cli import options as shared
-from d2rpick.cli.card_options import all_cautions, card_options, card_request, energy_of, need_ids, prints_card
-from d2rpick.cli.output import Output, finish, text_bytes
-from d2rpick.cli.progress import reading
-from d2rpick.cli.wording import in_words, with_options
-from d2rpick.report.formats import FORMATS, Shown, write
+from d2rpick.api.request import time_or_window
+from d2rpick.cli import options
+from d2rpick.cli.options import ANSWER, DECK_OF_PARTS, ONE_RUN, WINDOW
+from d2rpick.cli.progress import opened
+from d2rpick.errors import ArgumentError
+from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
-    from d2rpick.choice.of_run import Reference
-    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.choices import Suggestion
+    from d2rpick.api.request import Request
+    from d2rpick.cli.output import Output
 
 EXAMPLES = """\b
 Examples:
@@ -32,44 +30,12 @@ Examples:
 """
 
 
-@click.command("suggest", epilog=EXAMPLES)
-@click.option(
-    "--td", type=shared.TIME, metavar="T", cls=shared.Either, instead_of=("td_window",),
-    help="Switch back to deformable at this time.",
-)  # fmt: skip
-@click.option(
-    "--td-window",
-    type=(shared.TIME, shared.TIME),
-    metavar="LO HI",
-    cls=shared.Either,
-    instead_of=("td",),
-    help="Choose the time to switch back within this window.",
-)
-@click.option(
-    "--limit",
-    type=click.IntRange(min=1),
-    default=10,
-    show_default=True,
-    help="Number of rows in the table; json and csv have all.",
-)
-@deck_cost.cost_options
-@shared.history_options
-@shared.choosing_options
-@card_options
-@shared.MIN_QUALITY
-@shared.output_options(*FORMATS["suggestion"], "card")
-@click.pass_context
-def command(
-    ctx: click.Context,
-    /,
-    td: float | None,
-    td_window: tuple[float, float] | None,
-    limit: int,
-    min_quality: str | None,
-    output_format: str,
-    exit_zero: bool,
-    **options: Any,
-) -> None:
+@options.command("suggest", EXAMPLES)
+@options.time("--td", "Switch back to deformable at this time.", instead_of=("td_window",))
+@options.time("--td-window", "Choose the time to switch back within this window.", instead_of=("td",), pair=True)
+@options.LIMIT
+@options.takes(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=[*FORMATS["suggestion"], "card"])
+def command(td: float | None, td_window: WINDOW, limit: int, request: Request, cards: Cards, output: Output) -> None:
     """Rank the times tr at which the parts of HISTORY can be made rigid until td, or choose both times.
 
     Without --td both are chosen, in --td-window or in the longest flight.
@@ -77,65 +43,27 @@ def command(
     A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
-    from d2rpick.choice.of_run import Reference, suggest_of
+    from d2rpick.api.asked import ask
+    from d2rpick.api.choices import suggested
 
-    _check_usage(td, td_window, card=output_format == "card", ids=(*options["part"], *options["node"]))
-    prints = prints_card(options, output_format)
-    asked, settings = shared.Reading.of({**options, "part": ()}), shared.settings(options)
-    extras = shared.Extras.of(options)
-    with reading(asked.names, quiet=asked.quiet):
-        run = asked.open()
-        output = Output.of(options, *run.sources)
-        model = deck_cost.model_of(options)
-        run, options = deck_cost.with_deck(run, options, settings, model)
-        reference = Reference(run, energy_of(run, options, prints=prints))
-        settings, unknown = deck_cost.with_cost(settings, reference, model, options["merge"])
-    answer = suggest_of(reference, td_window if td is None else td, settings)
-    answer = replace(answer, cautions=(*answer.cautions, *unknown))
-    output.notes(reference.history.notes, answer.cautions)
-    if extras.plot:
-        from d2rpick.report import figures, figures_choice
-
-        output.write(extras.plot, figures.render(figures_choice.draw_suggestion(answer), extras.plot))
-    if extras.report:
-        output.write(extras.report, text_bytes(with_options(_page(answer, reference, options))))
-    poor = shared.falls_short(answer.quality, min_quality)
-    if output_format == "card":
-        passed = _card(answer, reference, options, output)
-        return finish(ctx, objection=not passed or poor, exit_zero=exit_zero)
-    text = write("suggestion", output_format, answer, Shown(ctx.meta["d2rpick.command"], limit))
-    output.result(in_words(text, output_format))
-    return finish(ctx, objection=answer.recommended is None or poor, exit_zero=exit_zero)
+    wanted, card = time_or_window(td, td_window), output.output_format == "card"
+    if card and not (request.part or cards.node):
+        raise ArgumentError("-f card needs --part, the parts to switch (Radioss: --node, their main nodes)")
+    prints = output.prints(cards, request)
+    with opened(request, output) as (run, output):
+        asked = ask(run, request, prints=prints, merge=cards.merge)
+    answer = suggested(asked, wanted)
+    output.notes(asked.reference.history.notes, answer.cautions)
+    output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
+    if card:
+        return output.finish(objection=not _card(answer, cards, output), quality=answer.quality)
+    output.answer(answer, limit=limit)
+    return output.finish(objection=answer.recommended is None, quality=answer.quality)
 
 
-def _check_usage(td: float | None, window: tuple[float, float] | None, *, card: bool, ids: tuple[str, ...]) -> None:
-    """Raise UsageError where what is asked for makes no sense, before a file is opened."""
-    if td is not None and window:
-        raise click.UsageError("--td and --td-window exclude each other")
-    if window and not window[0] < window[1]:
-        raise click.UsageError(f"--td-window {window[0]:g} {window[1]:g} is empty; give the lower time first")
-    if card and not ids:
-        raise click.UsageError("-f card needs --part, the parts to switch (Radioss: --node, their main nodes)")
-
-
-def _page(answer: Suggestion, reference: Reference, options: dict[str, Any]) -> str:
-    """Draw the figure, explore the flight, and write the page around them."""
-    from d2rpick.choice.explored import explored_around
-    from d2rpick.choice.judged_card import input_for
-    from d2rpick.cli.explorer import explorer_of
-    from d2rpick.report.page import PageContext
-    from d2rpick.report.pages import suggestion_page
-
-    run = reference.run
-    request, pair = card_request(run, options, answer.situation.history), answer.recommended
-    card = input_for(reference, answer.situation, pair.tr, request) if pair else None
-    explorer = explorer_of([explored_around(reference, answer.situation, answer.td_window)])
-    judging = typed.judging(options)
-    return suggestion_page(answer, PageContext(run, typed.repeat(), judging, card, explorer=explorer))
-
-
-def _card(answer: Suggestion, reference: Reference, options: dict[str, Any], output: Output) -> bool:
+def _card(answer: Suggestion, cards: Cards, output: Output) -> bool:
     """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
+    from d2rpick.api.cards import all_cautions, need_ids
     from d2rpick.choice.judged_card import judged_card
     from d2rpick.choice.of_run import judge_of
 
@@ -143,10 +71,11 @@ def _card(answer: Suggestion, reference: Reference, options: dict[str, Any], out
     if pair is None:
         output.content(b"")
         return False
-    request = card_request(reference.run, options, situation.history).by(situation.settings)
-    found = judged_card([(pair.tr, pair.td)], situation.history, partial(judge_of, reference, situation), request)
+    request = cards.request(answer.question).by(situation.settings)
+    judge = partial(judge_of, answer.question.reference, situation)
+    found = judged_card([(pair.tr, pair.td)], situation.history, judge, request)
     if found is None:
-        raise click.UsageError(need_ids(request, situation.history))
+        raise ArgumentError(need_ids(request, situation.history))
     card, (verdict,) = found
     said = set(answer.cautions)
     output.notes(card.notes, [caution for caution in all_cautions(verdict) if caution not in said])

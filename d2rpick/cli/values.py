@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
+
+from d2rpick.api.request import UNLIMITED, Number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -20,30 +22,27 @@ else:
     FloatType = click.ParamType  # generic from click 8.4 on
 
 
-class Number(FloatType):
-    """A finite number with a point, not below ``low`` (or above it, when ``above``) and not above ``high``."""
+class NumberType(FloatType):
+    """A finite number with a point within its limits."""
 
     name = "number"
 
-    def __init__(self, low: float = -math.inf, high: float = math.inf, *, above: bool = False) -> None:
-        self.low, self.high, self.above = low, high, above
+    def __init__(self, limits: Number) -> None:
+        self.limits = limits
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Read a number or fail with what was found and what was expected."""
+        low, high, above = self.limits
         try:
             number = float(value)
         except ValueError:
             self.fail(f"{value!r} is not a number{_without_unit(str(value))}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
-        if number < self.low or (self.above and number == self.low):
-            self.fail(
-                f"{value} was found, a number {'above' if self.above else 'of at least'} {self.low:g} was expected",
-                param,
-                ctx,
-            )
-        if number > self.high:
-            self.fail(f"{value} was found, a number of at most {self.high:g} was expected", param, ctx)
+        limit = f"{'above' if above else 'of at least'} {low:g}" if number < low or (above and number == low) else ""
+        limit = limit or (f"of at most {high:g}" if number > high else "")
+        if limit:
+            self.fail(f"{value} was found, a number {limit} was expected", param, ctx)
         return number
 
 
@@ -53,10 +52,6 @@ def _without_unit(text: str) -> str:
 
     value = in_seconds(text)
     return "" if value is None else f": give a number in the unit of the history, {value:g} where it is s"
-
-
-# of d2rpick.histories.opening, which is too heavy to be imported for --help; a test holds them together
-FORMATS = ("binout", "radioss-th", "glstat", "matsum", "hdf5", "csv")
 
 
 class File(click.types.StringParamType):
@@ -130,12 +125,46 @@ def _completed(offered: Iterable[tuple[str, str]], incomplete: str) -> list[Comp
     return [CompletionItem(name, help=told) for name, told in words if name.startswith(incomplete)]
 
 
-NAMES = Names()
-PARTS = PartNames()
-CHANNELS = ChannelNames()
-FILE = File()
-TIME = Number()
-POSITIVE = Number(0.0, above=True)
-NOT_NEGATIVE = Number(0.0)
-FRACTION = Number(0.0, high=1.0)
-AT_LEAST_ONE = Number(1.0)
+class SolverName(click.types.StringParamType):
+    """Name of a solver whose input can be printed; the table of solvers is read when it is asked."""
+
+    name = "solver"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Take a name or fail with those there are."""
+        from d2rpick.deck.printing import SOLVERS
+
+        if value not in SOLVERS:
+            self.fail(f"{value!r} was found, one of {', '.join(SOLVERS)} was expected", param, ctx)
+        return str(value)
+
+    def get_metavar(self, *_: Any, **__: Any) -> str:
+        """Show the names in the help."""
+        from d2rpick.deck.printing import SOLVERS
+
+        return f"[{'|'.join(SOLVERS)}]"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        """Offer the names that begin so."""
+        from d2rpick.deck.printing import SOLVERS
+
+        return _completed([(name, "") for name in SOLVERS], incomplete)
+
+
+_NAMED: Final = {
+    "text": click.STRING,
+    "file": File(),
+    "names": Names(),
+    "parts": PartNames(),
+    "channels": ChannelNames(),
+    "solver": SolverName(),
+}
+
+
+def click_type(kind: Number | range | tuple[str, ...] | str) -> Any:
+    """Give the type by which click reads a kind of value."""
+    if isinstance(kind, str):
+        return _NAMED[kind]
+    if isinstance(kind, range):
+        return click.IntRange(kind.start, None if kind.stop >= UNLIMITED else kind.stop - 1)
+    return NumberType(kind) if isinstance(kind, Number) else click.Choice(kind)

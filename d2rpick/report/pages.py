@@ -261,7 +261,7 @@ def _files(answer: Study) -> str:
 
 def parts_page(found: Parts, command: Sequence[str]) -> str:
     """Write the page of ``parts``; ``command`` are the arguments that repeat the answer."""
-    return document(f"Parts to switch: {page.title_of(found.run)}", *_of_parts(found, command), signed=page.SIGNED)
+    return document(f"Parts to switch: {page.title_of(found.files)}", *_of_parts(found, command), signed=page.SIGNED)
 
 
 def _of_parts(found: Parts, command: Sequence[str]) -> Iterator[Markup]:
@@ -274,7 +274,7 @@ def _of_parts(found: Parts, command: Sequence[str]) -> Iterator[Markup]:
     yield section("What it means", pairs(parts.outlook(found)))
     weights = [("weights", found.weights.source)] if found.weights else []
     deck = page.deck_digests(found.inventory.files, found.weights) if found.inventory else []
-    read = [*page.named(parts.heading(found)), *weights, *page.digests(found.run.files), *deck]
+    read = [*page.named(parts.heading(found)), *weights, *page.digests(found.files.files), *deck]
     yield section("What was read", pairs(read))
     yield page.repeated(command)
 

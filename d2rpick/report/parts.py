@@ -117,7 +117,7 @@ DOCUMENT: Final = Document(
     "Answer of d2rpick parts; times, masses and energies in the units of the history.",
     row(
         keys.WARNINGS,
-        Field("history", _HISTORY, get=lambda found: found.run),
+        Field("history", _HISTORY, get=lambda found: found.files),
         Field("deck", maybe(_DECK), get=lambda found: found.inventory),
         Field("weights", maybe(_WEIGHTS)),
         Field("step_ratio", "number", get=lambda found: found.settings.step_ratio),
@@ -161,7 +161,7 @@ def as_value(found: Parts) -> str:
 
 def heading(found: Parts) -> list[str]:
     """What was read."""
-    run, deck = found.run, found.inventory
+    run, deck = found.files, found.inventory
     formats = " + ".join(one.format for one in run.databases)
     lines = [f"history  {', '.join(run.sources)}: {formats}, {_number(len(run.parts), 'part')}"]
     if deck is None:

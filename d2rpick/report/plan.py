@@ -102,7 +102,7 @@ def as_value(plan: Plan, *, every: bool = False) -> str:
 
     Those that are done, and the supported ones, or ``every`` new one; nothing where none is new.
     """
-    return "\n".join(f"{tr!r} {td!r}" for tr, td in plan.next_run(every=every))
+    return "\n".join(f"{tr!r} {td!r}" for tr, td in plan.run_windows(every=every))
 
 
 def heading(plan: Plan) -> str:

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import d2rpick as d2
-from d2rpick.api.answers import written
+from d2rpick.api.answer import written
 from d2rpick.report.keys import MEASURES
 from tests.command import BOX, DECK, ENERGY, GLSTAT, ROLLOVER, answer, run
 from tests.sample_deck import DECK as SAMPLE_DECK
@@ -272,7 +272,7 @@ def test_a_run_is_shown_by_its_files() -> None:
         (
             lambda: loose.suggest(d2.read(ENERGY), td=0.06, td_window=(0.06, 0.07)),
             TypeError,
-            "td or td_window was expected",
+            "`td` and `td_window` exclude",
         ),
         (lambda: loose.suggest(d2.read(ENERGY), "0.064"), TypeError, "td is '0.064', a number was expected"),
         (lambda: loose.suggest(d2.read(ENERGY), td_window=(2, 1)), ValueError, "td_window is 2 to 1, which is empty"),
@@ -285,13 +285,13 @@ def test_a_run_is_shown_by_its_files() -> None:
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=d2.read(BOX).parts[0]), TypeError, r"parts holds Part\(id=1,"),
         (lambda: loose.suggest(ENERGY, 0.06), TypeError, "run is .*, what read"),
         (lambda: loose.suggest(d2.read(ROLLOVER, energy="boxIE_J"), 0.3, parts=1), ValueError, "exclude each other"),
-        (lambda: loose.suggest(d2.read(BOX), 0.3, weights="a.toml"), ValueError, "weights needs a deck"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, weights="a.toml"), ValueError, "`weights` needs `deck`"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, deck=3), TypeError, "deck is 3"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, deck=["a.k", "b.k"]), ValueError, "deck names 2 files"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, deck="absent.k"), d2.DeckError, "absent.k"),
-        (lambda: loose.plan(d2.read(BOX), parts="recommended"), ValueError, "needs deck"),
+        (lambda: loose.plan(d2.read(BOX), parts="recommended"), ValueError, "needs `deck`"),
         (lambda: loose.plan(d2.read(BOX), parts=["recommended", 1]), ValueError, "a whole set"),
-        (lambda: loose.plan(d2.read(BOX), step_ratio=2), ValueError, "cost_share or a deck"),
+        (lambda: loose.plan(d2.read(BOX), step_ratio=2), ValueError, "`cost_share` or `deck`"),
         (lambda: loose.read(3), TypeError, "source is 3"),
         (lambda: loose.read([]), ValueError, "source is empty"),
         (lambda: loose.read("a\0b"), ValueError, r"source holds 'a\\x00b' with a NUL byte"),

@@ -70,9 +70,9 @@ def test_explore_takes_a_deck_as_suggest_does() -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        ({"weights": "site.toml"}, "weights needs a deck"),
-        ({"tr": 0.1}, "tr needs td"),
-        ({"tr": 0.3, "td": 0.1}, "empty"),
+        ({"weights": "site.toml"}, "`weights` needs `deck`"),
+        ({"tr": 0.1}, "`tr` needs `td`"),
+        ({"tr": 0.3, "td": 0.1}, "tr must lie before td"),
     ],
 )
 def test_wrong_arguments_are_named(arguments: dict[str, object], told: str) -> None:

@@ -59,7 +59,7 @@ def test_a_wrong_argument_is_named() -> None:
         d2.plan(d2.read(ENERGY), min_rigid=-1)
     with pytest.raises(ValueError, match=r"done\[0\] is"):
         d2.plan(d2.read(ENERGY), done=[(0.2, 0.1)])
-    with pytest.raises(ValueError, match="before is a run, but done names no window"):
+    with pytest.raises(ValueError, match="name its windows with `done`"):
         d2.plan(d2.read(ENERGY), before=d2.read(ENERGY))
     with pytest.raises(d2.RangeError, match="outside the record"):
         d2.plan(d2.read(ENERGY), done=[(0.1, 0.9)])

@@ -71,20 +71,20 @@ def test_the_first_fall_is_rigid_from_the_start_and_the_first_that_locks_in_ener
 
 
 def test_each_window_is_what_suggest_says_for_its_td(reference: Reference, plan: Plan) -> None:
-    for tr, td in plan.windows(every=True):
+    for tr, td in plan.new_windows(every=True):
         found = suggest_of(reference, td, PLAIN)
         assert found.recommended is not None
         assert (found.recommended.tr, found.recommended.td) == (tr, td)
 
 
 def test_windows_keep_their_margin_and_follow_each_other(plan: Plan) -> None:
-    windows = plan.windows(every=True)
+    windows = plan.new_windows(every=True)
     assert all(one[1] < other[0] for one, other in pairwise(windows))
     for row in plan.rows:
         if row.window and row.flight.end is not None:
             assert row.start <= row.window[0] < row.window[1] <= row.end - row.margin.time + 1e-12
             assert row.margin.time >= 0.03 * (row.end - row.start)
-    assert plan.rigid_time == pytest.approx(sum(td - tr for tr, td in plan.windows()))
+    assert plan.rigid_time == pytest.approx(sum(td - tr for tr, td in plan.new_windows()))
 
 
 def test_a_margin_that_is_given_overrules(reference: Reference) -> None:
@@ -116,12 +116,12 @@ def test_after_counts_in_its_flight_alone(reference: Reference, plan: Plan) -> N
 def test_a_switched_run_is_recognised_and_the_next_window_planned(
     reference: Reference, plan: Plan, tmp_path: Path
 ) -> None:
-    done = plan.windows()
+    done = plan.new_windows()
     switched = read(written(drop(*done), tmp_path), BOX)
     found = plan_of(switched, PLAIN, done=done, before=reference)
     assert [row.window for row in found.rows if row.status == "done"] == list(done)
-    assert found.windows()
-    assert found.windows()[0][0] > done[-1][1]
+    assert found.new_windows()
+    assert found.new_windows()[0][0] > done[-1][1]
     for row in found.rows:
         if row.done:
             assert abs(sure(row.done.moved)) <= row.margin.time
@@ -129,9 +129,9 @@ def test_a_switched_run_is_recognised_and_the_next_window_planned(
     landed = [row.done.landing for row in found.rows if row.done]
     contacts = [start for start, _ in drop(*done).landings]
     assert all(min(abs(one - at) for at in contacts) < 2e-3 for one in landed if one is not None)
-    assert found.next_run() == (*done, *found.windows())
-    assert plan.next_run() == done
-    assert plan_of(switched, PLAIN, done=done, min_rigid=1.0).next_run() == ()
+    assert found.run_windows() == (*done, *found.new_windows())
+    assert plan.run_windows() == done
+    assert plan_of(switched, PLAIN, done=done, min_rigid=1.0).run_windows() == ()
 
 
 @pytest.mark.parametrize("window", [(0.31, 0.5), (0.281, 0.75)])
@@ -139,7 +139,7 @@ def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
     plan: Plan, window: tuple[float, float], tmp_path: Path
 ) -> None:
     """The box is made rigid before, or while, it stands on the ground; it takes off while it is rigid."""
-    done = [one for one in (plan.windows()[0], window) if one[1] < window[0]] + [window]
+    done = [one for one in (plan.new_windows()[0], window) if one[1] < window[0]] + [window]
     record = drop(*done)
     (take_off,) = [end for _, end in record.landings if window[0] < end < window[1]]
     found = plan_of(read(written(record, tmp_path), BOX), PLAIN, done=done)
@@ -149,7 +149,7 @@ def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
     assert "rigid in the contact" in told.told
     assert "landed-rigid" in [caution.code for caution in found.cautions]
     assert not found.supported
-    assert not found.next_run()
+    assert not found.run_windows()
     reasons = [row.reason or "" for row in found.rows if row.status == "re-plan"]
     assert reasons
     assert all(f"in the window {window[0]:.6g} to {window[1]:.6g}" in reason for reason in reasons)
@@ -177,7 +177,7 @@ def test_a_window_that_is_done_where_nothing_flies_is_told(tmp_path: Path) -> No
 
 def test_a_run_that_was_not_switched_is_not_taken_for_one(reference: Reference, plan: Plan) -> None:
     with pytest.raises(RangeError, match="said to be done"):
-        plan_of(reference, PLAIN, done=plan.windows())
+        plan_of(reference, PLAIN, done=plan.new_windows())
     with pytest.raises(RangeError, match="outside the record"):
         plan_of(reference, PLAIN, done=[(0.1, 9.0)])
 
@@ -227,7 +227,7 @@ def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) 
     found = plan_of(read([str(table)]), Settings(replay=False))
     assert len(found.rows) == 3
     assert all(one.end < other.start for one, other in pairwise(found.rows))
-    windows = found.windows(every=True)
+    windows = found.new_windows(every=True)
     assert all(one[1] < other[0] for one, other in pairwise(windows))
 
 
@@ -289,7 +289,7 @@ def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(c
     assert statuses(found) == ["left-out", "supported"]
     assert "flight 2 behind it for 0.108: this window locks in energy" in (found.rows[0].reason or "")
     longest = sure(suggest_of(car, None, PLAIN).recommended)
-    assert found.windows() == ((longest.tr, longest.td),)
+    assert found.new_windows() == ((longest.tr, longest.td),)
 
 
 def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_where_that_waits(tmp_path: Path) -> None:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from d2rpick.api.asked import model_of
+from d2rpick.api.request import Request
 from d2rpick.choice.by_deck import selected
 from d2rpick.choice.settings import Settings
-from d2rpick.cli.deck_cost import model_of
 from d2rpick.histories.names import Selection
 from tests.command import answer, run
 from tests.computed import starter, stored
@@ -30,7 +31,7 @@ def car() -> str:
 def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(tmp_path: Path) -> None:
     deck = tmp_path / "CAR_0000.rad"
     deck.write_bytes(starter("CAR"))
-    model = model_of({"deck": str(deck), "weights": None})
+    model = model_of(Request(deck=str(deck)))
     silent: Any = SimpleNamespace(springs=(), parts=())
     assert model is not None
     assert selected(silent, Selection(parts=("1",)), Settings(), model).springs == ("15", "16", "17")

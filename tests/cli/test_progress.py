@@ -131,4 +131,7 @@ def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyP
     assert "\r5 of 9 runs, 0:00 left\r" in stream.getvalue()
     assert stream.getvalue().endswith(" \r")
     # two runs took 60 s, so do the next two
-    assert progress.Count(total=9, done=5, taken=3).told(60) == "5 of 9 runs, 2:00 left"
+    count = progress.Count(total=9)
+    count.tell(3)
+    count.tell(5)
+    assert count.told(60) == "5 of 9 runs, 2:00 left"

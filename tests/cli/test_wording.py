@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.cli import COMMANDS
-from d2rpick.cli.wording import OPTIONS, with_options
+from d2rpick.cli.output import ARGUMENTS, option_of, with_options
 from tests.command import ENERGY, ROLLOVER, ROOT, run
 
 if TYPE_CHECKING:
@@ -34,12 +34,12 @@ def test_messages_name_arguments_and_no_options(folder: str) -> None:
     texts = list(messages(folder))
     assert texts
     assert [text for text in texts if re.search(r"(^|\s|\()--[a-z]", text)] == []
-    assert {name for text in texts for name in re.findall(r"`(\w+)`", text)} <= set(OPTIONS)
+    assert [name for text in texts for name in re.findall(r"`(\w+)`", text) if not option_of(name)] == []
 
 
 def test_every_argument_has_an_option_that_exists() -> None:
     shown = "".join(run(command, "--help").stdout for command in COMMANDS)
-    assert {option for option in OPTIONS.values() if f"{option} " not in shown} == set()
+    assert {name for name in ARGUMENTS if f"{option_of(name)} " not in shown} == set()
 
 
 def test_the_command_line_names_the_option_that_cures() -> None:

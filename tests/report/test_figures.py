@@ -46,16 +46,16 @@ def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> N
     assert axes.get_xlim() == pytest.approx((0.0736, 0.3989), abs=1e-3)
     assert "landing, up to 1248 \u2191" in texts(axes)
     assert marks(axes) == [1]  # the recommended one alone
-    assert answer._core.windows is not None
+    assert answer.windows is not None
     bands = [one for one in axes.patches if isinstance(one, Rectangle) and one.get_height() < 0.1]
     drawn = sum(one.get_width() for one in bands)
-    assert drawn == pytest.approx(sum(one.end - one.start for one in answer._core.windows), rel=0.03)
-    assert len(bands) < len(answer._core.windows)  # gaps that nobody sees are closed
+    assert drawn == pytest.approx(sum(one.end - one.start for one in answer.windows), rel=0.03)
+    assert len(bands) < len(answer.windows)  # gaps that nobody sees are closed
 
 
 @pytest.mark.parametrize("replay", [True, False])
 def test_the_band_is_known_on_every_basis(replay: bool) -> None:
-    answer = d2.suggest(d2.read(ENERGY), td=0.0687534, replay=replay)._core
+    answer = d2.suggest(d2.read(ENERGY), td=0.0687534, replay=replay)
     assert answer.recommended is not None
     windows = answer.acceptable_windows
     assert any(start <= answer.recommended.tr <= end for start, end in windows)
@@ -71,7 +71,7 @@ def test_few_candidates_are_marks_acceptable_or_not() -> None:
 
 
 def test_the_figure_of_a_page_holds_the_better_pair_in_a_look_of_its_own() -> None:
-    answer = d2.suggest(d2.read(ENERGY), td=0.064)._core
+    answer = d2.suggest(d2.read(ENERGY), td=0.064)
     better = answer.clearly_better
     assert better is not None
     figure = draw_suggestion(answer, page=True)

@@ -1,0 +1,113 @@
+"""What is asked of a card beside its times, and the card of an answer."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.api.request import POSITIVE, TIME, UNLIMITED, dashed, option, options_of
+from d2rpick.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.api.asked import Asked
+    from d2rpick.choice.judged_card import CardRequest
+    from d2rpick.choice.verify import Verdict
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.deck.printed_card import Printing
+    from d2rpick.deck.printed_card import Solver as Module
+    from d2rpick.histories.history import History
+
+_RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
+_MOST_IDS: Final = 100_000
+_IDS: Final = range(1, UNLIMITED)
+
+
+@dataclass(frozen=True)
+class Cards:
+    """How a card is printed: the options of every command that prints one."""
+
+    solver: str | None = option(
+        "Solver whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]", "solver"
+    )
+    merge: int | None = option("LS-DYNA: lead part that all others are merged into (LRB).", _IDS, "ID")
+    swset: tuple[int, int] | None = option(
+        "LS-DYNA: switch sets of the first window; the next ids follow.  [default: 901 902]", _IDS, "ID ID", pair=True
+    )
+    step_cap: float | None = option("Largest time step while rigid (DTMAX, /DTIX).", POSITIVE, "DT")
+    node: tuple[str, ...] = option("Radioss: main nodes of the rigid bodies.", "names", "IDS", many=True)
+    end: float | None = option("Radioss: end of the run.  [default: end of the history]", TIME, "T")
+    name: str | None = option("Radioss: name of the run.  [default: Root]", metavar="NAME")
+
+    @property
+    def given(self) -> list[str]:
+        """Names of the options that were given, the solver aside."""
+        return [name for name in options_of(Cards) if name != "solver" and getattr(self, name) not in (None, ())]
+
+    def printing(self, parts: Sequence[int] = ()) -> Printing:
+        """Say what a card says besides its times and its solver."""
+        from d2rpick.deck.printed_card import Printing
+
+        given = {name: getattr(self, name) for name in self.given}
+        if self.node:
+            given["node"] = tuple(numbers("--node", self.node))
+        return Printing(part=tuple(parts), **given)
+
+    def check_solver(self, solver: str) -> None:
+        """Refuse an option that says what the input of ``solver`` has no place for."""
+        from d2rpick.deck.printing import SOLVERS
+
+        places = {name: {one.switches, *one.takes} for name, one in SOLVERS.items()}
+        for name in self.given:
+            if name not in places[solver]:
+                owner = next(one for one, takes in places.items() if name in takes)
+                hint = "" if self.solver else f"; without --solver the card is one for {SOLVERS[solver].title}"
+                raise ArgumentError(f"--{dashed(name)} is an option of --solver {owner}{hint}")
+
+    def request(self, asked: Asked) -> CardRequest:
+        """Say how the card of a run is printed."""
+        from d2rpick.choice.judged_card import CardRequest
+
+        request = CardRequest(self.solver, self.printing(numbers("--part", asked.on_card)))
+        self.check_solver(request.of(asked.reference.history)[0])
+        return request
+
+
+def need_ids(request: CardRequest, history: History) -> str:
+    """Say which option names whom the card of the history's solver switches."""
+    from d2rpick.deck.printing import SOLVERS
+
+    solver, _ = request.of(history)
+    return needed(SOLVERS[solver])
+
+
+def needed(solver: Module) -> str:
+    """Say which option names whom the card of ``solver`` switches."""
+    what = {"part": "the parts to switch", "node": "the main nodes of the rigid bodies"}
+    return f"a card for {solver.title} needs --{solver.switches}, {what[solver.switches]}"
+
+
+def numbers(name: str, texts: Sequence[str]) -> list[int]:
+    """Numbers and ranges as they are typed; without a history nobody knows which of a range exist."""
+    ids: list[int] = []
+    for piece in (piece.strip() for text in texts for piece in text.split(",")):
+        found = re.fullmatch(_RANGE, piece, re.ASCII)
+        if not found:
+            hint = "; titles need a --history that has parts" if name == "--part" else ""
+            raise ArgumentError(f"{name}: {piece!r} is not a number (7) or range (10-19){hint}")
+        low, high = int(found[1]), int(found[2] or found[1])
+        if not low <= high < low + _MOST_IDS:
+            raise ArgumentError(f"{name}: {piece!r} is not a range of 1 to {_MOST_IDS} numbers")
+        ids += range(low, high + 1)
+    return ids
+
+
+def all_cautions(verdict: Verdict) -> tuple[Caution, ...]:
+    """Cautions of a verdict, and the verdict itself where it is an objection."""
+    from d2rpick.choice.warnings import Caution
+
+    if verdict.verified:
+        return verdict.cautions
+    return (*verdict.cautions, Caution("not-verified", f"the times as printed: {'; '.join(verdict.reasons)}"))

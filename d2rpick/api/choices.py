@@ -1,0 +1,281 @@
+"""The choice of switch times, and the verdict on a pair."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Unpack
+
+from d2rpick.api import arguments
+from d2rpick.api.answer import RunAnswer, frame_of
+from d2rpick.api.asked import ask
+from d2rpick.api.request import time_or_window
+from d2rpick.choice import of_run
+from d2rpick.choice import suggest as choice
+from d2rpick.choice import verify as judgement
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.asked import Asked
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.runs import Run
+    from d2rpick.choice.cost import Weights
+    from d2rpick.choice.situation import Situation
+    from d2rpick.flight.flight import Flight
+
+
+class Judged(RunAnswer):
+    """What a choice and a verdict have in common.
+
+    ``situation`` is what the record tells about td; ``health`` how far the run can be trusted, None where its files
+    hold nothing to judge it by.
+    """
+
+    situation: Situation
+
+    @property
+    def td(self) -> float:
+        """When the parts are switched back to deformable [time]."""
+        return self.situation.td
+
+    @property
+    def flight(self) -> Flight:
+        """Window of free flight around td: ``start``, ``end``, ``source``."""
+        return self.situation.flight
+
+    @property
+    def basis(self) -> str:
+        """What the answer rests on: ``"parts"``, ``"oscillator"`` or ``"energy"``."""
+        return self.situation.basis
+
+    @property
+    def kinetic_share(self) -> float | None:
+        """K, the share of the vibration energy that no tr can save; None on basis ``"energy"`` [-]."""
+        return self.situation.kinetic_share
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Suggestion(Judged, choice.Suggestion):
+    """Answer of `suggest`; nothing of it changes.
+
+    ``candidates`` are ranked, best first; ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
+    are None, with the reason in ``warnings``; ``quality`` of the recommended pair has ``grade`` good, fair or poor and
+    ``reasons``.
+    """
+
+    kind = "suggestion"
+    name = "suggest"
+    said = ("recommended", "better_pair")
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give the candidates as a table at full precision.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per candidate, best first, a column per key of ``candidates`` in the JSON; what is not known is NaN.
+            ``attrs``: ``td``, ``basis``, ``source``.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> answer = d2.suggest(d2.read("sample_data/energy.csv"), td=0.064)
+        >>> answer.to_frame().query("recommended")["tr"].round(6).tolist()
+        [0.012885]
+        """
+        from d2rpick.report.suggestion import CANDIDATE
+
+        source, rows = list(self.situation.history.source), self.to_dict()["candidates"]
+        return frame_of(rows, CANDIDATE.keys, td=self.td, basis=self.basis, source=source)
+
+    def plot(self) -> Figure:
+        """Draw the energy with its level at td, and the choice, as a matplotlib Figure."""
+        from d2rpick.report.figures_choice import draw_suggestion
+
+        return draw_suggestion(self)
+
+    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
+        """Write the page, with the card of the recommended pair."""
+        from d2rpick.choice.explored import explored_around
+        from d2rpick.report.pages import suggestion_page
+
+        chosen = (self.situation, self.recommended.tr) if self.recommended else None
+        explored = explored_around(self.question.reference, self.situation, self.td_window)
+        return suggestion_page(self, self._context(command, judging, cards, chosen, explored))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Verdict(Judged, judgement.Verdict):
+    """Answer of `verify`; nothing of it changes.
+
+    ``verified``: the pair is good; ``reasons``: why not, or what to know; ``tr_ok`` and ``td_ok`` are None where
+    the record does not tell; ``candidate`` has the measures of the pair; ``quality`` is None where it does not verify.
+    """
+
+    compared: Run | None = None
+    kind = "verdict"
+    name = "verify"
+    said = ("verified", "reasons", "tr_ok", "td_ok")
+
+    @property
+    def tr(self) -> float:
+        """When the parts are switched to rigid [time]."""
+        return self.candidate.tr
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give the measures of the pair as a table of one row, with the columns of the csv; what is not known is NaN.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> verdict = d2.verify(d2.read("sample_data/energy.csv"), tr=0.0135867, td=0.0687534)
+        >>> verdict.to_frame()["verified"].tolist()
+        [True]
+        """
+        from d2rpick.report.verdict import measures
+
+        found = measures(self)
+        return frame_of([found], list(found), basis=self.basis, source=list(self.situation.history.source))
+
+    def plot(self) -> Figure:
+        """Draw the energy with its level at td, and the pair, as a matplotlib Figure."""
+        from d2rpick.report.figures_choice import draw_verdict
+
+        return draw_verdict(self)
+
+    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
+        """Write the page, with the card of the pair where it is good."""
+        from d2rpick.choice.explored import explored_around
+        from d2rpick.report.pages import verdict_page
+
+        chosen = (self.situation, self.tr) if self.verified else None
+        explored = explored_around(self.question.reference, self.situation)
+        context = self._context(command, judging, cards, chosen, explored)
+        return verdict_page(self, replace(context, switched=self.compared.files if self.compared else None))
+
+
+def suggest(
+    run: Run,
+    td: float | None = None,
+    *,
+    td_window: tuple[float, float] | None = None,
+    parts: Parts | None = None,
+    flying: Parts | None = None,
+    deck: arguments.Path | None = None,
+    weights: Weights | arguments.Path | None = None,
+    **choosing: Unpack[Choosing],
+) -> Suggestion:
+    """Choose tr for ``td``, or both times with td in ``td_window`` or the longest flight, as ``d2rpick suggest`` does.
+
+    Parameters
+    ----------
+    run : Run
+        As `read` gives it, without switching.
+    td : float
+        When the parts are switched back [time].
+    td_window : (float, float)
+        Instead of ``td``: where to choose it [time]; without both, in the longest flight.
+    parts : number, title or several, optional
+        The parts to be switched; ``"10-19"`` is a range, ``"flying"`` all deformable parts that fly together,
+        ``"all"`` all that have energy.
+    flying : number, title or several, optional
+        What flies together with them.
+    deck : path, optional
+        Main deck of the run: tells what the parts cost, which are springs, which rigid bodies they become, and the
+        parts of ``"recommended"``.  Without it they are taken for one body: ``position_error_assumes`` of a candidate.
+    weights : Weights or path, optional
+        Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
+    **choosing
+        How to choose: ``after``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``, ``oscillator``
+        with ``v0``, ``fit_window``, ``replay``, ``strict``, ``cost_share``, ``step_ratio``; what they mean stands in
+        ``d2rpick.api.arguments.Choosing``.
+
+    Returns
+    -------
+    Suggestion
+
+    Raises
+    ------
+    D2RPickError
+        If the run has no such parts or energy, or td lies outside the record.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> run = d2.read("sample_data/energy.csv")
+    >>> answer = d2.suggest(run, td_window=(0.06, 0.07))
+    >>> f"{answer.recommended.tr:.6f} {answer.recommended.td:.6f}"
+    '0.013587 0.068753'
+    """
+    wanted = time_or_window(arguments.optional("td", td), arguments.window("td_window", td_window))
+    return suggested(ask(run, arguments.request_of(run, parts, flying, deck, weights, choosing)), wanted)
+
+
+def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestion:
+    """Choose tr for ``td``, or both times with td in a window or, for None, in the longest flight."""
+    found = of_run.suggest_of(asked.reference, td, asked.settings)
+    times = ("--td-window", *map(repr, td)) if isinstance(td, tuple) else () if td is None else ("--td", repr(td))
+    return Suggestion.about(asked, found, *times)
+
+
+def verify(
+    run: Run,
+    tr: float,
+    td: float,
+    *,
+    switched: Run | None = None,
+    parts: Parts | None = None,
+    flying: Parts | None = None,
+    deck: arguments.Path | None = None,
+    weights: Weights | arguments.Path | None = None,
+    **choosing: Unpack[Choosing],
+) -> Verdict:
+    """Judge one pair of switch times, as ``d2rpick verify`` does.
+
+    Parameters
+    ----------
+    run : Run
+        As `read` gives it, without switching.
+    tr, td : float
+        Switch times [time].
+    switched : Run, optional
+        A finished run with these switch times, to be compared with ``run``.
+    parts, flying, deck, weights, **choosing
+        As for `suggest`.
+
+    Returns
+    -------
+    Verdict
+
+    Raises
+    ------
+    D2RPickError
+        If the run has no such parts or energy, a time lies outside the record, or tr is not before td.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> run = d2.read("sample_data/energy.csv")
+    >>> d2.verify(run, tr=0.0135867, td=0.0687534).verified
+    True
+    """
+    pair = arguments.number("tr", tr), arguments.number("td", td)
+    asked = ask(run, arguments.request_of(run, parts, flying, deck, weights, choosing))
+    return judged(asked, *pair, switched)
+
+
+def judged(asked: Asked, tr: float, td: float, switched: Run | None = None) -> Verdict:
+    """Judge a pair, also by a finished switched run."""
+    found, times = of_run.verify_of(asked.reference, tr, td, asked.settings), ["--tr", repr(tr), "--td", repr(td)]
+    if switched is not None:
+        found = of_run.compare_with(found, asked.reference, asked.reference.like(switched.files, asked.selection))
+        times += [text for name in switched.sources for text in ("--switched", name)]
+    return Verdict.about(asked, found, *times, compared=switched)

@@ -1,0 +1,213 @@
+"""What parts cost: which may be switched, what sets of them save, and the cost of elements fitted to runs of a site."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Unpack
+
+from d2rpick.api import arguments
+from d2rpick.api.answer import Answer, Paged, frame_of, written
+from d2rpick.api.asked import model_of
+from d2rpick.choice import calibration, sets_of_parts
+from d2rpick.errors import ArgumentError
+from d2rpick.report.shell import positional
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    import pandas as pd
+
+    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.request import Request
+    from d2rpick.api.runs import Run
+    from d2rpick.choice.calibration import Observation
+    from d2rpick.choice.cost import Weights
+    from d2rpick.choice.switched_run import Times
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class PartTable(Paged, sets_of_parts.Parts):
+    """Answer of `parts`; nothing of it changes.
+
+    ``rows`` has every part with its ``verdict`` and ``reasons``, ``sets`` what is worth comparing, ``recommended`` the
+    set to take, None where there is none; its ``parts`` and ``cost_share`` are what `suggest` and `plan` take.
+    """
+
+    run: Run
+    command: tuple[str, ...]
+    kind = "parts"
+    said = ("sets", "recommended")
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give a row per part.
+
+        The columns are the keys of ``parts`` in the JSON; what is not known is NaN.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> d2.parts(d2.read("sample_data/rollover_box.matsum")).to_frame()["verdict"].tolist()
+        ['unknown', 'unknown']
+        """
+        from d2rpick.report.parts import PART
+
+        return frame_of(list(map(PART.plain, self.rows)), PART.keys, source=list(self.run.sources))
+
+    def sets_frame(self) -> pd.DataFrame:
+        """Give a row per set; the columns are the keys of ``sets`` in the JSON."""
+        from d2rpick.report.parts import SET
+
+        return frame_of(list(map(SET.plain, self.sets)), SET.keys, source=list(self.run.sources))
+
+    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
+        """Write the page."""
+        from d2rpick.report.pages import parts_page
+
+        return parts_page(self, command)
+
+
+def parts(
+    run: Run,
+    *,
+    deck: arguments.Path | None = None,
+    weights: Weights | arguments.Path | None = None,
+    given: Parts | None = None,
+    tr: float | None = None,
+    td: float | None = None,
+    **choosing: Unpack[Choosing],
+) -> PartTable:
+    """Say which parts of a run may be switched and what sets of them save, as ``d2rpick parts`` does.
+
+    Parameters
+    ----------
+    run : Run
+        As `read` gives it, without switching.
+    deck : path, optional
+        Main deck of the run: of LS-DYNA, or a starter or engine file of Radioss.
+    weights : Weights or path, optional
+        Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
+    given : number, title or several, optional
+        A set to be compared too.
+    tr, td : float, optional
+        The window to compare in, or its end alone [time].  Default: at the end of the longest flight.
+    **choosing
+        As for `suggest`.
+
+    Returns
+    -------
+    PartTable
+
+    Raises
+    ------
+    D2RPickError
+        If the deck or the weights cannot be read, or the run has no such parts.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> [row.title for row in d2.parts(d2.read("sample_data/rollover_box.matsum")).rows]
+    ['box', 'step']
+    """
+    request = arguments.request_of(run, given, None, deck, weights, choosing)
+    return tabled(run, request, arguments.optional("tr", tr), arguments.optional("td", td))
+
+
+def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> PartTable:
+    """Say which parts may be switched, by sets that are compared from tr to td, or up to td."""
+    times = check_times(tr, td)
+    model, beside = model_of(request), [request.deck] if request.deck else []
+    ids = sets_of_parts.given_parts(run.files, request.part)
+    found = sets_of_parts.parts_of(run.files, request.settings, model, given=ids, times=times, beside=beside)
+    window = [text for name, time in (("tr", tr), ("td", td)) if time is not None for text in (f"--{name}", repr(time))]
+    command = ("parts", *window, *request.asking(), *positional(request.history))
+    return PartTable.of(found, run=run, command=command)
+
+
+def check_times(tr: float | None, td: float | None) -> Times | float | None:
+    """Give the window to compare sets in, or its end; ArgumentError where there is none."""
+    if tr is not None and td is None:
+        raise ArgumentError("`tr` needs `td`, the end of the window")
+    if tr is not None and td is not None and not tr < td:
+        raise ArgumentError(f"`tr` {tr:g} `td` {td:g}: tr must lie before td")
+    return td if tr is None or td is None else (tr, td)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Calibration(Answer, calibration.Calibration):
+    """Answer of `calibrate`; nothing of it changes.
+
+    ``weights`` are what `parts`, `suggest`, `plan`, `explore` and `verify` take; ``told`` names what the runs decide,
+    the others keep the measured ratio.  ``misfit`` is relative to the time of a leg [-]; ``legs`` have what each took
+    per cycle [us], and what it computed.
+    """
+
+    command: tuple[str, ...]
+    kind = "calibration"
+    said = ("weights", "told", "misfit")
+
+    @property
+    def legs(self) -> tuple[Observation, ...]:
+        """What each leg took per cycle [us], and what it computed."""
+        return self.observations
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give a row per formulation: its weight, what was measured with OpenRadioss, whether the runs tell it.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> d2.calibrate("sample_data/flying_box").to_frame()["formulation"].tolist()
+        ['QBAT', 'QEPH', 'point']
+        """
+        from d2rpick.report.calibration import COLUMNS, plain_rows
+
+        rows = [dict(zip(COLUMNS, row, strict=True)) for row in plain_rows(self)]
+        return frame_of(rows, COLUMNS, source=[one.name for one in self.legs])
+
+    def save(self, path: arguments.Path) -> Path:
+        """Write the TOML file that ``--weights`` reads; an existing file is replaced."""
+        from d2rpick.report.calibration import as_toml
+
+        return written(path, f"{as_toml(self)}\n")
+
+
+def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
+    """Fit the cost of elements to what runs of a site took, as ``d2rpick calibrate`` does.
+
+    Parameters
+    ----------
+    runs : path or several
+        Folders, each with the deck of one run and what its solver printed; with and without switching of one model.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    D2RPickError
+        If a folder is not that of one run, nothing says what a run took, or none is without rigid parts.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> found = d2.calibrate("sample_data/flying_box")
+    >>> round(found.weights.element_share, 2)
+    0.65
+    """
+    return fitted(arguments.paths("runs", runs))
+
+
+def fitted(runs: Sequence[str]) -> Calibration:
+    """Fit the cost of elements to what the runs in folders took."""
+    from d2rpick.choice.calibration import observations_of_runs
+
+    observations, cautions = observations_of_runs(runs)
+    command = ("calibrate", *positional(runs))
+    return Calibration.of(calibration.calibrate(observations), cautions=cautions, command=command)

@@ -1,0 +1,274 @@
+"""What each td of a flight costs, and the plan of the rigid windows of all flights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Unpack
+
+from d2rpick.api import arguments
+from d2rpick.api.answer import RunAnswer, frame_of
+from d2rpick.api.asked import ask
+from d2rpick.api.cards import Cards
+from d2rpick.api.request import check_window
+from d2rpick.choice import plan as planning
+from d2rpick.choice import trade_off
+from d2rpick.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.asked import Asked
+    from d2rpick.api.runs import Run
+    from d2rpick.choice.cost import Weights
+    from d2rpick.choice.switched_run import Times
+    from d2rpick.choice.verify import Verdict
+    from d2rpick.deck.printed_card import PrintedCard
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Exploration(RunAnswer, trade_off.TradeOff):
+    """Answer of `explore`; nothing of it changes.
+
+    ``offers`` are by ascending td, each with ``tr``, ``error``, ``rigid_time``, ``unbeaten``, ``quality`` and its
+    measures in ``best``; ``recommended`` is the one that `suggest` chooses, ``step`` the nearest unbeaten td with
+    half the error of ``start``, the td asked for or else the one that saves most.  ``answer`` says it in a sentence.
+    """
+
+    kind = "trade_off"
+    name = "explore"
+    said = ("recommended", "step")
+
+    @property
+    def answer(self) -> str:
+        """The shortest sensible answer."""
+        from d2rpick.report.trade_off import answer
+
+        return answer(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give a row per td, a column per single value of ``offers`` in the JSON; what is not known is NaN.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> table = d2.explore(d2.read("sample_data/energy.csv"), td_window=(0.06, 0.07), steps=10).to_frame()
+        >>> table.query("recommended")[["tr", "td"]].round(6).values.tolist()
+        [[0.013587, 0.068753]]
+        """
+        from d2rpick.report.trade_off import COLUMNS
+
+        return frame_of(self.to_dict()["offers"], COLUMNS, source=list(self.situation.history.source))
+
+    def plot(self) -> Figure:
+        """Draw energy, error and rigid time over td, as a matplotlib Figure."""
+        from d2rpick.report.figures_choice import draw_trade_off
+
+        return draw_trade_off(self)
+
+    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
+        """Write the page, with the card of the recommended pair."""
+        from d2rpick.report.pages import trade_off_page
+
+        found = self.suggestion
+        chosen = (found.situation, found.recommended.tr) if found.recommended else None
+        return trade_off_page(self, self._context(command, judging, cards, chosen, self))
+
+
+def explore(
+    run: Run,
+    td: float | None = None,
+    *,
+    td_window: tuple[float, float] | None = None,
+    steps: int = 200,
+    parts: Parts | None = None,
+    flying: Parts | None = None,
+    deck: arguments.Path | None = None,
+    weights: Weights | arguments.Path | None = None,
+    **choosing: Unpack[Choosing],
+) -> Exploration:
+    """Find what each td costs, as ``d2rpick explore`` does.
+
+    Parameters
+    ----------
+    run : Run
+        As `read` gives it, without switching.
+    td : float, optional
+        Explored too, and what others are compared with [time].
+    td_window : (float, float), optional
+        Where td is looked for [time].  Default: the longest flight; where none is seen but td is named, the record.
+    steps : int
+        Number of evenly spaced td; peaks of the energy come on top.
+    parts, flying, deck, weights, **choosing
+        As for `suggest`.
+
+    Returns
+    -------
+    Exploration
+
+    Raises
+    ------
+    D2RPickError
+        If the run has no such parts or energy, a time lies outside the record, or no flight is seen and no td
+        is named.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> found = d2.explore(d2.read("sample_data/energy.csv"), td=0.064, td_window=(0.06, 0.07), steps=100)
+    >>> round(found.step.td - found.start.td, 4)
+    0.0048
+    """
+    wanted, window = arguments.optional("td", td), arguments.window("td_window", td_window)
+    count = arguments.whole("steps", steps, 1)
+    asked = ask(run, arguments.request_of(run, parts, flying, deck, weights, choosing))
+    return explored(asked, wanted, window, count)
+
+
+def explored(asked: Asked, td: float | None, td_window: tuple[float, float] | None, steps: int) -> Exploration:
+    """Find what each td in a window costs, or in the longest flight."""
+    check_window("td_window", td_window)
+    found = trade_off.explore_of(asked.reference, asked.settings, td_window, td=td, steps=steps)
+    times = [] if td is None else ["--td", repr(td)]
+    times += ["--td-window", *map(repr, td_window)] if td_window else []
+    return Exploration.about(asked, found, *times, "--steps", str(steps))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Plan(RunAnswer, planning.Plan):
+    """Answer of `plan`; nothing of it changes.
+
+    ``flights`` has a row per flight with ``window``, ``status`` and ``reason``; ``windows`` are the (tr, td) that this
+    run supports, ``all_windows`` also those that wait for a switched run, ``next_run`` those that are done and
+    ``windows``: what the next run is switched in, none where no window is new; ``rigid_fraction`` is the share of the
+    record in which the parts are rigid by ``windows``.  Times in the unit of the run.
+    """
+
+    kind = name = "plan"
+    said = ("windows", "all_windows", "next_run")
+
+    @property
+    def flights(self) -> tuple[planning.Planned, ...]:
+        """What is planned for each flight."""
+        return self.rows
+
+    @property
+    def windows(self) -> tuple[Times, ...]:
+        """Windows that this run supports [time]."""
+        return self.new_windows()
+
+    @property
+    def all_windows(self) -> tuple[Times, ...]:
+        """The same with those that wait for a switched run [time]."""
+        return self.new_windows(every=True)
+
+    @property
+    def next_run(self) -> tuple[Times, ...]:
+        """What the next run is switched in [time]."""
+        return self.run_windows()
+
+    def to_frame(self) -> pd.DataFrame:
+        """Give a row per flight, a column per key of ``windows`` in the JSON; what is not known is NaN.
+
+        Examples
+        --------
+        >>> import d2rpick as d2
+        >>> d2.plan(d2.read("sample_data/energy.csv")).to_frame()["status"].tolist()
+        ['supported']
+        """
+        from d2rpick.report.plan import WINDOW
+
+        return frame_of(self.to_dict()["windows"], WINDOW.keys, source=list(self.history.source))
+
+    def plot(self) -> Figure:
+        """Draw the energy with the flights and the rigid windows, as a matplotlib Figure."""
+        from d2rpick.report.figures_choice import draw_plan
+
+        return draw_plan(self)
+
+    def card(self, cards: Cards, *, every: bool = False) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
+        """Print the card of the next run, its new windows judged; None without one, or nobody to switch."""
+        from d2rpick.choice.judged_card import card_of_plan
+
+        return card_of_plan(self, self.question.reference.run, cards.request(self.question), every=every)
+
+    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
+        """Write the page, with the cards of the next run."""
+        from d2rpick.choice.explored import explored_flights
+        from d2rpick.report.pages import plan_page
+
+        card = self.card(cards or Cards())
+        explorer = self._explorer(explored_flights(self.question.reference, self))
+        return plan_page(self, self.question.reference.run, command, card[0].text if card else None, explorer)
+
+
+def plan(
+    run: Run,
+    *,
+    parts: Parts | None = None,
+    flying: Parts | None = None,
+    deck: arguments.Path | None = None,
+    weights: Weights | arguments.Path | None = None,
+    min_rigid: float | None = None,
+    done: Iterable[tuple[float, float]] = (),
+    before: Run | None = None,
+    **choosing: Unpack[Choosing],
+) -> Plan:
+    """Plan the rigid windows of a run, as ``d2rpick plan`` does.
+
+    Parameters
+    ----------
+    run : Run
+        As `read` gives it: without switching, or switched in the windows that are ``done``.
+    parts, flying, deck, weights, **choosing
+        As for `suggest`.
+    min_rigid : float, optional
+        Leave shorter windows out [time].  Default: 5 % of the record, and a window that locks in energy before one more
+        than twice as long.
+    done : pairs of float
+        Windows (tr, td) in which the run was switched [time].
+    before : Run, optional
+        The run that these were planned from; its landings are compared.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    D2RPickError
+        If the run has no such parts or energy, or its parts were deformable in a window that is done.
+    TypeError, ValueError
+        If an argument is not of its kind.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> found = d2.plan(d2.read("sample_data/rollover_box.matsum"), parts="box")
+    >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
+    [(0.097, 0.37)]
+    """
+    shortest = None if min_rigid is None else arguments.number("min_rigid", min_rigid, 0.0)
+    windows = [arguments.window(f"done[{number}]", list(pair)) or (0.0, 0.0) for number, pair in enumerate(done)]
+    asked = ask(run, arguments.request_of(run, parts, flying, deck, weights, choosing))
+    return planned(asked, shortest, windows, before)
+
+
+def planned(asked: Asked, min_rigid: float | None, done: Sequence[Times], before: Run | None) -> Plan:
+    """Plan the rigid windows of a run, or those after the windows that are ``done``."""
+    if before is not None and not done:
+        raise ArgumentError("`before` compares the landings of a switched run; name its windows with `done`")
+    from d2rpick.deck.printed_card import check_windows
+
+    earlier = asked.reference.like(before.files, asked.selection) if before else None
+    windows = check_windows(done) if done else ()
+    found = planning.plan_of(asked.reference, asked.settings, min_rigid=min_rigid, done=windows, before=earlier)
+    times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
+    times += ["--done", "-"] if windows else []  # on its standard input, a line for each
+    times += [text for name in (before.sources if before else ()) for text in ("--before", name)]
+    return Plan.about(asked, found, *times)

@@ -1,0 +1,297 @@
+"""What can be asked about a run: one table.
+
+From the fields of `Request` follow the options of the command line with their environment variables, the keywords of
+Python, and the command line that asks the same again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from math import inf
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from d2rpick.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping
+
+    from d2rpick.choice.cost import Weights
+    from d2rpick.choice.settings import Settings
+    from d2rpick.histories.names import Selection
+    from d2rpick.vibration.oscillator import Oscillator
+
+
+class Number(NamedTuple):
+    """A finite number from ``low`` (or above it, when ``above``) to ``high``."""
+
+    low: float = -inf
+    high: float = inf
+    above: bool = False
+
+
+TIME, POSITIVE, NOT_NEGATIVE, FRACTION = Number(), Number(0.0, above=True), Number(0.0), Number(0.0, 1.0)
+AT_LEAST_ONE: Final = Number(1.0)  # elements that are rigid no longer limit the step: it cannot become smaller
+UNLIMITED: Final = 2**63  # the end of a range of whole numbers that has none
+# of d2rpick.histories.opening, which is too heavy to be imported for --help; a test holds them together
+FORMATS: Final = ("binout", "radioss-th", "glstat", "matsum", "hdf5", "csv")
+
+
+class Option(NamedTuple):
+    """What an option is: its ``kind`` of value, what the help says, and which others it takes the place of.
+
+    ``kind`` is a `Number`, a range of whole numbers, names to choose from, or what the command line calls it: "flag",
+    "file", "names", ...  ``many``: it can be repeated; ``pair``: two values.
+    """
+
+    help: str
+    kind: Number | range | tuple[str, ...] | str = "text"
+    metavar: str | None = None
+    many: bool = False
+    pair: bool = False
+    instead_of: tuple[str, ...] = ()
+    short: tuple[str, ...] = ()
+
+
+def option(text: str, kind: Any = "text", metavar: str | None = None, *, default: Any = None, **more: Any) -> Any:
+    """Describe the field of a table of options; what can be repeated is an empty tuple where it is not given."""
+    default = () if more.get("many") else default
+    return field(default=default, metadata={"option": Option(text, kind, metavar, **more)})
+
+
+def options_of(table: Any) -> dict[str, Option]:
+    """Give the options of a table by the names of their fields."""
+    return {one.name: one.metadata["option"] for one in fields(table) if "option" in one.metadata}
+
+
+# Groups of options: how to read a history, how to judge by it, and how to judge a tr.
+READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
+JUDGING: Final = ("input_format", "time", "energy", "flying", "channel", "after", "margin", "tolerance")
+OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
+LIMITS: Final = (
+    *("after", "margin", "tolerance", "max_kinetic_share", "max_residual", *OSCILLATOR),
+    *("fit_window", "no_verify", "strict"),
+)
+CHOOSING: Final = (*LIMITS, "cost_share", "step_ratio")
+# Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
+_IN_MEMORY: Final = "<weights in memory>"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What is asked about a run, times in the unit of the history; ArgumentError where it contradicts itself.
+
+    ``given`` names the options that were given, where values that are the default count as well.
+    """
+
+    deck: str | None = option("Main deck of the run.", "file", "DECK")
+    weights: str | Weights | None = option(  # noqa: RUF009
+        "Cost of an element by formulation, as d2rpick calibrate writes it.  [default: measured with OpenRadioss]",
+        *("file", "FILE"),
+    )
+    history: tuple[str, ...] = option(
+        "Energy history of the run without switching to judge by: file, folder or glob; repeatable.",
+        *("file", "HISTORY"), many=True,
+    )  # fmt: skip
+    input_format: str = option(
+        "Format of the history; auto recognises it by content.", ("auto", *FORMATS), default="auto", short=("-F",)
+    )
+    time: str | None = option("Time column, by name, number or HDF5 path.", metavar="NAME|NUMBER")
+    energy: tuple[str, ...] = option(
+        "Energy column, label or HDF5 path; repeat it to add several.",
+        *("channels", "NAME|NUMBER"), many=True, instead_of=("part",),
+    )  # fmt: skip
+    part: tuple[str, ...] = option(
+        "Parts to switch: number (3,7), range (10-19), title, `flying` or `all`; energies are added.",
+        *("parts", "IDS"), many=True, instead_of=("energy",),
+    )  # fmt: skip
+    flying: tuple[str, ...] = option("Parts that fly together with the switched parts.", "parts", "IDS", many=True)
+    channel: tuple[str, ...] = option(
+        "Channel of another quantity, where its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
+        *("names", "QUANTITY=NAME"), many=True,
+    )  # fmt: skip
+    after: float | None = option("End of the load.  [default: found from the record]", TIME, "T")
+    margin: float | None = option(
+        "Time to keep clear after the load and before the next contact.  [default: 0; where td is chosen, derived]",
+        *(NOT_NEGATIVE, "T"),
+    )
+    tolerance: float = option(
+        "Limit on the lock-in error, or on the level error where no oscillator is known.", FRACTION, "L", default=0.2
+    )
+    max_kinetic_share: float | None = option("Reject a td with a larger kinetic share.", NOT_NEGATIVE, "K")
+    max_residual: float | None = option("Reject a pair with a larger residual.", NOT_NEGATIVE, "R")
+    stiffness: float | None = option("Spring k.", POSITIVE, instead_of=("fit_window", "no_verify"))
+    mass: float | None = option("Suspended mass M.", POSITIVE, instead_of=("fit_window", "no_verify"))
+    frame_mass: float | None = option(
+        "Frame mass m (or give --beta).", POSITIVE, instead_of=("beta", "fit_window", "no_verify")
+    )
+    beta: float | None = option(
+        "Mass ratio M/m (instead of --frame-mass).", POSITIVE, instead_of=("frame_mass", "fit_window", "no_verify")
+    )
+    alpha: float | None = option(
+        "Rate of damping proportional to mass.", NOT_NEGATIVE, instead_of=("fit_window", "no_verify")
+    )
+    v0: float | None = option(
+        "Velocity of the frame at time 0; all else at rest.", TIME, instead_of=("vz0", "fit_window", "no_verify")
+    )
+    fit_window: tuple[float, float] | None = option(
+        "Identify the oscillator only here.", TIME, "LO HI", pair=True, instead_of=("stiffness", "no_verify")
+    )
+    no_verify: bool = option(
+        "Judge by the energy level alone, without an oscillator.",
+        *("flag",), default=False, instead_of=("stiffness", "fit_window"),
+    )  # fmt: skip
+    strict: bool = option(
+        "Recommend nothing where the energy alone shows when the load is over.", "flag", default=False
+    )
+    cost_share: float | None = option(
+        "Share of the cost of a time step spent on the elements of the switched parts; gives the run time.",
+        *(FRACTION, "C"),
+    )
+    step_ratio: float | None = option(
+        "Time step while rigid over that before, 1 or more.  [default: 1]", AT_LEAST_ONE, "N"
+    )
+    given: Collection[str] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense together."""
+        ways = {"an oscillator": self._oscillator_given, "`fit_window`": self.fit_window, "`replay`": self.no_verify}
+        chosen = [name for name, value in ways.items() if value]
+        if len(chosen) > 1:
+            raise ArgumentError(f"{chosen[0]} and {chosen[1]} exclude each other")
+        if self.step_ratio is not None and self.cost_share is None and not self.deck:
+            raise ArgumentError("`step_ratio` needs `cost_share` or `deck` too: the run time needs both")
+        if self.weights is not None and self.deck is None:
+            raise ArgumentError("`weights` needs `deck`, the deck whose elements are weighted")
+        check_window("fit_window", self.fit_window)
+
+    @property
+    def _oscillator_given(self) -> bool:
+        """Whether an oscillator is given; ArgumentError for half of one."""
+        names = ("stiffness", "mass", "alpha", "v0")
+        given = [name for name in (*names, "frame_mass", "beta") if getattr(self, name) is not None]
+        if given and (missing := [name for name in names if getattr(self, name) is None]):
+            raise ArgumentError(f"`{given[0]}` needs `{missing[0]}` too: give all parameters of the oscillator")
+        if given and (self.frame_mass is None) == (self.beta is None):
+            raise ArgumentError("the oscillator needs either `frame_mass` or `beta`")
+        return bool(given)
+
+    @property
+    def oscillator(self) -> Oscillator | None:
+        """The oscillator that is given."""
+        if self.stiffness is None or self.mass is None or self.alpha is None:
+            return None
+        from d2rpick.vibration.oscillator import Oscillator
+
+        return Oscillator(self.stiffness, self.mass, self.frame_mass or self.mass / (self.beta or 1.0), self.alpha)
+
+    @property
+    def settings(self) -> Settings:
+        """How to choose and judge."""
+        from d2rpick.choice.settings import Settings
+
+        mode, oscillator = None, self.oscillator
+        if oscillator is not None and self.v0 is not None:
+            from d2rpick.vibration.oscillator import to_mode  # not above: mostly none is given
+
+            mode = to_mode(oscillator, self.v0)
+        return Settings(
+            after=self.after,
+            margin=self.margin,
+            tolerance=self.tolerance,
+            max_kinetic_share=self.max_kinetic_share,
+            max_residual=self.max_residual,
+            oscillator=mode,
+            fit_window=self.fit_window,
+            replay=not self.no_verify,
+            strict=self.strict,
+            cost_share=self.cost_share,
+            step_ratio=self.step_ratio or 1.0,
+        )
+
+    def selection(self, *, parts: bool = True) -> Selection:
+        """What of a run is meant, without ``parts`` the columns alone; ArgumentError for energies in two ways."""
+        from d2rpick.histories.names import Selection
+
+        if parts and self.energy and self.part:
+            raise ArgumentError("`energy` and `parts` exclude each other: give columns or parts")
+        part = self.part if parts else ()
+        return Selection(self.time, self.energy, part, self.flying, channels_of(self.channel))
+
+    def asking(self, names: Collection[str] | None = None) -> tuple[str, ...]:
+        """Give the options that were given, or those of ``names``, as they are typed behind a td."""
+        chosen = self._given() if names is None else [name for name in self._given() if name in names]
+        return tuple(text for name in chosen for text in _typed(name, getattr(self, name)))
+
+    def judging(self) -> tuple[str, ...]:
+        """Give the options of ``card`` and ``check`` that judge by the same history."""
+        named = [text for name in self.history for text in ("--history", name)]
+        return (*named, *self.asking(JUDGING), *self.asking(("part",)))
+
+    def without_history(self) -> None:
+        """Refuse to be told how to judge, but not by what."""
+        if lost := [name for name in JUDGING if name in (self.given or ())]:
+            raise ArgumentError(f"`{lost[0]}` needs an energy history; give one with `history`")
+
+    def _given(self) -> Iterator[str]:
+        for one in fields(self):
+            given = getattr(self, one.name) != one.default if self.given is None else one.name in self.given
+            if given and one.name not in ("history", "given"):
+                yield one.name
+
+
+def _typed(name: str, value: Any) -> Iterator[str]:
+    """Write an option with its value as it is typed."""
+    if isinstance(value, bool):
+        yield from (f"--{dashed(name)}",) * value
+        return
+    for one in value if OPTIONS[name].many else [value]:
+        words = one if isinstance(one, tuple) else (one,)
+        yield from (f"--{dashed(name)}", *(word if isinstance(word, str) else _word(word) for word in words))
+
+
+def _word(value: Any) -> str:
+    return repr(value) if isinstance(value, float) else _IN_MEMORY
+
+
+def channels_of(given: Collection[str]) -> tuple[tuple[str, str], ...]:
+    """Read ``QUANTITY=NAME``; ArgumentError for a quantity that is none, or one that is given twice."""
+    from d2rpick.histories.names import QUANTITIES
+
+    split = (text.partition("=") for text in given)
+    pairs = [(quantity.strip().replace("-", "_"), name) for quantity, _, name in split]
+    for quantity, name in pairs:
+        if quantity not in QUANTITIES or not name:
+            known = ", ".join(QUANTITIES)
+            raise ArgumentError(f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {known}")
+    if len({quantity for quantity, _ in pairs}) < len(pairs):
+        raise ArgumentError("`channels` names a quantity twice; name each once")
+    return tuple(pairs)
+
+
+def check_window(name: str, window: tuple[float, float] | None) -> None:
+    """Refuse a window of time that is empty."""
+    if window and not window[0] < window[1]:
+        raise ArgumentError(f"`{name}` {window[0]:g} {window[1]:g} is empty; give the lower time first")
+
+
+def time_or_window(td: float | None, window: tuple[float, float] | None) -> float | tuple[float, float] | None:
+    """Give what is asked for, a td or a window for it; ArgumentError for both."""
+    if td is not None and window is not None:
+        raise ArgumentError("`td` and `td_window` exclude each other")
+    check_window("td_window", window)
+    return window if td is None else td
+
+
+def needed_time(asked: float | tuple[float, float] | None) -> float | tuple[float, float]:
+    """Give a td or a window for it; ArgumentError for none."""
+    if asked is None:
+        raise ArgumentError("name the time to switch back with `td`, or a window for it with `td_window`")
+    return asked
+
+
+def dashed(name: str) -> str:
+    """Give the name of an option as it is typed."""
+    return name.replace("_", "-")
+
+
+OPTIONS: Final[Mapping[str, Option]] = options_of(Request)
