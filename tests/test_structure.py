@@ -200,8 +200,8 @@ CARD = ("card", "--tr", "0.02", "--td", "0.09")
         (("rule", "D2R201"), "click", 0.2),
         ((*CARD, "--part", "1"), "click", 0.12),
         ((*CARD, "--solver", "radioss", "--node", "1", "--end", "1"), "click", 0.12),
-        (("suggest", "-q", "--td", "0.064", ENERGY), "click, numpy", 0.32),
-        (("suggest", "-q", "--td", "0.064", GLSTAT), "click, numpy", 0.32),
+        (("suggest", "-q", "--td", "0.064", ENERGY), "click, numpy", 0.36),
+        (("suggest", "-q", "--td", "0.064", GLSTAT), "click, numpy", 0.36),
     ],
 )
 def test_a_command_loads_only_what_its_answer_needs(args: tuple[str, ...], libraries: str, most: float) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from d2rpick.api.cards import Cards
@@ -11,6 +10,7 @@ from d2rpick.files import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
+    from pathlib import Path
 
     import pandas as pd
     from matplotlib.figure import Figure
@@ -147,6 +147,8 @@ class RunAnswer(Paged):
 
 def written(path: arguments.Path, page: str) -> Path:
     """Write a page and give its path."""
+    from pathlib import Path  # not above: a table does without it
+
     from d2rpick.api import arguments
 
     place = Path(*arguments.paths("path", path))

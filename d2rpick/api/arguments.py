@@ -7,14 +7,11 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypedDict
 
-from d2rpick.api.request import OPTIONS, Number, Request
-from d2rpick.histories.names import Selection
+from d2rpick.api.request import OPTIONS, Number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from d2rpick.api.runs import Run
-    from d2rpick.choice.cost import Weights
     from d2rpick.vibration.oscillator import Oscillator
 
     Path = str | os.PathLike[str]
@@ -172,33 +169,7 @@ def check_run(name: str, run: object) -> None:
         raise TypeError(f"{name} is {run!r}, what read() or from_frame() gives was expected")
 
 
-def request_of(
-    run: Run | None,
-    parts: Parts | None,
-    flying: Parts | None,
-    deck: Path | None,
-    weights: Weights | Path | None,
-    choosing: Choosing,
-) -> Request:
-    """Ask as the arguments say; TypeError for one that is not of its kind or does not exist."""
-    if run is not None:
-        check_run("run", run)
-    chosen = run.chosen if run else Selection()
-    return Request(
-        deck=None if deck is None else one_path("deck", deck),
-        weights=one_path("weights", weights) if isinstance(weights, str | os.PathLike) else weights,
-        history=run.sources if run else (),
-        input_format=run.input_format if run else "auto",
-        time=chosen.time,
-        energy=chosen.energy,
-        part=part_names("parts", parts),
-        flying=part_names("flying", flying),
-        channel=tuple(f"{quantity}={name}" for quantity, name in chosen.channels),
-        **_chosen(choosing),
-    )
-
-
-def _chosen(choosing: Choosing) -> dict[str, Any]:
+def chosen(choosing: Choosing) -> dict[str, Any]:
     """Give the fields of a request that say how to choose."""
     known = Choosing.__annotations__
     if unknown := [name for name in choosing if name not in known]:

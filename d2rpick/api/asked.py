@@ -5,22 +5,25 @@ The commands of one run and Python go this one way, and get the same numbers.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from d2rpick.api import arguments
+from d2rpick.api.request import Request
 from d2rpick.choice.of_run import Reference
 from d2rpick.errors import ArgumentError, listing, name_units
+from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.api.request import Request
+    from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.runs import Run
-    from d2rpick.choice.cost import CostModel
+    from d2rpick.choice.cost import CostModel, Weights
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.warnings import Caution
     from d2rpick.histories import run as histories
-    from d2rpick.histories.names import Selection
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +51,32 @@ class Asked:
         return (*self.request.asking(), *positional(self.request.history))
 
 
+def request_of(
+    run: Run | None,
+    parts: Parts | None,
+    flying: Parts | None,
+    deck: arguments.Path | None,
+    weights: Weights | arguments.Path | None,
+    choosing: Choosing,
+) -> Request:
+    """Ask as the arguments say; TypeError for one that is not of its kind or does not exist."""
+    if run is not None:
+        arguments.check_run("run", run)
+    chosen = run.chosen if run else Selection()
+    return Request(
+        deck=None if deck is None else arguments.one_path("deck", deck),
+        weights=arguments.one_path("weights", weights) if isinstance(weights, str | os.PathLike) else weights,
+        history=run.sources if run else (),
+        input_format=run.input_format if run else "auto",
+        time=chosen.time,
+        energy=chosen.energy,
+        part=arguments.part_names("parts", parts),
+        flying=arguments.part_names("flying", flying),
+        channel=tuple(f"{quantity}={name}" for quantity, name in chosen.channels),
+        **arguments.chosen(choosing),
+    )
+
+
 def open_run(request: Request, names: Sequence[str] = ()) -> Run:
     """Open the run that is asked about, or other files as its files are opened."""
     from d2rpick.api.runs import Run
@@ -56,14 +85,6 @@ def open_run(request: Request, names: Sequence[str] = ()) -> Run:
     selection = request.selection(parts=False)
     files = opening.open_run(names or request.history, selection, request.input_format)
     return Run(files, selection, request.input_format)
-
-
-def judging_run(request: Request) -> Run | None:
-    """Open the history by which cards are judged; None without one, ArgumentError where options need it."""
-    if request.history:
-        return open_run(request)
-    request.without_history()
-    return None
 
 
 def on_card_only(request: Request, run: histories.Run) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, frame_of
+from d2rpick.api.asked import request_of
 from d2rpick.report.shell import positional
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def check(
     names = arguments.paths("decks", decks)
     if history is not None:
         arguments.check_run("history", history)
-    request = arguments.request_of(history, None, None, None, None, choosing)
+    request = request_of(history, None, None, None, None, choosing)
     judge = None
     if history is not None:
         from d2rpick.rules.judgement import HistoryJudge

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
-from d2rpick.api.asked import ask
+from d2rpick.api.asked import ask, request_of
 from d2rpick.api.request import time_or_window
 from d2rpick.choice import of_run
 from d2rpick.choice import suggest as choice
@@ -214,7 +214,7 @@ def suggest(
     '0.013587 0.068753'
     """
     wanted = time_or_window(arguments.optional("td", td), arguments.window("td_window", td_window))
-    return suggested(ask(run, arguments.request_of(run, parts, flying, deck, weights, choosing)), wanted)
+    return suggested(ask(run, request_of(run, parts, flying, deck, weights, choosing)), wanted)
 
 
 def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestion:
@@ -268,7 +268,7 @@ def verify(
     True
     """
     pair = arguments.number("tr", tr), arguments.number("td", td)
-    asked = ask(run, arguments.request_of(run, parts, flying, deck, weights, choosing))
+    asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
     return judged(asked, *pair, switched)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, Paged, frame_of, written
-from d2rpick.api.asked import model_of
+from d2rpick.api.asked import model_of, request_of
 from d2rpick.choice import calibration, sets_of_parts
 from d2rpick.errors import ArgumentError
 from d2rpick.report.shell import positional
@@ -112,7 +112,7 @@ def parts(
     >>> [row.title for row in d2.parts(d2.read("sample_data/rollover_box.matsum")).rows]
     ['box', 'step']
     """
-    request = arguments.request_of(run, given, None, deck, weights, choosing)
+    request = request_of(run, given, None, deck, weights, choosing)
     return tabled(run, request, arguments.optional("tr", tr), arguments.optional("td", td))
 
 

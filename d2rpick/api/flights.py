@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
-from d2rpick.api.asked import ask
+from d2rpick.api.asked import ask, request_of
 from d2rpick.api.cards import Cards
 from d2rpick.api.request import check_window
 from d2rpick.choice import plan as planning
@@ -126,7 +126,7 @@ def explore(
     """
     wanted, window = arguments.optional("td", td), arguments.window("td_window", td_window)
     count = arguments.whole("steps", steps, 1)
-    asked = ask(run, arguments.request_of(run, parts, flying, deck, weights, choosing))
+    asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
     return explored(asked, wanted, window, count)
 
 
@@ -255,7 +255,7 @@ def plan(
     """
     shortest = None if min_rigid is None else arguments.number("min_rigid", min_rigid, 0.0)
     windows = [arguments.window(f"done[{number}]", list(pair)) or (0.0, 0.0) for number, pair in enumerate(done)]
-    asked = ask(run, arguments.request_of(run, parts, flying, deck, weights, choosing))
+    asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
     return planned(asked, shortest, windows, before)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import Paged, frame_of
+from d2rpick.api.asked import request_of
 from d2rpick.api.request import needed_time, time_or_window
 from d2rpick.choice import study as core
 from d2rpick.report.shell import positional
@@ -126,7 +127,7 @@ def study(
     asked = needed_time(time_or_window(arguments.optional("td", td), arguments.window("td_window", td_window)))
     processes = arguments.whole("jobs", jobs, 1)
     names = core.find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
-    request = arguments.request_of(None, parts, flying, None, None, choosing)
+    request = request_of(None, parts, flying, None, None, choosing)
     chosen = selection_of(time, energy, channels)
     request = replace(
         request, time=chosen.time, energy=chosen.energy, channel=tuple("=".join(one) for one in chosen.channels),

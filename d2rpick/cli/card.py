@@ -53,14 +53,13 @@ def command(
 
     With a history, the times are judged again as printed, and the verdict is added as a comment.
     """
-    from d2rpick.api.asked import judging_run
     from d2rpick.deck.printing import DEFAULT
     from d2rpick.deck.printing import cards as print_cards
 
     if cards.solver:
         cards.check_solver(cards.solver)
     times = _windows(tr, td, windows)
-    run = judging_run(request)
+    run = options.judging_run(request)
     output = output.beside(windows, *(run.sources if run else ()))
     if run is None:
         solver = cards.solver or DEFAULT

@@ -84,9 +84,7 @@ def command(
 
 
 def _judge(request: Request) -> HistoryJudge | None:
-    from d2rpick.api.asked import judging_run
-
-    run = judging_run(request)
+    run = options.judging_run(request)
     if run is None:
         return None
     from d2rpick.rules.judgement import HistoryJudge

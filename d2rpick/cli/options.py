@@ -18,6 +18,7 @@ from d2rpick.errors import ArgumentError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from d2rpick.api.runs import Run
     from d2rpick.choice.switched_run import Times
 
 WINDOW = tuple[float, float] | None
@@ -182,6 +183,16 @@ def windows_in(file: str) -> Sequence[Times]:
 
     with click.open_file(file, encoding="utf-8", errors="replace") as stream:
         return read_windows(stream.read(), file)
+
+
+def judging_run(request: Request) -> Run | None:
+    """Open the history by which cards are judged; None without one, ArgumentError where options need it."""
+    if not request.history:
+        request.without_history()
+        return None
+    from d2rpick.api.asked import open_run  # not above: without a history nothing is computed
+
+    return open_run(request)
 
 
 LIMIT: Final = click.option(
