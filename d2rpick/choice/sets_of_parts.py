@@ -21,8 +21,8 @@ from d2rpick.choice.deck_of_run import (
     of_another_model,
 )
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
-from d2rpick.choice.part_evidence import facts_of, steps_of
-from d2rpick.choice.switchable_parts import rows_of
+from d2rpick.choice.part_evidence import facts_of
+from d2rpick.choice.switchable_parts import rows_of, step_growth
 from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.deck.geometry import Placement
 from d2rpick.errors import FormatError, RangeError, are, name_units
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.cost import Weights
-    from d2rpick.choice.part_evidence import RunFacts, Steps
+    from d2rpick.choice.part_evidence import RunFacts
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.switchable_parts import PartRow
@@ -156,11 +156,8 @@ def parts_of(
     model = None if foreign else model
     run = in_deck(run, model.inventory if model else None)
     facts = facts_of(run, settings)
-    printed = printed_steps(run, *(beside if model else ()))
-    inventory = model.inventory if model else None
-    steps = steps_of(inventory, printed)
-    rows = rows_of(facts, model, steps)
-    comparison = _Comparison(run, settings, model, rows, steps)
+    rows = rows_of(facts, model, printed_steps(run, *(beside if model else ())))
+    comparison = _Comparison(run, settings, model, rows)
     sets: list[PartSet] = []
     for one in _sets(rows, given):
         td = next((other.window[1] for other in sets if other.window), None)  # the same for all, to be compared
@@ -170,7 +167,16 @@ def parts_of(
             sets.append(comparison.of(PartSet(_STILL, left), times))
     found = tuple(_with_recommendation(_distinct(sets)))
     cautions = (*((foreign,) if foreign else ()), *_cautions(run, facts, model, rows, found))
-    return Parts(run, inventory, model.weights if model else None, settings, facts, rows, found, cautions)
+    return Parts(
+        run,
+        model.inventory if model else None,
+        model.weights if model else None,
+        settings,
+        facts,
+        rows,
+        found,
+        cautions,
+    )
 
 
 def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
@@ -250,7 +256,6 @@ class _Comparison:
     settings: Settings
     model: CostModel | None
     rows: Sequence[PartRow]
-    steps: Steps
 
     @cached_property
     def placement(self) -> Placement | None:
@@ -275,7 +280,6 @@ class _Comparison:
         within = {part: counts.total() for part, counts in inventory.elements_within(one.parts).items()}
         whole = {part: counts.total() for part, counts in inventory.counts.items()}
         rigid = {part for part, count in within.items() if count == whole[part]}
-        computed = [row.id for row in self.rows if row.elements and row.kind not in ("rigid", "void")]
         return replace(
             one,
             bodies=inventory.bodies(one.parts),
@@ -284,7 +288,7 @@ class _Comparison:
             element_fraction=sum(within.values()) / sum(whole.values()) if whole else None,
             mass_fraction=self._mass_fraction(one.parts),
             cost_share=share.value,
-            step_growth=self.steps.growth({*one.parts, *rigid}, computed),
+            step_growth=step_growth(self.rows, {*one.parts, *rigid}),
         )
 
     def _mass_fraction(self, parts: Sequence[int]) -> float | None:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.deck.geometry import masses_and_steps
 from d2rpick.deck.model import DISCRETE
 from d2rpick.deck.pieces import pieces_of
 from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from d2rpick.choice.cost import CostModel
-    from d2rpick.choice.part_evidence import InFlight, PartFacts, RunFacts, Steps
+    from d2rpick.choice.part_evidence import InFlight, PartFacts, RunFacts
     from d2rpick.deck.model import Inventory, PartData
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
@@ -57,7 +59,9 @@ class PartRow:
         return self.verdict in (SWITCH, MERGE)
 
 
-def rows_of(facts: RunFacts, model: CostModel | None, steps: Steps) -> tuple[PartRow, ...]:
+def rows_of(
+    facts: RunFacts, model: CostModel | None, printed: Mapping[int, tuple[float, str]] = MappingProxyType({})
+) -> tuple[PartRow, ...]:
     """Judge every part of a deck or history, ascending by number.
 
     Parameters
@@ -66,25 +70,33 @@ def rows_of(facts: RunFacts, model: CostModel | None, steps: Steps) -> tuple[Par
         What the history says.
     model : CostModel or None
         The deck with its cost; without it no verdict that depends on materials or shared nodes is given.
-    steps : Steps
-        Masses by the deck, and smallest stable steps.
+    printed : mapping of (float, str), optional
+        Smallest steps of those parts that controlled the step, by number, with the name of the source [time].
     """
     inventory = model.inventory if model else None
     ids = sorted({*facts.parts, *(inventory.parts if inventory else ())})
-    rows = [_described(part, facts, model, steps) for part in ids]
+    sizes = masses_and_steps(inventory) if inventory else {}
+    rows = [_described(part, facts, model, sizes.get(part, (None, None)), printed) for part in ids]
     alone = landing_alone(rows)
     judged = [_judged(row, facts, inventory, alone) for row in rows]
     return tuple(_merged(judged, inventory)) if inventory else tuple(judged)
 
 
-def _described(part: int, facts: RunFacts, model: CostModel | None, steps: Steps) -> PartRow:
+def _described(
+    part: int,
+    facts: RunFacts,
+    model: CostModel | None,
+    by_deck: tuple[float | None, float | None],
+    printed: Mapping[int, tuple[float, str]],
+) -> PartRow:
+    """Collect what is known of a part, of which the mass and step ``by_deck`` are used where nothing better is."""
     fact, inventory = facts.parts.get(part), model.inventory if model else None
     data = inventory.parts.get(part) if inventory else None
     counts = inventory.counts.get(part, Counter()) if inventory and data else None
     if inventory and not counts and not inventory.complete:
         counts = None  # they may be in a file that was not read
-    by_deck, (step, source) = steps.masses.get(part), steps.of(part)
-    mass = fact.mass if fact and fact.mass is not None else by_deck
+    step, source = printed.get(part, (None, None)) if by_deck[1] is None else (by_deck[1], "deck")
+    mass = fact.mass if fact and fact.mass is not None else by_deck[0]
     title = data.title if data and data.title else fact.part.title if fact else ""
     return PartRow(
         id=part,
@@ -201,6 +213,20 @@ def _to_switch(row: PartRow, fact: PartFacts | None, data: PartData | None) -> I
         yield "solids: solvers may misreport their energy while they are rigid"
     if fact and fact.has_energy is None:
         yield "its energy is not written"
+
+
+def step_growth(rows: Sequence[PartRow], switched: Collection[int]) -> float | None:
+    """How much the step may at least grow while some parts are rigid, from 1 on [-].
+
+    None where the step of a part that stays deformable is not known; infinite where none of them does.
+    """
+    computed = [row for row in rows if row.elements and row.kind not in ("rigid", "void")]
+    left = [row.smallest_step for row in computed if row.id not in switched]
+    known = [step for step in left if step is not None]
+    steps = [row.smallest_step for row in computed if row.smallest_step is not None]
+    if len(known) < len(left) or not steps:
+        return None
+    return min(known) / min(steps) if known else float("inf")
 
 
 def landing_alone(rows: Sequence[PartRow]) -> int | None:

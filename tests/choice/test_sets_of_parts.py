@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.cost import CostModel, Weights
-from d2rpick.choice.part_evidence import InFlight, PartFacts, Steps, facts_of
+from d2rpick.choice.part_evidence import InFlight, PartFacts, facts_of
 from d2rpick.choice.sets_of_parts import Parts, parts_of, recommended_parts
 from d2rpick.choice.settings import Settings
-from d2rpick.choice.switchable_parts import PartRow, landing_alone, rows_of
+from d2rpick.choice.switchable_parts import PartRow, landing_alone, rows_of, step_growth
 from d2rpick.deck import read_inventory
 from d2rpick.errors import FormatError
 from d2rpick.histories.opening import open_run
@@ -127,12 +127,15 @@ def test_parts_of_a_run_in_which_nothing_deforms_are_listed(tmp_path: Path) -> N
 
 
 def test_the_step_grows_by_what_stays_deformable() -> None:
-    steps = Steps(computed={1: 2e-6, 2: 6e-6}, printed={3: (3e-6, "glstat")})
-    assert steps.growth({1}, [1, 2, 3]) == pytest.approx(1.5)
-    assert steps.growth({2}, [1, 2, 3]) == 1.0
-    assert steps.growth({1, 2, 3}, [1, 2, 3]) == float("inf")
-    assert steps.growth({1}, [1, 2, 4]) is None  # the step of part 4 is not known
-    assert steps.growth({1, 4}, [1, 2, 4]) == 3.0
+    one, two, three, four = (
+        replace(row(part, None, None), smallest_step=step) for part, step in enumerate((2e-6, 6e-6, 3e-6, None), 1)
+    )
+    assert step_growth([one, two, three], {1}) == pytest.approx(1.5)
+    assert step_growth([one, two, three], {2}) == 1.0
+    assert step_growth([one, two, three], {1, 2, 3}) == float("inf")
+    assert step_growth([one, two, four], {1}) is None  # the step of part 4 is not known
+    assert step_growth([one, two, four], {1, 4}) == 3.0
+    assert step_growth([one, replace(four, kind="rigid")], {1}) == float("inf")
 
 
 @pytest.fixture(scope="module")
@@ -226,7 +229,7 @@ def test_a_part_that_drives_the_landing_alone_is_kept() -> None:
         return replace(part, flights=tuple(replace(one, landing=landing) for one in part.flights))
 
     known = {1: with_landing(facts.parts[1], 0.01), 2: with_landing(facts.parts[2], 5.0)}
-    rows = rows_of(replace(facts, parts=known), model, Steps())
+    rows = rows_of(replace(facts, parts=known), model)
     assert [one.verdict for one in rows] == ["switch", "keep", "keep"]
     assert rows[1].reasons == ("drives the landing alone, at little cost",)
 
