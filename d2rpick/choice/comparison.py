@@ -250,13 +250,18 @@ def compare_runs(
     if before.size and after[0] == before[-1] and _reported_wrong(before[-1], rest[1:]):
         after, rest = after[1:], rest[1:]  # the switch comes at the first step from td on: this state was still rigid
     frozen, wanted = float(after[0]), reference.energy_at(td)
-    notes = tuple(note for note in switched.notes if note not in reference.notes)
+    notes = [note for note in switched.notes if note not in reference.notes]
+    if before.size and _reported_wrong(before[-1], rest):
+        found = f"while rigid the run reports an energy of {before[-1]:.6g}, at td {frozen:.6g} came back"
+        notes.append(f"{found}; some solvers report rigid solid elements wrongly")
     still = _still(reference, switched, tr, td)
     error, rigid = _relative(*momenta, td, end), _rigid_window(switched, tr, td, still)
     objections = [*_not_rigid(reference, switched, rigid, tr, td, still)]
     if known:
-        objections += [*_not_of_tr(reference, tr, frozen), *_not_of_td(frozen, wanted, tolerance)]
-    objections += _moved_otherwise(error)
+        objections += _not_locked_in(reference, tr, frozen, wanted, tolerance)
+    if error is not None and error > MOST_MOMENTUM_ERROR:
+        moved = f"the switched run's momentum after td is off by {error:.1%}"
+        objections.append(f"{moved}: its motion differs from the reference")
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -269,10 +274,10 @@ def compare_runs(
         spread_after_reference=float(reference_after.std()),
         momentum_error=error,
         displacement=_distance(*centres, td, end),
-        rigid_from=rigid[0] if rigid else None,
-        rigid_to=rigid[1] if rigid else None,
+        rigid_from=rigid and rigid[0],
+        rigid_to=rigid and rigid[1],
         objections=tuple(objections),
-        notes=(*notes, *(_reported(float(before[-1]), rest) if before.size else ())),
+        notes=tuple(notes),
     )
 
 
@@ -334,8 +339,8 @@ def _not_rigid(
         yield f"{found}, not from tr {tr:g} to td {td:g}"
 
 
-def _not_of_tr(reference: History, tr: float, frozen: float) -> Iterator[str]:
-    """Object when the energy that came back is not one that the reference has about tr."""
+def _not_locked_in(reference: History, tr: float, frozen: float, wanted: float, tolerance: float) -> Iterator[str]:
+    """Object when the energy that came back is not one that the reference has about tr, or not that of td."""
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:
@@ -343,32 +348,14 @@ def _not_of_tr(reference: History, tr: float, frozen: float) -> Iterator[str]:
             f"the energy that came back, {frozen:.6g}, is not that of the reference at tr {tr:g}, "
             f"{reference.energy_at(tr):.6g}: was it switched at another time?"
         )
-
-
-def _not_of_td(frozen: float, wanted: float, tolerance: float) -> Iterator[str]:
-    """Object when the energy that came back is not that of the reference at td."""
     if measures.level_error(frozen, wanted) > tolerance:
         yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {wanted:.6g}"
-
-
-def _moved_otherwise(error: float | None) -> Iterator[str]:
-    """Object when the momentum after td is another one."""
-    if error is not None and error > MOST_MOMENTUM_ERROR:
-        yield f"the switched run's momentum after td is off by {error:.1%}: its motion differs from the reference"
 
 
 def _reported_wrong(rigid: float, after: Samples) -> bool:
     """Whether the energy reported while rigid is not the one that comes back."""
     usual = np.abs(np.diff(after)).max()
     return bool(abs(rigid - after[0]) > max(usual, _REPORTED_OFF * abs(after[0])))
-
-
-def _reported(rigid: float, after: Samples) -> tuple[str, ...]:
-    """Note an energy that the solver reports just before td otherwise than it comes back."""
-    if not _reported_wrong(rigid, after):
-        return ()
-    found = f"while rigid the run reports an energy of {rigid:.6g}, at td {after[0]:.6g} came back"
-    return (f"{found}; some solvers report rigid solid elements wrongly",)
 
 
 def _relative(reference: Track | None, other: Track | None, td: float, end: float) -> float | None:

@@ -167,16 +167,8 @@ def parts_of(
             sets.append(comparison.of(PartSet(_STILL, left), times))
     found = tuple(_with_recommendation(_distinct(sets)))
     cautions = (*((foreign,) if foreign else ()), *_cautions(run, facts, model, rows, found))
-    return Parts(
-        run,
-        model.inventory if model else None,
-        model.weights if model else None,
-        settings,
-        facts,
-        rows,
-        found,
-        cautions,
-    )
+    inventory, weights = (model.inventory, model.weights) if model else (None, None)
+    return Parts(run, inventory, weights, settings, facts, rows, found, cautions)
 
 
 def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
