@@ -144,9 +144,7 @@ class Candidates(Sequence[Candidate]):
     @cached_property
     def acceptable(self) -> NDArray[np.bool_]:
         """Which of them nothing speaks against."""
-        return np.asarray(
-            ~np.logical_or.reduce([np.zeros(len(self), dtype=bool), *(one.holds for one in self.objections)])
-        )
+        return np.asarray(~np.logical_or.reduce([one.holds for one in self.objections]))
 
     @property
     def kept(self) -> NDArray[np.bool_]:
