@@ -16,7 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.cli import suggest, typed
+from d2rpick.api.request import CHOOSING, READING
+from d2rpick.cli import suggest
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROOT, run
 from tests.computed import stored
 
@@ -242,7 +243,13 @@ def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_
         *("output_file", "overwrite", "quiet", "verbose", "show_settings", "debug"),
         *("solver", "merge", "swset", "step_cap", "node", "end", "name"),
     }
-    assert {str(option.name) for option in suggest.command.params} == {*about_output, *typed.ASKING}
+    assert {str(option.name) for option in suggest.command.params} == {
+        *about_output,
+        *READING,
+        *CHOOSING,
+        "deck",
+        "weights",
+    }
 
 
 def test_a_time_that_no_card_can_hold_costs_the_card_only(tmp_path: Path) -> None:
