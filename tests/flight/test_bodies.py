@@ -18,6 +18,7 @@ from d2rpick.flight.position_error import MOST_OF_PATH, Drift
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, stored
+from tests.records import known
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History
@@ -40,8 +41,7 @@ def test_the_largest_error_counts_with_its_part_and_its_body(rates: list[float],
     found = Bodies([drift(i, rate) for i, rate in enumerate(rates)], told(*((i, i + 10) for i in range(len(rates)))))
     errors = [rate * (0.95 - tr) for rate in rates]
     assert found.errors(np.array([tr]), 0.95)[0] == pytest.approx(max(errors))
-    worst = found.worst(tr, 0.95)
-    assert worst is not None
+    worst = known(found.worst(tr, 0.95))
     assert worst.error == pytest.approx(max(errors))
     assert not worst.assumed
     if worst.error:
@@ -62,8 +62,7 @@ def test_one_body_that_is_not_known_leaves_all_open() -> None:
 
 
 def test_without_a_deck_one_body_is_assumed() -> None:
-    worst = Bodies([drift(1, 1.0)], None).worst(0.1, 0.9)
-    assert worst is not None
+    worst = known(Bodies([drift(1, 1.0)], None).worst(0.1, 0.9))
     assert (worst.assumed, worst.body) == (True, None)
 
 
@@ -100,8 +99,7 @@ def test_of_the_bodies_of_the_car_that_of_many_parts_is_off() -> None:
     alone = bodies_in_flight(*car("1-11,13"), told(frame))
     tr = np.array([0.04, 0.0496, 0.09])
     np.testing.assert_allclose(found.errors(tr, 0.1464), alone.errors(tr, 0.1464))
-    worst = found.worst(0.0496, 0.1464)
-    assert worst is not None
+    worst = known(found.worst(0.0496, 0.1464))
     assert worst.body == RigidBody(frame)
     assert worst.error < 1e-3  # without engine and wheels; with them 2.2 mm
 

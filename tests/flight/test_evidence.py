@@ -26,7 +26,7 @@ from d2rpick.models.files import BOX_WRITERS
 from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, run
 from tests.computed import columns, stored
 from tests.json_schemas import check_by_schema
-from tests.records import table
+from tests.records import known, table
 from tests.sample_box import t01
 
 if TYPE_CHECKING:
@@ -237,8 +237,7 @@ def test_a_contact_between_two_flights_on_one_level_ends_the_first() -> None:
     load = 400 * np.exp(-(((time - 0.2) / 0.05) ** 2))
     contact = 80 * np.exp(-(((time - 0.8) / 0.01) ** 2))  # brief, in the last quarter before td
     energy = 190 + 5 * np.sin(250 * time) + load + contact
-    quiet = quiet_time(table(time, np.where(time < 0.1, 0, energy)), 0.95)
-    assert quiet
+    quiet = known(quiet_time(table(time, np.where(time < 0.1, 0, energy)), 0.95))
     assert quiet.start > 0.81
 
 

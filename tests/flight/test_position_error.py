@@ -19,6 +19,7 @@ from d2rpick.histories.history import EXACT, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, stored
+from tests.records import known
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -60,9 +61,7 @@ def sliding(way: Samples, part: int = ENGINE) -> Samples:
 
 
 def drift(found: Momenta, masses: Samples = MASSES) -> Drift:
-    answer = drift_of(Flying(found, masses, range(masses.size), *FLIGHT))
-    assert answer is not None
-    return answer
+    return known(drift_of(Flying(found, masses, range(masses.size), *FLIGHT)))
 
 
 @settings(max_examples=25, deadline=None)
@@ -104,8 +103,7 @@ def test_a_rigid_body_is_where_it_should_be() -> None:
 
 
 def test_beyond_the_flight_nothing_is_known() -> None:
-    found = drift_of(Flying(momenta(np.zeros(3), sliding(np.ones(3) / 100)), MASSES, range(5), 0.02, 0.08))
-    assert found is not None
+    found = known(drift_of(Flying(momenta(np.zeros(3), sliding(np.ones(3) / 100)), MASSES, range(5), 0.02, 0.08)))
     assert np.isnan(found.errors(np.array([0.01, 0.05]), 0.07)).tolist() == [True, False]
     assert np.isnan(found.errors(np.array([0.05]), 0.09)).all()
 
@@ -157,8 +155,7 @@ def errors(name: str, parts: str, flight: tuple[float, float], tr: list[float], 
     """Position errors [mm] by the momenta of a run that a solver computed."""
     history = solved(name, parts).history
     assert history.masses is not None
-    found = drift_of(Flying(history.momenta[0], history.masses, history.momenta[0].chosen, *flight))
-    assert found is not None
+    found = known(drift_of(Flying(history.momenta[0], history.masses, history.momenta[0].chosen, *flight)))
     assert found.part.title == ("engine" if name.startswith("car") else "block")
     return 1e3 * found.errors(np.array(tr), td)
 
@@ -207,8 +204,7 @@ def test_of_computed_runs_those_that_come_out_too_small_are_lower_bounds(
 ) -> None:
     history = read([stored(name)], Selection(parts=tuple(parts.split(",")))).history
     assert history.masses is not None
-    found = drift_of(Flying(history.momenta[0], history.masses, history.momenta[0].chosen, *flight))
-    assert found is not None
+    found = known(drift_of(Flying(history.momenta[0], history.masses, history.momenta[0].chosen, *flight)))
     assert found.at_least is bound
 
 
@@ -219,8 +215,7 @@ def test_a_set_that_leaves_the_first_landing_part_out_is_off_as_far() -> None:
 def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show() -> None:
     history = solved("carT01.gz", "1-17").history
     flight = find_flight(history, 0.14, None, seen_flight(history, 0.14), None)
-    found = drift_in_flight(history, flight)
-    assert found is not None
+    found = known(drift_in_flight(history, flight))
     assert found.part.title == "engine"
     assert found.errors(np.array([0.0496]), 0.1464)[0] == pytest.approx(2.2e-3, abs=1e-3)
     assert drift_in_flight(history, flight, [found.part]) is None

@@ -22,6 +22,7 @@ from d2rpick.histories.history import EXACT, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, starter, stored
+from tests.records import known
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -129,29 +130,25 @@ def still() -> Samples:
 
 
 def test_without_a_deck_the_angle_is_not_known() -> None:
-    found = drift(still(), None)
-    assert found is not None
+    found = known(drift(still(), None))
     assert np.isnan(found.angles(TIME[80:120], 0.09)).all()
 
 
 def test_beyond_the_flight_no_angle_is_known() -> None:
-    found = drift(still(), placement())
-    assert found is not None
+    found = known(drift(still(), placement()))
     assert np.isnan(found.angles(np.array([0.005, 0.05]), 0.09)).tolist() == [True, False]
     assert np.isnan(found.angles(np.array([0.05]), 0.11)).all()
 
 
 def test_a_deck_with_the_parts_in_other_places_tells_no_angle() -> None:
-    found = drift(still(), placement(places=PLACES[[1, 2, 3, 0, 4]]))
-    assert found is not None
+    found = known(drift(still(), placement(places=PLACES[[1, 2, 3, 0, 4]])))
     assert found.turning is None
 
 
 def test_a_part_that_the_deck_does_not_place_leaves_the_angle_open() -> None:
     deck = placement()
     deck.parts.pop(2)  # type: ignore[attr-defined]
-    found = drift(still(), deck)
-    assert found is not None
+    found = known(drift(still(), deck))
     assert found.turning is None
 
 
@@ -162,8 +159,7 @@ def test_what_flies_with_a_body_holds_it() -> None:
     inside = PLACES + slides
     where = inside - np.einsum("p,npi->ni", MASSES / MASSES.sum(), inside)[:, np.newaxis]
     where += np.outer(TIME, [4.0, -2.5, -1.0])[:, np.newaxis]
-    without = drift(where, None, members=(0, 1, 2, 4))
-    assert without is not None
+    without = known(drift(where, None, members=(0, 1, 2, 4)))
     expected = MASSES[ENGINE] / MASSES.sum() * 0.5 * 0.03
     assert without.errors(np.array([0.05]), 0.08)[0] == pytest.approx(expected, rel=1e-3)
 
@@ -174,8 +170,7 @@ def test_a_body_that_bends_more_than_it_is_said_to_turn_makes_the_angle_a_lower_
 ) -> None:
     where = still()
     where[:, :ENGINE, 2] += bends * np.outer(np.sin(40.0 * TIME), [1.0, -1.0, 1.0, -1.0])  # it is twisted
-    found = drift(where, placement())
-    assert found is not None
+    found = known(drift(where, placement()))
     assert found.at_least is bound
 
 

@@ -15,7 +15,7 @@ from d2rpick.vibration.part_motion import all_zeros, by_own_modes, followed
 from d2rpick.vibration.part_signs import read_parts
 from d2rpick.vibration.waves import Waves
 from tests.benchmarks.promise_parts import Motion, history
-from tests.records import noisy
+from tests.records import known, noisy
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History
@@ -63,8 +63,7 @@ def test_minima_that_stay_above_zero_prove_no_sign() -> None:
     (zeros,) = all_zeros(TIME, np.sqrt(energy)[np.newaxis])
     tracked = np.where(np.searchsorted(zeros.sure, TIME) % 2, -1, 1) * np.sqrt(energy)
     assert followed(TIME, tracked, zeros) is None
-    own = by_own_modes(TIME, energy, None)
-    assert own is not None
+    own = known(by_own_modes(TIME, energy, None))
     assert len(own.model.amplitudes(TIME)) == 2
 
 

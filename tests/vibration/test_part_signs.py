@@ -24,7 +24,7 @@ from d2rpick.vibration.waves import Waves
 from tests import chain
 from tests.command import BOX
 from tests.computed import stored
-from tests.records import printed
+from tests.records import known, printed
 
 if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
@@ -154,8 +154,7 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
 
 def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> None:
     situation = examine(chain.history(), chain.TD_LATE, PLAIN)
-    parts = situation.evidence.parts
-    assert parts is not None
+    parts = known(situation.evidence.parts)
     started = Waves(
         np.array([-300 + 900j]), np.array([101 * np.sqrt(parts.vibration_energy(chain.TD_LATE))]), parts.time[0]
     )
@@ -170,8 +169,7 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
 
 
 def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
-    parts = examine(chain.history(), chain.TD_LATE, PLAIN).evidence.parts
-    assert parts is not None
+    parts = known(examine(chain.history(), chain.TD_LATE, PLAIN).evidence.parts)
     for run in chain.scan():
         product = np.prod(deformations(parts, np.array([run["tr_s"], run["td_s"]])), axis=1)
         assert (product > 0).tolist() == [run["sign1"] > 0, run["sign2"] > 0]

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.vibration.swings import count_swings
-from tests.records import table
+from tests.records import known, table
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -35,8 +35,7 @@ def stiffening(by: float, alpha: float) -> tuple[Samples, Samples]:
 @pytest.mark.parametrize("lifted", [0.0 * TIME, 40.0 + 0.0 * TIME, 0.02 * TIME, -0.02 * TIME])
 def test_every_minimum_on_the_floor_is_a_passage_through_zero(by: float, alpha: float, lifted: Samples) -> None:
     x, energy = stiffening(by, alpha)
-    found = count_swings(TIME, energy + lifted)
-    assert found is not None
+    found = known(count_swings(TIME, energy + lifted))
     counted = found.amplitudes(TIME)[0]
     unclear = found.unclear
     assert np.all((unclear == TIME[1]) | (unclear > TIME[-1] - np.pi))
