@@ -268,9 +268,8 @@ def _witnesses(history: History) -> Iterator[Witness]:
         around = partial(_by_energies, history, work.plateau_around, level=not history.momenta)
         yield Witness.of("contact-energy", balance.time, around, decisive=False)
     if work.can_tell(balance):
-        worked = balance.external_work is not None and bool(np.ptp(balance.external_work))
         around = partial(_by_energies, history, work.balanced_around, level=True)
-        yield Witness.of("energy-balance", balance.time, around, decisive=worked)
+        yield Witness.of("energy-balance", balance.time, around, decisive=balance.worked is not None)
 
 
 def _first(history: History, momenta: Sequence[Momenta], td: float) -> FreeFlight | None:

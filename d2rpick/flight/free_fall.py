@@ -273,8 +273,7 @@ def acceleration_by_work(balance: Balance, time: Samples, momentum: Samples, sta
     float or None
         None where none of them is written, 0 where they do not follow.
     """
-    worked = balance.external_work is not None and bool(np.ptp(balance.external_work))
-    work = balance.external_work if worked else balance.kinetic_and_internal
+    work = balance.kinetic_and_internal if balance.worked is None else balance.worked
     inside = window(balance.time, start, end)
     if work is None or balance.time[inside].size < _LEAST_STATES:
         return None

@@ -121,7 +121,7 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
     if extent <= max(2 * noise, _CONSTANT * float(np.abs(momentum).max())):
         known = float(np.abs(momentum).max()) > noise and _moves(momenta, members, noise)
         known = known and (gravities is None or 0.0 in gravities)
-        whole = FreeFlight(float(time[0]), float(time[-1]), parts, False)
+        whole = FreeFlight.of(time, (0, time.size - 1), parts)
         return unheld(momenta.surroundings, whole, parts, td) if known else None
     if noise > TOLERANCE * extent:
         return None
@@ -136,7 +136,7 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
         if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
             return None  # held, or at rest
     damping = laws.fit.damping(first, last) if gravity is not None else 0.0
-    found = FreeFlight(float(time[first]), float(time[last]), parts, last < time.size - 1, damping, gravity or 0.0)
+    found = FreeFlight.of(time, states, parts, damping=damping, gravity=gravity or 0.0)
     return unheld(momenta.surroundings, found, parts, td)
 
 

@@ -52,6 +52,15 @@ class FreeFlight(NamedTuple):
     damping: float = 0.0
     gravity: float = 0.0
 
+    @classmethod
+    def of(
+        cls, time: Samples, states: tuple[int, int], parts: tuple[Part, ...] | None = None, *,
+        damping: float = 0.0, gravity: float = 0.0,
+    ) -> FreeFlight:  # fmt: skip
+        """Give the flight from the first to the last of some states of a record."""
+        first, last = states
+        return cls(float(time[first]), float(time[last]), parts, last < time.size - 1, damping, gravity)
+
 
 class Law:
     """What free flight obeys over ``time`` (n,), and how far a record is off.

@@ -66,7 +66,7 @@ def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | N
         one_sided.append(-integral(time, balance.kinetic[inside]))
     error = _BENT if balance.velocity is None else _OWN_ERROR
     rest = float(np.abs(_rest(work, free, one_sided, most)).max())
-    own = balance.precision.quantum(float(np.abs(work).max())) + error * float(np.ptp(work))
+    own = 2 * balance.precision.noise(work) + error * float(np.ptp(work))
     return max(0.0, rest - own)
 
 
@@ -119,9 +119,7 @@ def change_of_balance(balance: Balance, start: float, end: float) -> float | Non
     kinetic = None if balance.kinetic is None else balance.kinetic[inside]
     law = _Parabola(balance.time[inside], whole[inside][:, np.newaxis], kinetic)
     rest = law.misfit(0, law.time.size - 1)
-    return max(
-        0.0, rest - balance.precision.quantum(float(np.abs(whole).max())) - _OWN_ERROR * float(np.ptp(whole[inside]))
-    )
+    return max(0.0, rest - 2 * balance.precision.noise(whole) - _OWN_ERROR * float(np.ptp(whole[inside])))
 
 
 def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
@@ -134,11 +132,10 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     time, terms = balance.time, _terms(balance)
     if balance.velocity is not None or not terms or time.size < FEWEST or not time[0] <= td <= time[-1]:
         return None
-    largest = max(float(np.abs(term).max()) for term in terms)
     extent = min(float(np.ptp(term)) for term in terms)
     if balance.internal is not None:  # a crash into a fixed wall leaves the sum as it was
         extent = max(extent, _OF_INTERNAL * float(np.ptp(balance.internal)))
-    noise = balance.precision.quantum(largest) / 2
+    noise = balance.precision.noise(np.stack(terms))
     if noise > _OWN_ERROR * extent:
         return None
     # without and with a rate, which takes up what tells a load from free flight, too
@@ -151,10 +148,7 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     found = window or rings
     if found is None:
         return None
-    first, last = found
-    start, end = float(time[first]), float(time[last])
-    gravity = _unexplained(balance, first, last) or (np.nan if rings else 0.0)
-    return FreeFlight(start, end, None, last < time.size - 1, gravity=gravity)
+    return FreeFlight.of(time, found, gravity=_unexplained(balance, *found) or (np.nan if rings else 0.0))
 
 
 def _unexplained(balance: Balance, first: int, last: int) -> float:
@@ -181,14 +175,9 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
 
 def _terms(balance: Balance) -> list[Samples]:
     """Energies that change by gravity and damping only, as far as they are written and change at all."""
-    found = []
-    if balance.external_work is not None:
-        found.append(balance.external_work)
-    found = [term for term in found if np.ptp(term) > 0]
-    whole = balance.kinetic_and_internal
-    if whole is not None and balance.internal is not None and (np.ptp(whole) > 0 or np.ptp(balance.internal) > 0):
-        found.append(whole)
-    return found
+    whole, internal = balance.kinetic_and_internal, balance.internal
+    changes = whole is not None and internal is not None and (np.ptp(whole) > 0 or np.ptp(internal) > 0)
+    return [term for term in (balance.worked, whole if changes else None) if term is not None]
 
 
 class _Parabola(Law):
@@ -227,7 +216,9 @@ _VISIBLE = 100
 def shows_contacts(balance: Balance) -> bool:
     """Whether the model has contacts that were ever closed, as far as the contact energy tells."""
     energy = balance.sliding
-    return energy is not None and energy.size >= FEWEST and float(np.ptp(energy)) > _VISIBLE * _noise(balance)
+    if energy is None or energy.size < FEWEST:
+        return False
+    return float(np.ptp(energy)) > _VISIBLE * balance.precision.noise(energy)
 
 
 def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
@@ -240,14 +231,7 @@ def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     if energy is None or not time[0] <= td <= time[-1]:
         return None
     law = balance.known.once("sliding", lambda: Constant(time, energy[:, np.newaxis]))
-    window = lasting_window(law, td, float(np.ptp(energy)), _noise(balance))
-    if window is None or (window[0] == 0 and balance.external_work is None):
+    states = lasting_window(law, td, float(np.ptp(energy)), balance.precision.noise(energy))
+    if states is None or (states[0] == 0 and balance.external_work is None):
         return None
-    first, last = window
-    return FreeFlight(float(time[first]), float(time[last]), None, last < time.size - 1)
-
-
-def _noise(balance: Balance) -> float:
-    """What the printed digits leave open [energy]."""
-    assert balance.sliding is not None
-    return balance.precision.quantum(float(np.abs(balance.sliding).max())) / 2
+    return FreeFlight.of(time, states)

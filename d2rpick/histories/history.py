@@ -63,6 +63,10 @@ class Precision(NamedTuple):
         powers = np.floor(np.log10(sizes, out=np.zeros(sizes.shape), where=sizes > 0)) - self.digits + 1
         return np.where(sizes > 0, 10.0**powers, 0.0)
 
+    def noise(self, values: Samples) -> float:
+        """What printed digits leave open in values, half a quantum of the largest [unit of the values]."""
+        return self.quantum(float(np.abs(values).max())) / 2
+
 
 EXACT = Precision()
 
@@ -191,6 +195,11 @@ class Balance:
         if self.kinetic is None or self.internal is None:
             return None
         return self.kinetic + self.internal + (0.0 if self.hourglass is None else self.hourglass)
+
+    @cached_property
+    def worked(self) -> Samples | None:
+        """External work (n,); None where it is not written, or none is ever done."""
+        return None if self.external_work is None or not np.ptp(self.external_work) else self.external_work
 
 
 class FlightEvidence(Protocol):
