@@ -60,7 +60,7 @@ def measured(
     ``of_parts``: the deformations are those of parts, whose energy at td the mismatch is held against.
     """
     lock_in = lock_in_error(vibration, tr, td)
-    error = np.sqrt(lock_in**2 + vibration.kinetic_energy(td) / vibration.vibration_energy(td))
+    error = residual(lock_in, kinetic_share(vibration, td))
     columns = (sign_match(vibration, tr, td), lock_in, error, bound(error, tr, td), tolerance)
     mismatch = part_mismatch(vibration, tr, td).tolist() if of_parts else repeat(None, tr.size)
     return map(Measured, *(column.tolist() for column in columns), mismatch)
@@ -94,12 +94,14 @@ def level_error(energy: Samples | float, level: float) -> Samples:
     return np.asarray(np.abs(np.sqrt(square) - 1))
 
 
-def kinetic_share(vibration: Deformation, td: float) -> float:
+def kinetic_share(vibration: Deformation, td: Samples | float) -> Samples:
     """K = T(td)/V(td) [-]: the share of the vibration energy that is kinetic at td, which no tr can save.
+
+    Of the shape of ``td``.
 
     V = T + (q - q0)^2 is the energy of the vibration about the preload q0; without preload V = T + E.
     """
-    return float(vibration.kinetic_energy(td) / vibration.vibration_energy(td))
+    return np.asarray(vibration.kinetic_energy(td) / vibration.vibration_energy(td))
 
 
 def lock_in_error(vibration: Deformation, tr: Samples | float, td: Samples | float) -> Samples:
@@ -141,15 +143,15 @@ def _apart(vibration: Deformation, tr: Samples | float, td: Samples | float) -> 
     return np.asarray((at_tr.T - vibration.amplitudes(td).T).T)
 
 
-def residual(lock_in: float, kinetic: float) -> float:
+def residual(lock_in: Samples | float, kinetic: Samples | float) -> Samples:
     """R = sqrt(L^2 + K) [-]: the vibration error after td relative to the reference vibration.
 
     Examples
     --------
-    >>> residual(0.3, 0.16)
+    >>> float(residual(0.3, 0.16))
     0.5
     """
-    return sqrt(lock_in**2 + kinetic)
+    return np.asarray(np.sqrt(np.square(lock_in) + kinetic))
 
 
 def wrong_sign(kinetic: float) -> float:

@@ -99,7 +99,7 @@ class Vibration:
     @property
     def kinetic_share(self) -> float | None:
         """K at td, None where it is not known [-]."""
-        return self.compared and measures.kinetic_share(self.compared.deformation, self.td)
+        return None if self.compared is None else float(measures.kinetic_share(self.compared.deformation, self.td))
 
     @cached_property
     def profile(self) -> Profile | None:
