@@ -21,9 +21,7 @@ from tests.records import ENERGY, TIME, noisy, printed, replayed_residual, table
 
 
 def random_mode(rng: np.random.Generator) -> Mode:
-    return Mode(
-        omega=2 * np.pi, alpha=rng.uniform(0, 0.5), cosine=rng.normal(), sine=rng.normal(), origin=0.0
-    )  # period 1
+    return Mode(2 * np.pi, rng.uniform(0, 0.5), rng.normal(), rng.normal(), 0.0)  # period 1
 
 
 def covered(samples_per_period: int, digits: int, *, jitter: float, runs: int) -> tuple[float, float]:
