@@ -141,32 +141,44 @@ def test_it_is_the_same_every_time(tmp_path: Path) -> None:
     assert pages[0] == pages[1]
 
 
-def test_parts_version_flight_and_health_are_told(tmp_path: Path) -> None:
-    page = page_of(tmp_path, "--td", "0.37", "--part", "box", "--no-verify", ROLLOVER_T01)
-    for text in (
-        "curb trip of a box",
-        "RADIOSS OpenRadioss",
-        "momentum of box, step",
-        "hourglass energy of box",
-        "kept",
-    ):
-        assert text in page.text
-    assert "266 more" in page.text
+CHAIN = stored("chain_referenceT01.gz")
+BOX = ("--td", "0.37", "--part", "box", "--no-verify", ROLLOVER_T01)
+# Of a command with its arguments: the exit code, what its page says, and what it must not say.
+TOLD = {
+    "parts, version, flight and health": (
+        ("suggest", *BOX), 0,
+        ("curb trip of a box", "RADIOSS OpenRadioss", "momentum of box, step", "hourglass energy of box", "kept",
+         "266 more"), (),
+    ),
+    "a pair that cannot be bettered": (
+        ("suggest", "--td-window", "0.06", "0.07", ENERGY), 0, ("Recommended",), ("Better pair",)
+    ),
+    "each part and the saving, and no pair that is not better": (
+        ("suggest", "--td", "0.13505", "--part", "spring1,spring2", "--cost-share", "0.9", CHAIN), 0,
+        ("Parts at this pair", "share of the mismatch", "run time", "2 modes", "residual0.065"), ("Better pair",),
+    ),
+    "nothing to recommend": (
+        ("suggest", "--td", "0.064", "--max-residual", "0.1", ENERGY), 1,
+        ("No tr can be recommended", "no-candidate"), ("card chosen", "rigid at  "),
+    ),
+    "a poor pair": (
+        ("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY), 0, ("Verified, but of poor quality",), ()
+    ),
+    "a pair that does not verify": (
+        ("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY), 1,
+        ("Not verified", "opposite sign of the deformation"), ("d2rpick card",),
+    ),
+}  # fmt: skip
 
 
-def test_a_pair_that_cannot_be_bettered_is_shown_once(tmp_path: Path) -> None:
-    page = page_of(tmp_path, "--td-window", "0.06", "0.07", ENERGY)
-    assert "Recommended" in page.text
-    assert "Better pair" not in page.text
+@pytest.mark.parametrize(("asked", "code", "said", "unsaid"), TOLD.values(), ids=TOLD)
+def test_it_tells_what_is_known_and_nothing_else(
+    asked: tuple[str, ...], code: int, said: tuple[str, ...], unsaid: tuple[str, ...], tmp_path: Path
+) -> None:
+    page = page_of(tmp_path, *asked[1:], command=asked[0], code=code)
+    assert [text for text in said if text not in page.text] == []
+    assert [text for text in unsaid if text in page.text or text in page.source] == []
     assert page.source.count("<figure ") == 1
-
-
-def test_each_part_and_the_saving_are_told_and_no_pair_that_is_not_better(tmp_path: Path) -> None:
-    chain = stored("chain_referenceT01.gz")
-    page = page_of(tmp_path, "--td", "0.13505", "--part", "spring1,spring2", "--cost-share", "0.9", chain)
-    for text in ("Parts at this pair", "share of the mismatch", "run time", "2 modes", "residual0.065"):
-        assert text in page.text
-    assert "Better pair" not in page.text
 
 
 def test_a_title_of_html_stays_text(tmp_path: Path) -> None:
@@ -223,7 +235,7 @@ def test_the_command_for_radioss_names_the_parts(tmp_path: Path) -> None:
 
 
 def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_path: Path) -> None:
-    choosing = (
+    choosing = [
         "--after",
         "0.001",
         "--tolerance",
@@ -234,7 +246,7 @@ def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_
         "--max-residual",
         "2.5",
         "--strict",
-    )
+    ]
     page = page_of(tmp_path, "--td", "0.064", *choosing, ENERGY)
     before, behind = json.loads(page.data[0])["command"]
     assert (before, sorted(shlex.split(behind))) == ("d2rpick suggest --td ", sorted([*choosing, ENERGY]))
@@ -281,18 +293,6 @@ def test_a_verdict_has_a_page_too(tmp_path: Path) -> None:
     assert not page.unnamed
 
 
-def test_a_poor_pair_is_not_shown_as_a_good_one(tmp_path: Path) -> None:
-    page = page_of(tmp_path, "--tr", "0.0128853", "--td", "0.064", ENERGY, command="verify")
-    assert "Verified, but of poor quality" in page.text
-
-
-def test_a_pair_that_does_not_verify_gets_its_reasons_and_no_card(tmp_path: Path) -> None:
-    page = page_of(tmp_path, "--tr", "0.0122659", "--td", "0.064", ENERGY, command="verify", code=1)
-    assert "Not verified" in page.text
-    assert "opposite sign of the deformation" in page.text
-    assert "d2rpick card" not in page.text
-
-
 def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> None:
     reference, *legs = (ROLLOVER_T01, *(stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 2, 3)))
     page = page_of(
@@ -302,14 +302,6 @@ def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> No
         assert f"{name}: {hashlib.sha256(Path(name).read_bytes()).hexdigest()}" in page.text
     for text in ("The switched run", "mean energy after td", "hourglass energy of box", "The window is 0.1 to 0.37"):
         assert text in page.text
-
-
-def test_where_nothing_can_be_recommended_it_says_so(tmp_path: Path) -> None:
-    page = page_of(tmp_path, "--td", "0.064", "--max-residual", "0.1", ENERGY, code=1)
-    assert "No tr can be recommended" in page.text
-    assert "card chosen" not in page.source
-    assert "no-candidate" in page.text
-    assert "rigid at  " not in page.text
 
 
 def test_it_is_a_file_like_any_other_output(tmp_path: Path) -> None:
