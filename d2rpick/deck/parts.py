@@ -58,10 +58,7 @@ class PartSet:
     def joined(self, other: PartSet) -> PartSet:
         """Return both together (``_COLLECT``)."""
         return PartSet(
-            self.parts + other.parts,
-            self.ranges + other.ranges,
-            self.sets + other.sets,
-            self.problems + other.problems,
+            self.parts + other.parts, self.ranges + other.ranges, self.sets + other.sets, self.problems + other.problems
         )
 
 

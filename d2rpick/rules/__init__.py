@@ -80,10 +80,7 @@ def configuration_for(deck: str, asked: Configuration) -> Configuration:
 
 
 def check_deck(
-    path: str,
-    configuration: Configuration | None = None,
-    judge: Judge | None = None,
-    content: bytes | None = None,
+    path: str, configuration: Configuration | None = None, judge: Judge | None = None, content: bytes | None = None
 ) -> Checked:
     """Read a deck with its includes, or a Radioss run with its legs, and apply the rules.
 

@@ -91,10 +91,7 @@ def plate(far: float = 0.0) -> Inventory:
     first = np.array([i * (ACROSS + 1) + j for i in range(ALONG) for j in range(ACROSS)])
     shells = np.stack([first, first + 1, first + ACROSS + 2, first + ACROSS + 1], axis=1)
     springs = np.array([[0, 1], [0, ACROSS]])
-    elements = (
-        Elements("shell", np.full(len(shells), 3), shells),
-        Elements("spring", np.full(2, 4), springs),
-    )
+    elements = (Elements("shell", np.full(len(shells), 3), shells), Elements("spring", np.full(2, 4), springs))
     return Inventory("radioss", {}, elements, coordinates, watched=np.array([0, ACROSS, coordinates.shape[0] - 1]))
 
 
