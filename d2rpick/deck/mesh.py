@@ -218,7 +218,9 @@ class NodeTable:
         if not self.ids.size:
             return np.full_like(ids, NO_NODE)
         if self._sorted[-1] <= _DENSE:
-            return np.asarray(self._lookup[np.where((ids > 0) & (ids < self._lookup.size), ids, 0)])
+            if ids.min(initial=0) < 0 or ids.max(initial=0) >= self._lookup.size:
+                ids = np.where((ids > 0) & (ids < self._lookup.size), ids, 0)
+            return np.asarray(self._lookup[ids])
         at = np.minimum(np.searchsorted(self._sorted, ids), self.ids.size - 1)
         return np.where(self._sorted[at] == ids, self._order[at], NO_NODE)
 
