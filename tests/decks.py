@@ -15,6 +15,16 @@ if TYPE_CHECKING:
 MAIN = "main.k"
 
 
+def wide(*fields: object, width: int = 10) -> str:
+    """A line of fields, each at the right of its columns."""
+    return "".join(f"{field:>{width}}" for field in fields) + "\n"
+
+
+def row(*ids: int, width: int = 8) -> str:
+    """A line of a mesh of LS-DYNA."""
+    return wide(*ids, width=width)
+
+
 def write(folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None, name: str = MAIN) -> str:
     """Path of the main deck, written with the files it includes."""
     for other, text in (files or {}).items():

@@ -123,33 +123,16 @@ class Entities(NamedTuple):
         return by_id or next((one for one in self.found if one.number == number and not one.id), None)
 
 
-def read_contacts(deck: Deck) -> Entities:
-    """List the contacts of a deck."""
-    return _read(deck, "CONTACT")
-
-
-def read_rigid_walls(deck: Deck) -> Entities:
-    """List the rigid walls of a deck."""
-    return _read(deck, "RIGIDWALL")
-
-
-def _read(deck: Deck, kind: str) -> Entities:
+def read_entities(deck: Deck, keyword: Literal["CONTACT", "RIGIDWALL"]) -> Entities:
+    """List the contacts, or the rigid walls, of a deck."""
     found: list[Entity] = []
     all_known = not deck.unread and not deck.encrypted
-    for keyword, number, title, rows, moved in _cards(deck, kind):
-        all_known = all_known and not moved and (number > 0 or rows <= _MOST_ROWS)
-        found.append(Entity(keyword, number, title, len(found) + 1))
-    return Entities(tuple(found), all_known)
-
-
-def _cards(deck: Deck, kind: str) -> Iterator[tuple[str, int, str, int, bool]]:
-    """Keyword, id, title, number of lines, and whether the ids are moved by an include, of each definition."""
-    for card in deck.named(kind):
-        words = card.name.split("_")
+    for card in deck.named(keyword):
+        words, number, title = card.name.split("_"), 0, ""
         if words[1:2] and words[1] in _NO_CONTACTS:
             continue
-        number, title = 0, ""
         if {"ID", "TITLE"} & {*words} and card.rows:
-            value = card.integer(card.rows[0], 0)
-            number, title = value.value, card.rows[0].text[card.width :].strip()
-        yield card.name, number, title, len(card.rows), card.transform.rest != 0
+            number, title = card.integer(card.rows[0], 0).value, card.rows[0].text[card.width :].strip()
+        all_known = all_known and not card.transform.rest and (number > 0 or len(card.rows) <= _MOST_ROWS)
+        found.append(Entity(card.name, number, title, len(found) + 1))
+    return Entities(tuple(found), all_known)

@@ -16,23 +16,18 @@ _IN_PLANE: Final = {BT: 1, QEPH: 1, QBAT: 4}
 
 # Radioss, Ishell of quadrilaterals (Altair's public help for /PROP/TYPE1).
 _ISHELL: Final = {
-    1: Formulation("BT (Ishell 1)", BT), 2: Formulation("BT (Ishell 2)", BT), 3: Formulation("BT (Ishell 3)", BT),
-    4: Formulation("BT (Ishell 4)", BT), 12: Formulation("QBAT", QBAT), 24: Formulation("QEPH", QEPH),
+    **{number: Formulation(f"BT (Ishell {number})", BT) for number in (1, 2, 3, 4)},
+    12: Formulation("QBAT", QBAT), 24: Formulation("QEPH", QEPH),
 }  # fmt: skip
 _ISH3N: Final = {
-    0: Formulation("C0 triangle", BT, measured=False), 1: Formulation("C0 triangle", BT, measured=False),
-    2: Formulation("C0 triangle", BT, measured=False), 30: Formulation("DKT18", QBAT, measured=False),
-    31: Formulation("DKT_S3", QEPH, measured=False),
+    **dict.fromkeys((0, 1, 2), Formulation("C0 triangle", BT, measured=False)),
+    30: Formulation("DKT18", QBAT, measured=False), 31: Formulation("DKT_S3", QEPH, measured=False),
 }  # fmt: skip
 # Solids were measured together: 24, 17 and 1 could not be told apart.
 _ISOLID: Final = {
-    1: "SOLID1",
-    2: "SOLID2",
+    **{number: f"SOLID{number}" for number in (1, 2, 12, 17, 18)},
     5: "HEPH5",
-    12: "SOLID12",
     14: "HA8",
-    17: "SOLID17",
-    18: "SOLID18",
     24: "HEPH",
 }
 _ISOLID_MEASURED: Final = {1, 17, 24}

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
-from d2rpick.deck.constraints import read_contacts, read_rigid_walls
+from d2rpick.deck.constraints import read_entities
 from d2rpick.deck.switching import BY_TIME
 from d2rpick.errors import listing
 from d2rpick.rules.base import ERROR, WARNING, Example, rule
@@ -30,6 +30,9 @@ def _pair(codes: tuple[int, int], signs: tuple[int, int] = (1, -1), back: int = 
 
 _OF_WALL: Final = {1, 3}
 _OF_CONTACT: Final = {2, 4}
+_ENTITIES: Final[tuple[tuple[set[int], str, Literal["CONTACT", "RIGIDWALL"]], ...]] = (
+    (_OF_CONTACT, "contact", "CONTACT"), (_OF_WALL, "rigid wall", "RIGIDWALL"),
+)  # fmt: skip
 _NEEDS_FORCE: Final = {3, 4}
 _ABLE: Final = ("SURFACE_TO_SURFACE", "NODES_TO_SURFACE", "NODE_TO_SURFACE")  # in the names of contacts that trigger
 _MOST_LISTED = 8
@@ -179,9 +182,9 @@ def _there(case: Case) -> Iterator[Objection]:
     the manual, not confirmed). Judged only when all of the deck could be read and it has parts. Source: vendor
     keyword data.
     """
-    for codes, what, read in ((_OF_CONTACT, "contact", read_contacts), (_OF_WALL, "rigid wall", read_rigid_walls)):
+    for codes, what, keyword in _ENTITIES:
         headers = [header for header in _by_force(case, codes) if header.entno.value]
-        entities = read(case.deck) if headers else None
+        entities = read_entities(case.deck, keyword) if headers else None
         if entities is None or not (entities.all_known and case.whole):
             continue
         for header in headers:
@@ -204,7 +207,7 @@ def _able(case: Case) -> Iterator[Objection]:
     drop tool, and the vendor's help on OFFSET, which names the same types; not tried with the solver.
     """
     headers = [header for header in _by_force(case, _OF_CONTACT) if header.entno.value]
-    entities = read_contacts(case.deck) if headers else None
+    entities = read_entities(case.deck, "CONTACT") if headers else None
     for header in headers:
         named = entities.named(header.entno.value) if entities else None
         if named and entities and not _triggers(named):

@@ -10,7 +10,8 @@ import pytest
 from d2rpick.choice.calibration import Observation, calibrate, observations_of, observations_of_runs
 from d2rpick.choice.cost import MEASURED
 from d2rpick.errors import ConfigurationError, DeckError, FormatError
-from tests.deck.test_radioss import BEGIN, PROPS, nodes, wide
+from tests.deck.test_radioss import BEGIN, PROPS, nodes
+from tests.decks import wide
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

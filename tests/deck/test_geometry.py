@@ -17,8 +17,7 @@ from d2rpick.deck.radioss_run import read_run
 from tests.computed import starter, stored
 from tests.deck import test_ls_dyna as dyna
 from tests.deck import test_radioss as rad
-from tests.deck.test_ls_dyna import row
-from tests.decks import read
+from tests.decks import read, row, wide
 
 RHO, E, NU = 8000.0, 2.0e11, 0.25
 SPEED = math.sqrt(E / RHO)
@@ -122,9 +121,9 @@ def test_where_elements_are_missing_no_part_is_placed() -> None:
     assert Placement(replace(plate(), complete=False)).parts == {}
 
 
-PART = f"/PART/1\na\n{rad.wide(1, 1)}/SHELL/1\n{rad.wide(1, 1, 2, 4, 6)}{rad.PROPS}"
+PART = f"/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 4, 6)}{rad.PROPS}"
 WATCHED = "/TH/NODE/7\nthree points\nDX        VX\n         2         0first\n        99         0no node\n         4\n"
-PLATE = "*ELEMENT_SHELL\n" + dyna.row(1, 7, 1, 2, 4, 3)
+PLATE = "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 3)
 
 
 def places(found: Inventory) -> list[list[float]]:
@@ -140,9 +139,9 @@ def test_nodes_of_a_time_history_are_watched(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("keyword", "ids"),
     [
-        ("", dyna.row(2, 99, 4, width=10)),
+        ("", row(2, 99, 4, width=10)),
         ("_ID", "         2first\n         4second\n"),
-        ("_SET", dyna.row(2, 4, width=10)),  # sets of nodes, not nodes
+        ("_SET", row(2, 4, width=10)),  # sets of nodes, not nodes
     ],
 )
 def test_nodes_of_nodout_are_watched(tmp_path: Path, keyword: str, ids: str) -> None:

@@ -9,7 +9,8 @@ import pytest
 from d2rpick.choice.deck_of_run import bodies_of
 from d2rpick.flight.bodies import RigidBody
 from tests.deck import test_radioss as rad
-from tests.deck.test_ls_dyna import inventory, nodes, row
+from tests.deck.test_ls_dyna import inventory, nodes
+from tests.decks import row, wide
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,10 +24,6 @@ MESH = (
     + "*NODE\n" + nodes()
     + "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 3) + row(2, 9, 5, 6, 8, 7) + row(3, 11, 9, 10, 12, 11)
 )  # fmt: skip
-
-
-def wide(*ids: int) -> str:
-    return "".join(f"{one:10d}" for one in ids) + "\n"
 
 
 SET = "*SET_NODE_LIST\n" + wide(5) + wide(4, 5)
@@ -97,23 +94,23 @@ def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(tmp_path
 
 
 RADIOSS = "".join(
-    f"/PART/{n}\np{n}\n{rad.wide(1, 1)}/SHELL/{n}\n{rad.wide(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2, 3)
+    f"/PART/{n}\np{n}\n{wide(1, 1)}/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2, 3)
 )
 
 
 @pytest.mark.parametrize(
     ("group", "surface", "joined"),
     [
-        (f"/GRNOD/PART/5\ng\n{rad.wide(1)}", f"/SURF/PART/6\ns\n{rad.wide(2)}", {1: {2}, 2: {1}}),
-        (f"/GRNOD/NODE/5\ng\n{rad.wide(4, 3)}", f"/SURF/PART/EXT/6\ns\n{rad.wide(2)}", {1: {2}, 2: {1}}),
-        (f"/GRNOD/NODE/5\ng\n{rad.wide(4, 3)}", f"/SURF/PART/6\ns\n{rad.wide(2, 3)}", None),
-        (f"/GRNOD/BOX/5\ng\n{rad.wide(4)}", f"/SURF/PART/6\ns\n{rad.wide(2)}", None),
+        (f"/GRNOD/PART/5\ng\n{wide(1)}", f"/SURF/PART/6\ns\n{wide(2)}", {1: {2}, 2: {1}}),
+        (f"/GRNOD/NODE/5\ng\n{wide(4, 3)}", f"/SURF/PART/EXT/6\ns\n{wide(2)}", {1: {2}, 2: {1}}),
+        (f"/GRNOD/NODE/5\ng\n{wide(4, 3)}", f"/SURF/PART/6\ns\n{wide(2, 3)}", None),
+        (f"/GRNOD/BOX/5\ng\n{wide(4)}", f"/SURF/PART/6\ns\n{wide(2)}", None),
     ],
 )  # fmt: skip
 def test_tied_interfaces_of_radioss(
     tmp_path: Path, group: str, surface: str, joined: dict[int, set[int]] | None
 ) -> None:
-    tie = f"/INTER/TYPE2/1\ntie\n{rad.wide(5, 6)}"
+    tie = f"/INTER/TYPE2/1\ntie\n{wide(5, 6)}"
     read = rad.inventory(tmp_path, rad.nodes(12) + RADIOSS + rad.PROPS + group + surface + tie)
     assert len(read.ties) == (0 if joined else 1)
     assert {part: {*others} for part, others in read.joined.items()} == (joined or {})
@@ -122,7 +119,7 @@ def test_tied_interfaces_of_radioss(
 
 @pytest.mark.parametrize("keyword", ["RBE2", "RBE3", "RLINK", "MPC"])
 def test_other_ties_of_radioss_leave_the_bodies_open(tmp_path: Path, keyword: str) -> None:
-    tie = f"/{keyword}/1\ntie\n{rad.wide(4, 0, 0, 5)}"
+    tie = f"/{keyword}/1\ntie\n{wide(4, 0, 0, 5)}"
     read = rad.inventory(tmp_path, rad.nodes(12) + RADIOSS + rad.PROPS + tie)
     assert [one.split()[0] for one in read.ties] == [f"/{keyword}/1"]
     assert bodies_of(read, [1, 2]) == ()

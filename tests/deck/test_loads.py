@@ -17,6 +17,7 @@ from d2rpick.deck.pieces import supports_of
 from d2rpick.histories.opening import open_run
 from d2rpick.histories.run import Run
 from tests import made_car
+from tests.decks import wide
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,16 +28,12 @@ if TYPE_CHECKING:
 BODY, WHEEL, OTHER = set(made_car.BODY), {7, 8}, {7, 9}  # both wheels have hubs of one part
 
 
-def row(*numbers: object, width: int = 10) -> str:
-    return "".join(f"{number:>{width}}" for number in numbers) + "\n"
-
-
 def group(number: int, *nodes: int) -> str:
-    return f"/GRNOD/NODE/{number}\nnodes\n{row(*nodes)}"
+    return f"/GRNOD/NODE/{number}\nnodes\n{wide(*nodes)}"
 
 
 def bcs(code: str, group: int, skew: int = 0) -> str:
-    return f"/BCS/1\nheld\n   {code}{row(skew, group)}"
+    return f"/BCS/1\nheld\n   {code}{wide(skew, group)}"
 
 
 def radioss(folder: Path, more: str) -> Inventory:
@@ -62,10 +59,10 @@ def held(inventory: Inventory) -> tuple[set[int], bool]:
         (group(1, 22) + bcs("111 111", 1), (WHEEL, True)),
         (group(1, *range(31, 37)) + bcs("111 111", 1), (OTHER, False)),  # fixed all over: an obstacle
         (group(1, *range(31, 37)) + bcs("110 111", 1), (set(), False)),  # no motion there, free along z
-        ("/GRNOD/PART/1\nparts\n" + row(9) + bcs("111 000", 1), (OTHER, True)),
-        (group(1, 1) + "/IMPVEL/1\nmoved\n" + row(1, "Y", 0, 0, 1), (BODY, True)),
-        ("/IMPDISP/FGEO/1\nmoved\n" + row(1, 0) + row(1.0, width=20) + row(21, 1.0) + row(22, 1.0), (WHEEL, True)),
-        (group(1, 99) + bcs("111 000", 1) + group(2, 1, 2) + "/RBODY/1\nbody\n" + row(99, 0, 0, 0, "", 0, 2),
+        ("/GRNOD/PART/1\nparts\n" + wide(9) + bcs("111 000", 1), (OTHER, True)),
+        (group(1, 1) + "/IMPVEL/1\nmoved\n" + wide(1, "Y", 0, 0, 1), (BODY, True)),
+        ("/IMPDISP/FGEO/1\nmoved\n" + wide(1, 0) + wide(1.0, width=20) + wide(21, 1.0) + wide(22, 1.0), (WHEEL, True)),
+        (group(1, 99) + bcs("111 000", 1) + group(2, 1, 2) + "/RBODY/1\nbody\n" + wide(99, 0, 0, 0, "", 0, 2),
          (BODY, True)),
     ],
 )  # fmt: skip
@@ -92,7 +89,7 @@ def test_a_symmetry_plane_holds_nothing(tmp_path: Path, nodes: tuple[int, ...], 
 
 def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sensor_is_asked(tmp_path: Path) -> None:
     for sensor, times in ((0, (0.01, 0.05)), (4, (0.0, inf))):
-        moved = "/IMPVEL/1\nmoved\n" + row(1, "X", 0, sensor, 1) + row(0, 1, 0.01, 0.05, width=20)
+        moved = "/IMPVEL/1\nmoved\n" + wide(1, "X", 0, sensor, 1) + wide(0, 1, 0.01, 0.05, width=20)
         (one,) = radioss(tmp_path, group(1, 1) + moved).boundary.holds
         assert (one.start, one.end) == times
     assert "/IMPVEL/1" in one.name
@@ -102,18 +99,19 @@ def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sens
 @pytest.mark.parametrize(
     ("more", "expected"),
     [
-        ("*BOUNDARY_SPC_NODE\n" + row(1, 0, 1, 1, 1), BODY),
-        ("*BOUNDARY_SPC_NODE\n" + row(1, 0, 0, 0, 0), set()),
-        ("*BOUNDARY_SPC_SET_ID\n" + row(5) + row(4, 0, 1, 1, 1) + "*SET_NODE_LIST\n" + row(4) + row(21, 22), WHEEL),
-        ("*BOUNDARY_SPC_SYMMETRY_PLANE\n" + row(1), set()),
-        ("*CONSTRAINED_GLOBAL\n" + row(7, 7, 2, 0.0, 1.6, 0.0), BODY),
-        ("*CONSTRAINED_GLOBAL\n" + row(2, 0, 2, 0.0, 1.6, 0.0), set()),  # a symmetry plane
-        ("*NODE\n" + f"{99:8d}" + row(0, 0, 0, width=16).rstrip() + row(7, 7, width=8) + "*CONSTRAINED_SPOTWELD\n"
-         + row(99, 1), BODY),
-        ("*PART\ntool\n" + row(10, 1, 2) + "*MAT_RIGID\n" + row(2, 7800.0, 2.1e11, 0.3) + row(1.0, 7, 7)
-         + "*ELEMENT_SHELL\n" + row(99, 10, 1, 2, 6, 5, width=8), BODY | {10}),
-        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n" + row(9, 1, 2, 1, 1.0), OTHER),
-        ("*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + row(1, 9, 2, 1, 1.0) + row(1, 1) + row(21, 1, 2, 1, 1.0), BODY | WHEEL),
+        ("*BOUNDARY_SPC_NODE\n" + wide(1, 0, 1, 1, 1), BODY),
+        ("*BOUNDARY_SPC_NODE\n" + wide(1, 0, 0, 0, 0), set()),
+        ("*BOUNDARY_SPC_SET_ID\n" + wide(5) + wide(4, 0, 1, 1, 1) + "*SET_NODE_LIST\n" + wide(4) + wide(21, 22), WHEEL),
+        ("*BOUNDARY_SPC_SYMMETRY_PLANE\n" + wide(1), set()),
+        ("*CONSTRAINED_GLOBAL\n" + wide(7, 7, 2, 0.0, 1.6, 0.0), BODY),
+        ("*CONSTRAINED_GLOBAL\n" + wide(2, 0, 2, 0.0, 1.6, 0.0), set()),  # a symmetry plane
+        ("*NODE\n" + f"{99:8d}" + wide(0, 0, 0, width=16).rstrip() + wide(7, 7, width=8) + "*CONSTRAINED_SPOTWELD\n"
+         + wide(99, 1), BODY),
+        ("*PART\ntool\n" + wide(10, 1, 2) + "*MAT_RIGID\n" + wide(2, 7800.0, 2.1e11, 0.3) + wide(1.0, 7, 7)
+         + "*ELEMENT_SHELL\n" + wide(99, 10, 1, 2, 6, 5, width=8), BODY | {10}),
+        ("*BOUNDARY_PRESCRIBED_MOTION_RIGID\n" + wide(9, 1, 2, 1, 1.0), OTHER),
+        ("*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + wide(1, 9, 2, 1, 1.0) + wide(1, 1) + wide(21, 1, 2, 1, 1.0),
+         BODY | WHEEL),
     ],
 )  # fmt: skip
 def test_supports_of_ls_dyna(tmp_path: Path, more: str, expected: set[int]) -> None:
@@ -121,17 +119,17 @@ def test_supports_of_ls_dyna(tmp_path: Path, more: str, expected: set[int]) -> N
 
 
 def test_birth_and_death(tmp_path: Path) -> None:
-    motion = "*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + row(1, 1, 2, 1, 1.0, 0, 0.05, 0.01)
-    spc = "*BOUNDARY_SPC_NODE_BIRTH_DEATH\n" + row(1, 0, 1, 1, 1) + row(0.0, 0.02)
+    motion = "*BOUNDARY_PRESCRIBED_MOTION_NODE\n" + wide(1, 1, 2, 1, 1.0, 0, 0.05, 0.01)
+    spc = "*BOUNDARY_SPC_NODE_BIRTH_DEATH\n" + wide(1, 0, 1, 1, 1) + wide(0.0, 0.02)
     found = ls_dyna(tmp_path, motion + spc).boundary.holds
     assert {(one.start, one.end) for one in found} == {(0.01, 0.05), (0.0, 0.02)}
 
 
 def test_what_is_not_followed_is_told(tmp_path: Path) -> None:
-    found = radioss(tmp_path, "/GRNOD/BOX/1\nnodes\n" + row(1) + bcs("111 000", 1)).boundary
+    found = radioss(tmp_path, "/GRNOD/BOX/1\nnodes\n" + wide(1) + bcs("111 000", 1)).boundary
     assert not found.holds
     assert "/BCS/1" in found.notes[0]
-    found = ls_dyna(tmp_path, "*BOUNDARY_SPC_SET\n" + row(77, 0, 1, 1, 1) + "*LOAD_BODY_RX\n" + row(1, 1.0)).boundary
+    found = ls_dyna(tmp_path, "*BOUNDARY_SPC_SET\n" + wide(77, 0, 1, 1, 1) + "*LOAD_BODY_RX\n" + wide(1, 1.0)).boundary
     assert [note.split(" ")[0] for note in found.notes] == ["*BOUNDARY_SPC_SET", "*LOAD_BODY_RX"]
     assert found.gravity is None
     (tmp_path / "MADE_0001.rad").write_text("/RUN/MADE/1\n0.1\n/BCSR/TRA/X/1\n1\n")
@@ -141,7 +139,7 @@ def test_what_is_not_followed_is_told(tmp_path: Path) -> None:
 
 
 def grav(function: int, scale: float, *, sensor: int = 0, group: int = 0, axis: str = "Z") -> str:
-    return f"/GRAV/2\nmore\n{row(function, axis, 0, sensor, group or '')[:-1]:80}{scale:20g}\n"
+    return f"/GRAV/2\nmore\n{wide(function, axis, 0, sensor, group or '')[:-1]:80}{scale:20g}\n"
 
 
 def told(inventory: Inventory) -> Surroundings:
@@ -149,7 +147,7 @@ def told(inventory: Inventory) -> Surroundings:
     return in_deck(Run((), ()), inventory).surroundings
 
 
-RAMP = "/FUNCT/1\nramp\n" + "".join(row(*point, width=20) for point in ((0, 0), (1, 0), (2, 1), (3, 1)))
+RAMP = "/FUNCT/1\nramp\n" + "".join(wide(*point, width=20) for point in ((0, 0), (1, 0), (2, 1), (3, 1)))
 
 
 @pytest.mark.parametrize(
@@ -173,7 +171,7 @@ def test_gravity_by_part(
     [
         (RAMP + grav(1, -1.62), (0.0, 1.62)),
         (grav(0, -1.62, sensor=3), (0.0, 1.62)),
-        (RAMP.replace(row(1, 0, width=20), "").replace(row(3, 1, width=20), "") + grav(1, 1.0), None),
+        (RAMP.replace(wide(1, 0, width=20), "").replace(wide(3, 1, width=20), "") + grav(1, 1.0), None),
         ("", (0.0,)),
     ],
 )
@@ -196,8 +194,8 @@ def test_gravity_on_a_group_of_nodes_is_that_of_the_parts_that_lie_in_it(tmp_pat
     ("cards", "expected"),
     [
         ("", (9.81,)),
-        ("*SET_PART_LIST\n" + row(5) + row(1, 2) + "*LOAD_BODY_PARTS\n" + row(5), (0.0,)),
-        ("*LOAD_BODY_VECTOR\n" + row(1, 1.0), None),
+        ("*SET_PART_LIST\n" + wide(5) + wide(1, 2) + "*LOAD_BODY_PARTS\n" + wide(5), (0.0,)),
+        ("*LOAD_BODY_VECTOR\n" + wide(1, 1.0), None),
     ],
 )
 def test_body_loads_of_ls_dyna(tmp_path: Path, cards: str, expected: tuple[float, ...] | None) -> None:

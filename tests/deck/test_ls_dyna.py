@@ -13,7 +13,7 @@ from d2rpick.deck import ls_dyna, read_inventory
 from d2rpick.deck.pieces import pieces_of
 from d2rpick.deck.reader import read_deck
 from d2rpick.errors import DeckError
-from tests.decks import read, write
+from tests.decks import read, row, write
 from tests.sample_deck import DECK, FLYING, deck, radioss
 
 if TYPE_CHECKING:
@@ -31,10 +31,6 @@ def nodes(width: int = 8, real: int = 16, count: int = 24) -> str:
     return "".join(
         f"{n:{width}d}" + "".join(f"{float(x):{real}.4f}" for x in place) + "\n" for n, place in enumerate(places, 1)
     )
-
-
-def row(*ids: int, width: int = 8) -> str:
-    return "".join(f"{one:{width}d}" for one in ids) + "\n"
 
 
 def inventory(folder: Path, text: str, **files: str) -> Inventory:

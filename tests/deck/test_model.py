@@ -12,8 +12,9 @@ from d2rpick.deck.pieces import pieces_of
 from d2rpick.flight.bodies import RigidBody
 from tests import made_car
 from tests.deck import test_radioss as rad
-from tests.deck.test_joints import MESH, wide
-from tests.deck.test_ls_dyna import inventory, row
+from tests.deck.test_joints import MESH
+from tests.deck.test_ls_dyna import inventory
+from tests.decks import row, wide
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,12 +22,12 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
 
 # Part 1 is a row of shells on the nodes 1 to 40, parts 2 and 3 are one shell each: 41 to 44, 45 to 48.
-ROW = "".join(rad.wide(n, 2 * n - 1, 2 * n, 2 * n + 2, 2 * n + 1) for n in range(1, 20))
+ROW = "".join(wide(n, 2 * n - 1, 2 * n, 2 * n + 2, 2 * n + 1) for n in range(1, 20))
 RADIOSS = (
-    "".join(f"/PART/{n}\np{n}\n{rad.wide(1, 1)}" for n in (1, 2, 3))
-    + f"/SHELL/1\n{ROW}/SHELL/2\n{rad.wide(31, 41, 42, 44, 43)}/SHELL/3\n{rad.wide(32, 45, 46, 48, 47)}"
+    "".join(f"/PART/{n}\np{n}\n{wide(1, 1)}" for n in (1, 2, 3))
+    + f"/SHELL/1\n{ROW}/SHELL/2\n{wide(31, 41, 42, 44, 43)}/SHELL/3\n{wide(32, 45, 46, 48, 47)}"
 )
-SPRING = f"/PART/9\nmount\n{rad.wide(2, 1)}/SPRING/9\n"
+SPRING = f"/PART/9\nmount\n{wide(2, 1)}/SPRING/9\n"
 # The same for the three shells of LS-DYNA, on the nodes 1 to 12.
 DISCRETE = f"*PART\nmount\n{wide(15, 2)}*SECTION_DISCRETE\n{wide(2)}\n\n*ELEMENT_DISCRETE\n"
 
@@ -38,7 +39,7 @@ def radioss(folder: Path, *more: str, engine: str = "") -> Inventory:
 
 
 def body(number: int, *nodes: int) -> str:
-    group = "".join(rad.wide(*nodes[at : at + 10]) for at in range(0, len(nodes), 10))
+    group = "".join(wide(*nodes[at : at + 10]) for at in range(0, len(nodes), 10))
     line = f"{48 + number:10d}{0:10d}{0:10d}{0:10d}{'0':>20}{number:10d}\n"
     return f"/RBODY/{number}\nrb\n{line}/GRNOD/NODE/{number}\ng\n{group}"
 
@@ -52,7 +53,7 @@ def test_a_small_part_beside_a_big_one_is_a_body_of_its_own(tmp_path: Path) -> N
 
 
 def test_springs_hold_parts_in_one_body_and_go_with_it(tmp_path: Path) -> None:
-    found = radioss(tmp_path, SPRING, rad.wide(91, 40, 41))
+    found = radioss(tmp_path, SPRING, wide(91, 40, 41))
     assert found.bodies([1, 2, 3]) == ((1, 2), (3,))
     assert found.bodies([1, 2, 3, 9]) == ((1, 2, 9), (3,))
     assert found.bodies([2, 3]) == ((2,), (3,))
@@ -77,7 +78,7 @@ def test_a_rigid_body_that_is_there_to_be_switched_says_which_parts_become_one(t
 
 
 def test_parts_on_springs_stay_apart_where_the_deck_has_a_body_for_each(tmp_path: Path) -> None:
-    spring = SPRING + rad.wide(91, 40, 41)
+    spring = SPRING + wide(91, 40, 41)
     found = radioss(tmp_path, spring, body(1, *FIRST), body(2, *SECOND), engine="/RBODY/OFF\n49 50\n")
     assert found.bodies([1, 2]) == ((1,), (2,))
     alone = radioss(tmp_path, spring, body(1, *FIRST), engine="/RBODY/OFF\n49\n")

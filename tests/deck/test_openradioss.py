@@ -17,6 +17,7 @@ from d2rpick.deck.printing import cards
 from d2rpick.deck.writing import write_deck
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.rules import check_deck
+from tests.decks import wide
 
 MAIN, END = 99, 0.02
 ENGINE = f"""\
@@ -36,26 +37,24 @@ ENGINE = f"""\
 """
 
 
-def row(*values: float | str, width: int = 10) -> str:
-    return "".join(f"{value:>{width}}" for value in values) + "\n"
+WIDE = 20  # columns of a real number
 
 
 def starter() -> str:
     """A strip of four shells, one end of which is given a velocity; SI units."""
-    wide = 20
     nodes = [(2 * i + j + 1, 0.1 * i, 0.1 * j) for i in range(5) for j in range(2)]
-    text = f"#RADIOSS STARTER\n/BEGIN\nstrip\n{row(2022, 0)}" + 2 * row("kg", "m", "s", width=wide)
-    text += f"/TITLE\nstrip of shells\n/MAT/ELAST/1\nsteel\n{row(7850.0, width=wide)}{row(2.1e11, 0.3, width=wide)}"
-    text += f"/PROP/SHELL/1\nshell\n{row(24, 0, 0, 0)}{row(*5 * [0.0], width=wide)}"
-    text += f"{row(3, 0)[:-1]}{row(0.002, 0.0, width=wide)[:-1]}{'':10}{row(1, 1)}"
-    text += f"/PART/1\nstrip\n{row(1, 1)}/NODE\n"
-    text += "".join(row(node)[:-1] + row(x, y, 0.0, width=wide) for node, x, y in nodes)
-    text += row(MAIN)[:-1] + row(0.2, 0.05, 0.01, width=wide)
-    text += "/SHELL/1\n" + "".join(row(i + 1, 2 * i + 1, 2 * i + 3, 2 * i + 4, 2 * i + 2) for i in range(4))
-    text += f"/GRNOD/NODE/1\nstrip\n{row(*(node for node, _, _ in nodes))}/GRNOD/NODE/2\nend\n{row(1, 2)}"
-    text += f"/RBODY/1\nstrip\n{row(MAIN, 0, 0, 0)[:-1]}{row(0.0, width=wide)[:-1]}{row(1, 0, 0, 0)}"
-    text += 2 * row(0.0, 0.0, 0.0, width=wide) + row(0, 0, 0)
-    return text + f"/TH/PART/1\nparts\nDEF       MASS\n{row(1)}/END\n"
+    text = f"#RADIOSS STARTER\n/BEGIN\nstrip\n{wide(2022, 0)}" + 2 * wide("kg", "m", "s", width=WIDE)
+    text += f"/TITLE\nstrip of shells\n/MAT/ELAST/1\nsteel\n{wide(7850.0, width=WIDE)}{wide(2.1e11, 0.3, width=WIDE)}"
+    text += f"/PROP/SHELL/1\nshell\n{wide(24, 0, 0, 0)}{wide(*5 * [0.0], width=WIDE)}"
+    text += f"{wide(3, 0)[:-1]}{wide(0.002, 0.0, width=WIDE)[:-1]}{'':10}{wide(1, 1)}"
+    text += f"/PART/1\nstrip\n{wide(1, 1)}/NODE\n"
+    text += "".join(wide(node)[:-1] + wide(x, y, 0.0, width=WIDE) for node, x, y in nodes)
+    text += wide(MAIN)[:-1] + wide(0.2, 0.05, 0.01, width=WIDE)
+    text += "/SHELL/1\n" + "".join(wide(i + 1, 2 * i + 1, 2 * i + 3, 2 * i + 4, 2 * i + 2) for i in range(4))
+    text += f"/GRNOD/NODE/1\nstrip\n{wide(*(node for node, _, _ in nodes))}/GRNOD/NODE/2\nend\n{wide(1, 2)}"
+    text += f"/RBODY/1\nstrip\n{wide(MAIN, 0, 0, 0)[:-1]}{wide(0.0, width=WIDE)[:-1]}{wide(1, 0, 0, 0)}"
+    text += 2 * wide(0.0, 0.0, 0.0, width=WIDE) + wide(0, 0, 0)
+    return text + f"/TH/PART/1\nparts\nDEF       MASS\n{wide(1)}/END\n"
 
 
 def solve(folder: Path, name: str) -> None:

@@ -11,7 +11,8 @@ from d2rpick.deck import radioss, read_inventory
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.rules import check_deck
 from tests.computed import starter, stored
-from tests.deck.test_ls_dyna import counted, row
+from tests.deck.test_ls_dyna import counted
+from tests.decks import wide
 
 if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
@@ -25,10 +26,6 @@ PROPS = (
     + "         0" * 5
     + "         2\n"
 )
-
-
-def wide(*ids: int) -> str:
-    return row(*ids, width=10)
 
 
 def inventory(folder: Path, text: str) -> Inventory:

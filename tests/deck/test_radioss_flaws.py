@@ -12,15 +12,16 @@ import pytest
 from d2rpick.deck import read_inventory
 from d2rpick.deck.radioss_flaws import flaws_of
 from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw, read_run
-from tests.deck.test_openradioss import MAIN, row, starter
+from tests.deck.test_openradioss import MAIN, starter
+from tests.decks import wide
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 WIDE = 20
 OFF, ON = f"/RBODY/OFF\n{MAIN}\n", f"/RBODY/ON\n{MAIN}\n"
-ALL = f"/GRNOD/NODE/7\nall\n{row(*range(1, 11))}{row(MAIN)}"
-SENSOR = f"/SENSOR/TIME/5\nclock\n{row(0.001, 0.002, width=WIDE)}"
+ALL = f"/GRNOD/NODE/7\nall\n{wide(*range(1, 11))}{wide(MAIN)}"
+SENSOR = f"/SENSOR/TIME/5\nclock\n{wide(0.001, 0.002, width=WIDE)}"
 
 
 def flaws(folder: Path, more: str = "", *legs: str, deck: str = "") -> tuple[Flaw, ...]:
@@ -36,8 +37,10 @@ def codes(found: tuple[Flaw, ...]) -> list[str]:
 
 
 def wall(kind: str, reach: float, *points: tuple[float, ...], diameter: float = 0.0, fields: str = "") -> str:
-    sizes = row(reach, 0.0, diameter, 0.0, width=WIDE)[:-1] + row(0)
-    return f"/RWALL/{kind}\nwall\n{fields or row(0, 0, 0, 0)}{sizes}" + "".join(row(*one, width=WIDE) for one in points)
+    sizes = wide(reach, 0.0, diameter, 0.0, width=WIDE)[:-1] + wide(0)
+    return f"/RWALL/{kind}\nwall\n{fields or wide(0, 0, 0, 0)}{sizes}" + "".join(
+        wide(*one, width=WIDE) for one in points
+    )
 
 
 @pytest.mark.parametrize(
@@ -45,16 +48,16 @@ def wall(kind: str, reach: float, *points: tuple[float, ...], diameter: float = 
     [
         (wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
         (wall("PLANE/1", 0.15, (0.35, 0, 0), (0, 0, 0)), 4),
-        (wall("PLANE/1", 0.05, (0, 0, 0), (0, 1, 0), fields=row(0, 0, 0, 2)), 4),
+        (wall("PLANE/1", 0.05, (0, 0, 0), (0, 1, 0), fields=wide(0, 0, 0, 2)), 4),
         (wall("CYL/1", 0.15, (0.2, 0.05, 0), (0.2, 0.05, 1), diameter=0.05), 6),
         (wall("CYL/1", 0.1, (-0.1, 0, 0), (1, 0, 0), diameter=0.02), 5),
         (wall("SPHER/1", 0.2, (0, 0, 0), diameter=0.1), 5),
         (wall("PARAL/1", 0.1, (0.15, 0, -1), (0.15, 1, -1), (0.15, 0, 1)), 2),
-        (wall("PARAL/1", 0.1, (0.15, 0, -1), (0.15, 0, 1), (0.15, 1, -1), fields=row(0, 0, 2, 0)), 4),
-        (wall("PLANE/1", 0.25, (1, 0, 0, 0), (1, 0.05, 0.01), fields=row(MAIN, 0, 0, 0)), 6),
+        (wall("PARAL/1", 0.1, (0.15, 0, -1), (0.15, 0, 1), (0.15, 1, -1), fields=wide(0, 0, 2, 0)), 4),
+        (wall("PLANE/1", 0.25, (1, 0, 0, 0), (1, 0.05, 0.01), fields=wide(MAIN, 0, 0, 0)), 6),
         (wall("LAGMUL/PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
-        ("/GRNOD/PART/77\nall\n" + row(1) + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=row(0, 0, 77, 0)), 10),
-        (wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0), fields=row(0, 0, 0, 0, 1)), 4),  # Iform is none before 2026
+        ("/GRNOD/PART/77\nall\n" + wide(1) + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 77, 0)), 10),
+        (wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0), fields=wide(0, 0, 0, 0, 1)), 4),  # Iform is none before 2026
     ],
     ids=lambda text: text.split("\n", 1)[0] if isinstance(text, str) else "",
 )
@@ -69,11 +72,11 @@ GROUND = wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0))
 
 
 def with_ikrem(deck: str, value: int = 1) -> str:
-    return deck.replace(row(1, 0, 0, 0), row(1, value, 0, 0))
+    return deck.replace(wide(1, 0, 0, 0), wide(1, value, 0, 0))
 
 
 def test_a_wall_keeps_nodes_by_the_ikrem_of_the_body_and_of_that_with_the_highest_id(tmp_path: Path) -> None:
-    other = "/NODE\n" + row(98)[:-1] + row(0.2, 0.05, 0.05, width=WIDE) + "/RBODY/{}\nother\n" + row(98)
+    other = "/NODE\n" + wide(98)[:-1] + wide(0.2, 0.05, 0.05, width=WIDE) + "/RBODY/{}\nother\n" + wide(98)
     assert codes(flaws(tmp_path, GROUND)) == [THROUGH_WALL]
     assert flaws(tmp_path, GROUND, deck=with_ikrem(starter())) == ()
     higher, lower = other.format(2), other.format(2)
@@ -83,28 +86,28 @@ def test_a_wall_keeps_nodes_by_the_ikrem_of_the_body_and_of_that_with_the_highes
 
 
 def test_a_wall_keeps_the_nodes_of_a_body_with_a_sensor(tmp_path: Path) -> None:
-    deck = starter().replace(row(MAIN, 0, 0, 0)[:-1], row(MAIN, 5, 0, 0)[:-1])
+    deck = starter().replace(wide(MAIN, 0, 0, 0)[:-1], wide(MAIN, 5, 0, 0)[:-1])
     assert flaws(tmp_path, SENSOR + GROUND, deck=deck) == ()
 
 
 def test_a_wall_with_the_penalty_formulation_keeps_its_nodes(tmp_path: Path) -> None:
-    deck = starter().replace(row(2022, 0), row(2026, 0))
-    assert flaws(tmp_path, GROUND.replace(row(0, 0, 0, 0), row(0, 0, 0, 0, 1)), deck=deck) == ()
+    deck = starter().replace(wide(2022, 0), wide(2026, 0))
+    assert flaws(tmp_path, GROUND.replace(wide(0, 0, 0, 0), wide(0, 0, 0, 0, 1)), deck=deck) == ()
     assert codes(flaws(tmp_path, GROUND, deck=deck)) == [THROUGH_WALL]
 
 
 def velocity(group: int, kind: str = "TRA") -> str:
-    return f"/INIVEL/{kind}/1\nthrown\n{row(10.0, 0.0, 0.0, width=WIDE)[:-1]}{row(group, 0)}"
+    return f"/INIVEL/{kind}/1\nthrown\n{wide(10.0, 0.0, 0.0, width=WIDE)[:-1]}{wide(group, 0)}"
 
 
 def spin(group: int) -> str:
-    return f"/INIVEL/AXIS/1\nspin\n{row('Z', 0, group)}{row(10.0, 0.0, 0.0, 0.0, width=WIDE)}"
+    return f"/INIVEL/AXIS/1\nspin\n{wide('Z', 0, group)}{wide(10.0, 0.0, 0.0, 0.0, width=WIDE)}"
 
 
 LISTED = "/INIVEL/NODE/1\nlist\n" + "".join(
-    f"{row(node, 0)[:-1]}{row(10.0, 0.0, 0.0, width=WIDE)}\n" for node in range(1, 11)
+    f"{wide(node, 0)[:-1]}{wide(10.0, 0.0, 0.0, width=WIDE)}\n" for node in range(1, 11)
 )
-MAINS = f"/GRNOD/NODE/98\nmain\n{row(MAIN)}"
+MAINS = f"/GRNOD/NODE/98\nmain\n{wide(MAIN)}"
 
 
 @pytest.mark.parametrize(
@@ -121,10 +124,10 @@ def test_a_body_that_the_starter_lets_rest_is_found(tmp_path: Path, text: str, m
 
 
 def test_a_velocity_that_comes_later_or_is_none_lets_no_body_rest(tmp_path: Path) -> None:
-    assert flaws(tmp_path, velocity(1) + row(0.0005, width=WIDE)) == ()
-    assert flaws(tmp_path, velocity(1) + row("", "", 5)) == ()
+    assert flaws(tmp_path, velocity(1) + wide(0.0005, width=WIDE)) == ()
+    assert flaws(tmp_path, velocity(1) + wide("", "", 5)) == ()
     assert flaws(tmp_path, velocity(1).replace("10.0", " 0.0")) == ()
-    assert flaws(tmp_path, "/INIVEL/FVM/1\nfluid\n" + row(10.0, 0.0, 0.0, width=WIDE)) == ()
+    assert flaws(tmp_path, "/INIVEL/FVM/1\nfluid\n" + wide(10.0, 0.0, 0.0, width=WIDE)) == ()
 
 
 def start(*nodes: int, type_: int = 1) -> str:
@@ -157,16 +160,16 @@ def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(tmp_path: Pa
 @pytest.mark.parametrize(
     ("text", "legs"),
     [
-        ("/GRNOD/BOX/8\nbox\n" + row(1) + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=row(0, 0, 8, 0)), ()),
-        (GROUND.replace(row(0, 0, 0, 0), row(0, 0, 0, 8)), ()),
+        ("/GRNOD/BOX/8\nbox\n" + wide(1) + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 8, 0)), ()),
+        (GROUND.replace(wide(0, 0, 0, 0), wide(0, 0, 0, 8)), ()),
         ("/TRANSFORM/TRA/1\n" + GROUND, ()),
         (wall("CONE/1", 0.1, (0, 0, 0), (1, 0, 0)), ()),
         (wall("PLANE/1", 0.1, (0, 0, 0), (0, 0, 0)), ()),
-        (wall("PLANE/1", 0.1, (0, 0, 0), (1, 0, 0), fields=row(97, 0, 0, 0)), ()),
+        (wall("PLANE/1", 0.1, (0, 0, 0), (1, 0, 0), fields=wide(97, 0, 0, 0)), ()),
         (velocity(8), ()),
         ("", (ON + CAP + start(8, type_=2), OFF)),
         ("//SUBMODEL/1\nmoved\n" + velocity(1), ()),
-        (f"/PART/3\nfluid\n{row(1, 1)}/SPHCEL/3\n{row(1, 1)}/GRNOD/PART/8\nfluid\n{row(3)}{velocity(8)}", ()),
+        (f"/PART/3\nfluid\n{wide(1, 1)}/SPHCEL/3\n{wide(1, 1)}/GRNOD/PART/8\nfluid\n{wide(3)}{velocity(8)}", ()),
     ],
 )
 def test_what_cannot_be_resolved_is_said_and_not_judged(tmp_path: Path, text: str, legs: tuple[str, ...]) -> None:

@@ -10,7 +10,7 @@ from d2rpick.deck import read_parts
 from d2rpick.deck.ls_dyna import first_shared_nodes
 from d2rpick.deck.parts import element_cards
 from d2rpick.rules.examples import PARTS, automatic
-from tests.decks import read, spans, windows
+from tests.decks import read, spans, wide, windows
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -84,24 +84,20 @@ def test_a_set_of_unknown_members_stays_a_set(tmp_path: Path, cards: str) -> Non
     assert (window.unit.id, window.unit.kind) == (9, "part set")
 
 
-def line(*values: float | str) -> str:
-    return "".join(f"{value:>10}" for value in values) + "\n"
-
-
 PART_CARDS: dict[str, tuple[str, dict[int, str]]] = {
-    "pairs": ("*PART\na\n" + line(1, 1, 7) + "\n" + line(2, 1, "STEEL"), {1: "7", 2: "STEEL"}),
-    "contact": ("*PART_CONTACT\na\n" + line(1, 1, 7) + line(0.1) + "b\n" + line(2, 1, 8), {1: "7", 2: "8"}),
+    "pairs": ("*PART\na\n" + wide(1, 1, 7) + "\n" + wide(2, 1, "STEEL"), {1: "7", 2: "STEEL"}),
+    "contact": ("*PART_CONTACT\na\n" + wide(1, 1, 7) + wide(0.1) + "b\n" + wide(2, 1, 8), {1: "7", 2: "8"}),
     "inertia": (
-        "*PART_INERTIA\na\n" + line(1, 1, 7) + line(0, 0, 0, 1, 0) + line(1) + line(0) + "b\n" + line(2, 1, 8),
+        "*PART_INERTIA\na\n" + wide(1, 1, 7) + wide(0, 0, 0, 1, 0) + wide(1) + wide(0) + "b\n" + wide(2, 1, 8),
         {1: "7", 2: "8"},
     ),
     "inertia in local axes": (
-        "*PART_INERTIA\na\n" + line(1, 1, 7) + line(0, 0, 0, 1, 1) + line(1) + line(0) + line(9)
-        + "b\n" + line(2, 1, 8),
+        "*PART_INERTIA\na\n" + wide(1, 1, 7) + wide(0, 0, 0, 1, 1) + wide(1) + wide(0) + wide(9)
+        + "b\n" + wide(2, 1, 8),
         {1: "7", 2: "8"},
     ),
     "move is no part": ("*PART_MOVE\n10,0,0,0.0045\n", {}),
-    "composite": ("*PART_COMPOSITE\na\n" + line(5, 2) + line(7, 0.1), {5: ""}),
+    "composite": ("*PART_COMPOSITE\na\n" + wide(5, 2) + wide(7, 0.1), {5: ""}),
 }  # fmt: skip
 
 
@@ -113,8 +109,8 @@ def test_parts(tmp_path: Path, deck: str, expected: dict[int, str]) -> None:
 @pytest.mark.parametrize("name", ["*MAT_RIGID", "*MAT_020", "*mat_rigid_title"])
 def test_rigid_materials_move_with_their_include(tmp_path: Path, name: str) -> None:
     title = "steel\n" if "title" in name else ""
-    inner = f"{name}\n{title}{line(7)}*PART\na\n{line(1, 1, 7)}"
-    deck = "*INCLUDE_TRANSFORM\na.k\n" + line(0, 0, 100, 50) + line(0) + line(0)
+    inner = f"{name}\n{title}{wide(7)}*PART\na\n{wide(1, 1, 7)}"
+    deck = "*INCLUDE_TRANSFORM\na.k\n" + wide(0, 0, 100, 50) + wide(0) + wide(0)
     parts = read_parts(read(tmp_path, deck, {"a.k": inner}))
     assert parts.is_rigid(101)
     assert not parts.is_rigid(1)
