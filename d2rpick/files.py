@@ -106,10 +106,10 @@ class FileState(NamedTuple):
     @classmethod
     def of(cls, file: FileIO) -> FileState:
         """Look at a file as it is now."""
-        return cls.told(os.fstat(file.fileno()))
+        return cls.of_stat(os.fstat(file.fileno()))
 
     @classmethod
-    def told(cls, found: os.stat_result) -> FileState:
+    def of_stat(cls, found: os.stat_result) -> FileState:
         """Take from what the system tells just now."""
         now = time.time_ns()
         # Of the two times the modification can be set, to one in the future too, which would never be past.

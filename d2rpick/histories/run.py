@@ -248,7 +248,7 @@ class Run:
         if apart:
             notes = (*notes, _left_out(", ".join(apart)))
         energies = energies[:, ~left_out]
-        history = self._made(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
+        history = self._history_of(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
         return _with_terms(
             replace(history, springs=tuple(part for part, out in zip(chosen, left_out, strict=True) if out)),
             names,
@@ -284,7 +284,7 @@ class Run:
         channel = " + ".join(names)
         notes = quantity_note(channel)
         energy = columns[0] if len(columns) == 1 else np.sum(columns, axis=0)
-        history = self._made(database, database.time, energy, channel, names, notes, None)
+        history = self._history_of(database, database.time, energy, channel, names, notes, None)
         return history if len(columns) == 1 else _with_terms(history, names, np.stack(columns, axis=1))
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
@@ -299,7 +299,7 @@ class Run:
                 refusals.append(error)
         raise refusals[0]
 
-    def _made(
+    def _history_of(
         self, database: Legs, time: Samples, energy: Samples, channel: str, names: Sequence[str],
         notes: tuple[str, ...], parts: tuple[Part, ...] | None,
     ) -> History:  # fmt: skip

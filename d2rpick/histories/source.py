@@ -94,7 +94,7 @@ def _state(name: str) -> FileState | None:
         found = os.stat(name)  # noqa: PTH116  start-up
     except (OSError, ValueError):
         return None
-    return FileState.told(found) if stat.S_ISREG(found.st_mode) and name != STDIN else None
+    return FileState.of_stat(found) if stat.S_ISREG(found.st_mode) and name != STDIN else None
 
 
 def open_source(name: str) -> Source:

@@ -49,12 +49,12 @@ class _Curve:
 
 def find_curves(text: Text, selection: Selection) -> Curves | None:
     """Read a text of curves, those whose times are asked for first by the selection; None for any other text."""
-    found = _Found(text)
+    found = _CurveText(text)
     read = next((read for read in (_curveplot, _t_his, _dynaform, _counted) if read(found)), None)
     return Curves(found, selection) if read else None
 
 
-class _Found:
+class _CurveText:
     """What was found in a text: curves, the label of their x axis, and what it ends within of."""
 
     def __init__(self, text: Text) -> None:
@@ -111,7 +111,7 @@ class Curves(Database):
 
     format = "csv"
 
-    def __init__(self, found: _Found, selection: Selection) -> None:
+    def __init__(self, found: _CurveText, selection: Selection) -> None:
         self.source = found.source
         self.time_unit = unit_of(found.x_label)
         self._curves = _uniquely_named(found.curves)
@@ -189,7 +189,7 @@ class Curves(Database):
         return listing([f"{number} {name!r}" for number, name in enumerate(self.channels, 1)])
 
 
-def _curveplot(found: _Found) -> bool:
+def _curveplot(found: _CurveText) -> bool:
     word, *labels = [line.strip() for line in found.top(4)] or [""]
     if word != "Curveplot":
         return False
@@ -210,7 +210,7 @@ def _curveplot(found: _Found) -> bool:
     return True
 
 
-def _t_his(found: _Found) -> bool:
+def _t_his(found: _CurveText) -> bool:
     top = found.top(5)
     if len(top) < 5 or any(map(_is_pair, top[:4])) or not is_time(top[1].strip()) or not _is_pair(top[4]):
         return False
@@ -230,7 +230,7 @@ def _t_his(found: _Found) -> bool:
     return True
 
 
-def _dynaform(found: _Found) -> bool:
+def _dynaform(found: _CurveText) -> bool:
     top = found.top(2)
     if len(top) < 2 or not top[0].strip().isdecimal() or not re.fullmatch(_DYNAFORM, top[1]):
         return False
@@ -248,7 +248,7 @@ def _dynaform(found: _Found) -> bool:
     return True
 
 
-def _counted(found: _Found) -> bool:
+def _counted(found: _CurveText) -> bool:
     top = found.top(2)
     if len(top) < 2 or not top[0].strip().isdecimal() or not _is_pair(top[1]):
         return False

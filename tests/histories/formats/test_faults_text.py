@@ -72,16 +72,11 @@ def test_glstat(faults: list[Fault]) -> None:
     check_glstat(faults)
 
 
+@pytest.mark.parametrize("lines", MATSUM)
 @cases(100)
-@given(FAULTS)
-def test_matsum_with_four_lines(faults: list[Fault]) -> None:
-    check_matsum(faults, 4)
-
-
-@cases(100)
-@given(FAULTS)
-def test_matsum_with_three_lines(faults: list[Fault]) -> None:
-    check_matsum(faults, 3)
+@given(faults=FAULTS)
+def test_matsum(lines: int, faults: list[Fault]) -> None:
+    check_matsum(faults, lines)
 
 
 def test_many_blocks_that_all_differ_are_read() -> None:
