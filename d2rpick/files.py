@@ -131,16 +131,6 @@ def _slowness(changed: int, size: int) -> int:
     return _SLOWEST * size + (0 if changed % 1_000_000_000 else _COARSE)
 
 
-def is_endless(file: FileIO) -> bool:
-    """Whether a file is a device other than a terminal: /dev/zero and /dev/full never end."""
-    return stat.S_ISCHR(os.fstat(file.fileno()).st_mode) and not file.isatty()
-
-
-def is_regular(file: FileIO) -> bool:
-    """Whether a file can be read again, unlike a pipe or a terminal."""
-    return stat.S_ISREG(os.fstat(file.fileno()).st_mode)
-
-
 def settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
     """State of a file when no write is under way and a later one will show; None where it changes all the time.
 
@@ -155,6 +145,22 @@ def settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
         if now.is_as(found) or (may_grow and now.continues(found)):
             return found
     return None
+
+
+def at_rest(name: str, file: FileIO, error: type[D2RPickError], *, may_grow: bool = False) -> FileState | bytes:
+    """Give the `settled_state` of a file, or all bytes of a pipe or a terminal, which are read once.
+
+    An ``error`` is raised where it changes all the time, or is another device: /dev/zero and /dev/full never end.
+    """
+    mode = os.fstat(file.fileno()).st_mode
+    if stat.S_ISCHR(mode) and not file.isatty():
+        raise error(f"{name}: this is a device; a file, a pipe or a terminal was expected")
+    if not stat.S_ISREG(mode):
+        return file.read()
+    state = settled_state(file, may_grow=may_grow)
+    if state is None:
+        raise error(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+    return state
 
 
 def write_whole(path: Path, content: bytes) -> None:

@@ -6,6 +6,8 @@ import os
 from typing import TYPE_CHECKING
 
 from d2rpick.choice.of_run import read
+from d2rpick.errors import FormatError
+from d2rpick.files import at_rest
 from d2rpick.histories.content import OnDisk, Portions
 from d2rpick.histories.database import Legs
 from d2rpick.histories.opening import Run, Selection, open_run, open_sources
@@ -43,9 +45,12 @@ def read_history(names: Sequence[str], selection: Selection | None = None, input
     return read(names, selection or Selection(), input_format).history
 
 
-def on_disk(file: Path, portions: Portions = SMALL) -> OnDisk:
+def on_disk(file: Path, portions: Portions = SMALL, of: type[OnDisk] = OnDisk) -> OnDisk:
     """Content of a file that stays on its disk and is read in small pieces, however small it is itself."""
-    return OnDisk(str(file), os.open(file, os.O_RDONLY), portions)
+    with file.open("rb", buffering=0) as opened:
+        state = at_rest(str(file), opened, FormatError, may_grow=True)
+        assert not isinstance(state, bytes)
+        return of(str(file), os.dup(opened.fileno()), state, portions)
 
 
 def run_of_file(file: Path) -> Run:

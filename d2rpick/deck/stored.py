@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.errors import DeckError
-from d2rpick.files import FileState, is_endless, is_regular, settled_state
+from d2rpick.files import FileState, at_rest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -111,13 +111,9 @@ def stored(name: str) -> Held | OnDisk:
         If it cannot be opened, is a device, or changes all the time.
     """
     with _opened(name) as file:
-        if is_endless(file):
-            raise DeckError(f"{name}: this is a device, a readable deck was expected")
-        if not is_regular(file):
-            return Held(file.read())
-        state = settled_state(file)
-    if state is None:
-        raise DeckError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+        state = at_rest(name, file, DeckError)
+    if isinstance(state, bytes):
+        return Held(state)
     on_disk = OnDisk(name, state)
     return Held(on_disk.read(0, state.size)) if state.size <= _HELD else on_disk
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.errors import ChangedError, FormatError
-from d2rpick.files import FileState, is_endless, is_regular, settled_state
+from d2rpick.files import FileState, at_rest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,24 +87,18 @@ class OnDisk(Content):
         Name of the file, for messages.
     file : int
         Its descriptor, which is closed with this object.
+    state : FileState
+        Its state at rest.
     portions : Portions
-
-    Raises
-    ------
-    FormatError
-        If it changes all the time.
     """
 
-    def __init__(self, name: str, file: int, portions: Portions = _PORTIONS) -> None:
+    def __init__(self, name: str, file: int, state: FileState, portions: Portions = _PORTIONS) -> None:
         from threading import Lock, local  # not above: most files are small
 
         self._name, self._number = name, file
         self._block, self._gap, self._window = portions
         self._file = FileIO(file, closefd=False)
         self._lock, self._own = Lock(), local()  # of each thread: its buffer and its window
-        state = settled_state(self._file, may_grow=True)
-        if state is None:
-            raise FormatError(f"{name}: the file keeps changing while it is read; read it again when it is complete")
         self._state, self._size = state, state.size
         self._digest, self._ends = "", self._read_ends()
 
@@ -244,14 +238,13 @@ def stored(name: str) -> bytes | OnDisk:
     Raises
     ------
     FormatError
-        If a small file changes all the time, or it is a device.
+        If it changes all the time, or is a device.
     """
     with open(name, "rb", buffering=0) as file:  # noqa: PTH123
-        if is_endless(file):
-            raise FormatError(f"{name}: this is a device; a file, a pipe or a terminal was expected")
-        if not is_regular(file):
-            return file.read()
-        on_disk = OnDisk(name, os.dup(file.fileno()))
+        state = at_rest(name, file, FormatError, may_grow=True)
+        if isinstance(state, bytes):
+            return state
+        on_disk = OnDisk(name, os.dup(file.fileno()), state)
     return bytes(on_disk) if len(on_disk) <= _HELD else on_disk
 
 

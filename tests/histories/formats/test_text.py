@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING
 
 import pytest
@@ -73,7 +72,7 @@ def test_a_big_plain_text_is_not_taken_into_memory(tmp_path: Path) -> None:
 
     file = tmp_path / "text"
     file.write_bytes(b"time,IE\n" + b"0.125,17\n" * 50)
-    found = Text(Source("text", TooBig("text", os.open(file, os.O_RDONLY))), SMALL)
+    found = Text(Source("text", on_disk(file, content.Portions(), TooBig)), SMALL)
     assert [*found.lines(found.place(1))] == ["0.125,17"] * 50
 
 
