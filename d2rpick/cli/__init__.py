@@ -37,6 +37,12 @@ COMMANDS: Final = {
     "rollover": "Compute a box that trips or falls, flies and lands.",
     "reproduce": "Reproduce the published results.",
 }
+# Modules of those that stand in one of another name.
+_MODULES: Final = {
+    **dict.fromkeys(("suggest", "explore", "verify", "parts"), "one_run"),
+    **dict.fromkeys(("info", "extract"), "histories"),
+    "rule": "check",
+}
 COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
@@ -66,7 +72,7 @@ class _Group(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:
             return None
-        command: click.Command = importlib.import_module(f"d2rpick.cli.{name}").command
+        command: click.Command = getattr(importlib.import_module(f"d2rpick.cli.{_MODULES.get(name, name)}"), name)
         return command
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:

@@ -24,7 +24,7 @@ Examples:
 @options.command("calibrate", EXAMPLES)
 @click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=click_type("file"))
 @options.takes(*RESULT, forms=FORMATS["calibration"])
-def command(folders: tuple[str, ...], output: Output) -> None:
+def calibrate(folders: tuple[str, ...], output: Output) -> None:
     """Fit the cost of elements to what runs of a site took, for --weights.
 
     Each RUN is the folder of one run, with its deck and what its solver printed: listings of Radioss (NAME_0001.out,

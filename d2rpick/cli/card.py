@@ -46,7 +46,7 @@ _ONLY_JUDGED: Final = "--part chooses by whose energy a card for {} is judged; g
         "instead_of": (),
     },
 )
-def command(
+def card(
     tr: tuple[float, ...], td: tuple[float, ...], windows: str | None, request: Request, cards: Cards, output: Output
 ) -> None:
     """Print solver input for switching windows, ready to be pasted.

@@ -1,15 +1,15 @@
-"""The command ``check``."""
+"""The commands ``check`` and ``rule``."""
 
 from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from d2rpick.cli import options
-from d2rpick.cli.options import REFERENCE, RESULT
+from d2rpick.cli.options import FILES, REFERENCE, RESULT
 from d2rpick.cli.output import explained, in_words, tell
 from d2rpick.cli.values import click_type
 from d2rpick.errors import INTERNAL_ERROR, ConfigurationError, D2RPickError, DeckError
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.configuration import Configuration
     from d2rpick.rules.judgement import HistoryJudge
 
-EXAMPLES = """\b
+CHECK: Final = """\b
 Examples:
   d2rpick check sample_data/switching.k
   d2rpick check sample_data/switching.k --history sample_data/energy.glstat
@@ -33,7 +33,7 @@ Examples:
 """
 
 
-@options.command("check", EXAMPLES)
+@options.command("check", CHECK)
 @click.argument("deck", metavar="DECK...", nargs=-1, required=True, type=click_type("file"))
 @options.takes(*REFERENCE)
 @click.option(
@@ -46,7 +46,7 @@ Examples:
     help="Least severe finding that sets exit code 1.",
 )  # fmt: skip
 @options.takes(*RESULT, forms=FORMATS["findings"])
-def command(
+def check(
     deck: tuple[str, ...],
     select: tuple[str, ...],
     ignore: tuple[str, ...],
@@ -159,3 +159,23 @@ def _cautions(results: Sequence[Checked], judge: HistoryJudge | None) -> list[Ca
 
 def _ids(texts: Sequence[str]) -> tuple[str, ...]:
     return tuple(name.strip().upper() for text in texts for name in text.split(",") if name.strip())
+
+
+RULE: Final = """\b
+Examples:
+  d2rpick rule
+  d2rpick rule D2R105
+"""
+
+
+@options.command("rule", RULE)
+@click.argument("id", metavar="[ID]...", nargs=-1)
+@options.takes(*FILES)
+def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name is that of the argument in usage
+    """Explain a rule of `d2rpick check`, with decks that pass and fail; without ID, list all rules."""
+    from d2rpick.report import findings as report
+    from d2rpick.rules import find_rules
+
+    output = output.beside()
+    rules = [rule for name in id for rule in find_rules(name)]
+    output.result("\n\n\n".join(map(report.as_text, rules)) if rules else report.as_list())

@@ -60,7 +60,7 @@ Examples:
     deck=DECK_OF_PARTS,
     forms=[*FORMATS["plan"], "card"],
 )
-def command(
+def plan(
     min_rigid: float | None,
     every: bool,
     done: str | None,

@@ -75,7 +75,7 @@ _NEEDED: Final = {"required": True}
     *(Motion, "motion"), stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED
 )
 @options.takes("plot", *FILES, plot="Draw displacements and energies to FILE (png, svg, pdf).")
-def command(motion: Motion, output: Output) -> None:
+def replay(motion: Motion, output: Output) -> None:
     """Compute the floating oscillator in closed form, with or without switching.
 
     It starts from any displacements and velocities of both masses; what is not given is 0.  Columns: time,

@@ -60,7 +60,7 @@ PICTURES = ("svg", "png")
     + "; repeatable.",
 )
 @options.takes("report", *RESULT, report="Write all of it to one HTML page.", forms=FORMATS["reproduction"])
-def command(output_dir: str, section: Sequence[str], solver: Sequence[str], output: Output) -> None:
+def reproduce(output_dir: str, section: Sequence[str], solver: Sequence[str], output: Output) -> None:
     """Reproduce the published results as figures (svg, png) and tables (csv), section by section.
 
     Each figure stands with what the paper shows there, what is found here, and whether the two agree; the table puts

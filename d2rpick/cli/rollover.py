@@ -91,7 +91,7 @@ class Box:
     },
     plot="Draw the motion of the box, or the scan, to FILE (png, svg, pdf).",
 )
-def command(box: Box, output: Output) -> None:
+def rollover(box: Box, output: Output) -> None:
     """Compute a planar box that trips over the curb of a braking sled and rolls, or falls and bounces.  SI units.
 
     It is deformable throughout, or rigid from each tr to its td; the step that meets the curb stays deformable.

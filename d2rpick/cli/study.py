@@ -62,7 +62,7 @@ Examples:
     report="Write all of it to one HTML page to read, print and sign.",
     forms=FORMATS["study"],
 )
-def command(
+def study(
     run: tuple[str, ...],
     td: float | None,
     td_window: WINDOW,

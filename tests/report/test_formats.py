@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
 
+import click
 import pytest
 
+from d2rpick.cli import d2rpick
 from d2rpick.report.formats import FORMATS
 from tests.command import ENERGY, run
 
@@ -42,7 +43,10 @@ def test_every_form_is_written(result: str, form: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("result", FORMATS)
 def test_commands_offer_the_forms_of_their_result(result: str) -> None:
-    command = importlib.import_module(f"d2rpick.cli.{COMMANDS[result][0]}").command
-    (choice,) = (list(option.type.choices) for option in command.params if option.name == "output_format")
+    command = d2rpick.get_command(click.Context(d2rpick), COMMANDS[result][0])
+    assert command is not None
+    (kind,) = (option.type for option in command.params if option.name == "output_format")
+    assert isinstance(kind, click.Choice)
+    choice = list(kind.choices)
     assert [form for form in choice if form != "card"] == list(FORMATS[result])
     assert choice[0] == "table"

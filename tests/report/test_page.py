@@ -16,8 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.api.request import CHOOSING, READING
-from d2rpick.cli import suggest
+from d2rpick.api.request import OPTIONS
+from d2rpick.cli import one_run
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROOT, run
 from tests.computed import stored
 
@@ -255,13 +255,7 @@ def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_
         *("output_file", "overwrite", "quiet", "verbose", "show_settings", "debug"),
         *("solver", "merge", "swset", "step_cap", "node", "end", "name"),
     }
-    assert {str(option.name) for option in suggest.command.params} == {
-        *about_output,
-        *READING,
-        *CHOOSING,
-        "deck",
-        "weights",
-    }
+    assert {str(option.name) for option in one_run.suggest.params} == {*about_output, *OPTIONS}
 
 
 def test_a_time_that_no_card_can_hold_costs_the_card_only(tmp_path: Path) -> None:

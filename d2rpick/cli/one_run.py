@@ -1,0 +1,220 @@
+"""The commands ``suggest``, ``explore``, ``verify`` and ``parts``: one question about one run."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from d2rpick.api.request import LIMITS, READING, check_window, time_or_window
+from d2rpick.cli import options
+from d2rpick.cli.options import ANSWER, DECK, DECK_OF_PARTS, HISTORY, ONE_RUN, RESULT, WINDOW
+from d2rpick.cli.progress import opened, reading
+from d2rpick.errors import ArgumentError
+from d2rpick.report.formats import FORMATS
+
+if TYPE_CHECKING:
+    from d2rpick.api.cards import Cards
+    from d2rpick.api.choices import Suggestion
+    from d2rpick.api.request import Request
+    from d2rpick.cli.output import Output
+
+SUGGEST: Final = """\b
+Examples:
+  d2rpick suggest --part box sample_data/rolloverT01.gz
+  d2rpick suggest --td 0.064 sample_data/energy.csv
+  d2rpick suggest --td-window 0.06 0.07 sample_data/energy.csv
+  d2rpick suggest --td 0.37 --energy boxIE_J sample_data/rollover.csv
+  d2rpick suggest --td 0.064 -f json sample_data/energy.glstat
+  d2rpick suggest --td 0.37 --part box -f card --node 1001 sample_data/rolloverT01.gz
+  d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
+"""
+
+
+@options.command("suggest", SUGGEST)
+@options.time("--td", "Switch back to deformable at this time.", instead_of=("td_window",))
+@options.time("--td-window", "Choose the time to switch back within this window.", instead_of=("td",), pair=True)
+@options.LIMIT
+@options.takes(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=[*FORMATS["suggestion"], "card"])
+def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, cards: Cards, output: Output) -> None:
+    """Rank the times tr at which the parts of HISTORY can be made rigid until td, or choose both times.
+
+    Without --td both are chosen, in --td-window or in the longest flight.
+
+    A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
+    replaying the floating oscillator behind the record; the best one, and a better td, are named.
+    """
+    from d2rpick.api.asked import ask
+    from d2rpick.api.choices import suggested
+
+    wanted, card = time_or_window(td, td_window), output.output_format == "card"
+    if card and not (request.part or cards.node):
+        raise ArgumentError("-f card needs --part, the parts to switch (Radioss: --node, their main nodes)")
+    prints = output.prints(cards, request)
+    with opened(request, output) as (run, output):
+        asked = ask(run, request, prints=prints, merge=cards.merge)
+    answer = suggested(asked, wanted)
+    output.notes(asked.reference.history.notes, answer.cautions)
+    output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
+    if card:
+        return output.finish(objection=not _card(answer, cards, output), quality=answer.quality)
+    output.answer(answer, limit=limit)
+    return output.finish(objection=answer.recommended is None, quality=answer.quality)
+
+
+def _card(answer: Suggestion, cards: Cards, output: Output) -> bool:
+    """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
+    from d2rpick.api.cards import all_cautions, need_ids
+    from d2rpick.choice.judged_card import judged_card
+    from d2rpick.choice.of_run import judge_of
+
+    pair, situation = answer.recommended, answer.situation
+    if pair is None:
+        output.content(b"")
+        return False
+    request = cards.request(answer.question).by(situation.settings)
+    judge = partial(judge_of, answer.question.reference, situation)
+    found = judged_card([(pair.tr, pair.td)], situation.history, judge, request)
+    if found is None:
+        raise ArgumentError(need_ids(request, situation.history))
+    card, (verdict,) = found
+    said = set(answer.cautions)
+    output.notes(card.notes, [caution for caution in all_cautions(verdict) if caution not in said])
+    output.content(card.text.encode())
+    return verdict.verified
+
+
+EXPLORE: Final = """\b
+Examples:
+  d2rpick explore --td-window 0.06 0.07 sample_data/energy.csv
+  d2rpick explore --td 0.064 --td-window 0.06 0.07 sample_data/energy.csv
+  d2rpick explore --part box -f csv sample_data/rollover_box.matsum
+  d2rpick explore --part recommended --deck sample_data/rollover_box.k sample_data/rollover_box.matsum
+  d2rpick explore --part box --plot explore.png --report explore.html sample_data/rollover_box.matsum
+"""
+
+
+@options.command("explore", EXPLORE)
+@options.time("--td", "A time to switch back that others are compared with.")
+@options.time(
+    "--td-window", "Explore the times to switch back within this window.  [default: the longest flight]", pair=True
+)
+@click.option(
+    "--steps", type=click.IntRange(1, 100_000), default=200, show_default=True,
+    help="Number of evenly spaced td; peaks of the energy come on top.",
+)  # fmt: skip
+@click.option(
+    "--limit", type=click.IntRange(min=1), default=10, show_default=True,
+    help="Number of rows in the table, of the pairs that nothing beats; json and csv have all.",
+)  # fmt: skip
+@options.takes(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=FORMATS["trade_off"])
+def explore(
+    td: float | None, td_window: WINDOW, steps: int, limit: int, request: Request, cards: Cards, output: Output
+) -> None:
+    """Show what each time td to switch back costs: the best tr for it, its error, and what it saves.
+
+    A grid of td over --td-window or the longest flight, and every peak of the energy, each as `suggest --td` answers
+    it.  Named are those that no other beats in both error and rigid time, and the nearest td with half the error.
+    """
+    from d2rpick.api.asked import ask
+    from d2rpick.api.flights import explored
+
+    check_window("td_window", td_window)
+    prints = output.prints(cards, request)
+    with opened(request, output) as (run, output):
+        asked = ask(run, request, prints=prints, merge=cards.merge)
+    answer = explored(asked, td, td_window, steps)
+    output.notes(asked.reference.history.notes, answer.cautions)
+    output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
+    output.answer(answer, limit=limit)
+    chosen = answer.recommended
+    output.finish(objection=chosen is None, quality=chosen.quality if chosen else None)
+
+
+VERIFY: Final = """\b
+Examples:
+  d2rpick verify --tr 0.0135867 --td 0.0687534 sample_data/energy.csv
+  d2rpick verify --tr 0.1 --td 0.37 --energy boxIE_J -f json sample_data/rollover.csv
+  d2rpick verify --tr 0.0135867 --td 0.0687534 --report report.html sample_data/energy.csv
+"""
+
+
+class _Verify(options.Command):
+    """Lets ``--switched`` take all file names that follow it, as a shell's glob gives them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        spread: list[str] = []
+        taking = False
+        for arg in args:
+            option = arg.startswith("-") and arg != "-"
+            if taking and not option and spread[-1] != "--switched":
+                spread.append("--switched")
+            taking = arg == "--switched" if option else taking
+            spread.append(arg)
+        return super().parse_args(ctx, spread)
+
+
+@options.command("verify", VERIFY, _Verify)
+@options.time("--tr", "Switch to rigid at this time.", required=True)
+@options.time("--td", "Switch back to deformable at this time.", required=True)
+@options.files(
+    "--switched", "Compare a finished switched run with the reference; takes all names up to the next option.", "FILE"
+)
+@options.takes(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=FORMATS["verdict"])
+def verify(tr: float, td: float, switched: tuple[str, ...], request: Request, cards: Cards, output: Output) -> None:
+    """Judge one pair of switch times against the HISTORY of a run without switching."""
+    from d2rpick.api.asked import ask, open_run
+    from d2rpick.api.choices import judged
+
+    prints = output.prints(cards, request)
+    with opened(request, output) as (run, output):
+        asked = ask(run, request, prints=prints, merge=cards.merge)
+    other = None
+    if switched:
+        with reading(switched, quiet=output.quiet):
+            other = open_run(request, switched)
+        output.spare(other.sources)
+    answer = judged(asked, tr, td, other)
+    output.notes(asked.reference.history.notes, answer.cautions)
+    output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
+    output.answer(answer)
+    output.finish(objection=not answer.verified, quality=answer.quality)
+
+
+PARTS: Final = """\b
+Examples:
+  d2rpick parts sample_data/rollover_box.matsum
+  d2rpick parts --deck sample_data/rollover_box.k sample_data/rollover_box.matsum
+  d2rpick parts --deck sample_data/rollover_box.k -f json sample_data/rollover_box.matsum
+  d2rpick parts --deck sample_data/rollover_box.k --report parts.html sample_data/rollover_box.matsum
+"""
+
+
+@options.command("parts", PARTS)
+@options.time("--tr", "With --td: compare the sets in this window.")
+@options.time("--td", "Compare the sets in a window that ends here.  [default: at the end of the longest flight]")
+@options.takes(
+    *("deck", "weights", HISTORY, *READING, *LIMITS, "step_ratio", "report", *RESULT),
+    deck=f"{DECK}.",
+    step_ratio="Time step while rigid over that before, 1 or more.",
+    report="Write everything to one HTML page to read and sign.",
+    forms=FORMATS["parts"],
+)
+def parts(tr: float | None, td: float | None, request: Request, output: Output) -> None:
+    """Say which parts of a run may be switched, and what sets of them save.
+
+    Each part with its elements, material, mass and energy, and a verdict with its reasons; then sets of parts with the
+    run time that they save, and the one to take.  A set that --part names is compared too.
+    """
+    from d2rpick.api.costs import check_times, tabled
+
+    check_times(tr, td)
+    if request.energy:
+        raise ArgumentError("`energy` names one energy for the whole model; parts compares those of its parts")
+    with opened(request, output) as (run, output):
+        answer = tabled(run, request, tr, td)
+    output.notes(run.notes, answer.cautions)
+    output.beside_answer(answer, lambda: answer.page(options.repeat()))
+    output.answer(answer)
+    output.finish(objection=answer.recommended is None)
