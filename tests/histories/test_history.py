@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -78,3 +79,11 @@ def test_energy_between_the_states_is_that_of_numpy_over_the_whole_record(states
     for outside in (time[0] - 0.01, time[-1] + 0.01):
         with pytest.raises(RangeError, match="lies outside the record"):
             found.energy_at(float(outside))
+
+
+def test_what_was_found_in_a_record_is_made_once_and_stays_behind_when_it_goes_to_another_process() -> None:
+    record, made = history(np.ones(3)), iter((1, 2))
+    assert [record.known.once("one", lambda: next(made)) for _ in range(2)] == [1, 1]
+    record.known.once("not for other processes", lambda: lambda: None)
+    sent = pickle.loads(pickle.dumps(record))
+    assert sent.known.once("one", lambda: next(made)) == 2
