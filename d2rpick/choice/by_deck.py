@@ -39,7 +39,7 @@ def read_model(deck: str, weights: Weights | str | None = None) -> CostModel:
     DeckError, ConfigurationError
         If one of them cannot be read.
     """
-    from d2rpick.choice.weights_file import read_weights
+    from d2rpick.choice.cost import read_weights
 
     return CostModel(read_inventory(deck), read_weights(weights) if isinstance(weights, str) else weights)
 

@@ -16,16 +16,16 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from d2rpick.errors import ConfigurationError, are, name_units
+from d2rpick.histories.source import Source
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
 
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.source import SourceFile
-    from d2rpick.histories.source import Source
 
 # us per element and cycle, of shells with one point through the thickness, and of each further integration point: a fit
 # to legs of a car of 1516 elements after its first impact, with and without rigid sets, and with its shells in one
@@ -196,3 +196,71 @@ def _sum(amounts: Iterable[Amount]) -> Amount:
         cost += one.cost
         unknown += one.unknown
     return Amount(cost, tuple(dict.fromkeys(unknown)))
+
+
+# Keys of the TOML file of weights that `d2rpick calibrate` writes.
+_NUMBERS: Final = ("element_share", "rigid_node")
+_KEYS: Final = (*_NUMBERS, "per_element", "source")
+
+
+def read_weights(path: str) -> Weights:
+    """Read weights; what the file does not say of the share and of rigid nodes is as measured.
+
+    Raises
+    ------
+    ConfigurationError
+        If the file cannot be read, has unknown keys, or a number that makes no sense.
+    """
+    import tomllib
+    from pathlib import Path
+
+    try:
+        content = Path(path).read_bytes()
+        found = tomllib.loads(content.decode("utf-8"))
+    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ConfigurationError(f"{path}: cannot be read ({reason}), a TOML file of weights was expected") from None
+    if unknown := [key for key in found if key not in _KEYS]:
+        raise ConfigurationError(f"{path}: {unknown[0]!r} is not a key; expected {', '.join(_KEYS)}")
+    per_element = found.get("per_element")
+    if not isinstance(per_element, dict) or not per_element:
+        raise ConfigurationError(f"{path}: no table [per_element], the cost of each formulation was expected there")
+    given: dict[str, Any] = {key: _number(path, key, found[key]) for key in _NUMBERS if key in found}
+    weights = {name: _number(path, name, value) for name, value in per_element.items()}
+    try:
+        return Weights(weights, source=str(found.get("source", path)), file=Source(path, content), **given)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{path}: {error}") from None
+
+
+def weights_as_toml(weights: Weights) -> str:
+    """Write weights as TOML.
+
+    Examples
+    --------
+    >>> print(weights_as_toml(Weights({"BT": 0.3}, source="a run")))
+    source = "a run"
+    element_share = 0.91
+    rigid_node = 0.04
+    <BLANKLINE>
+    [per_element]
+    "BT" = 0.3
+    """
+    rows = [f"{_quoted(name)} = {value:.6g}" for name, value in weights.per_element.items()]
+    head = [f"source = {_quoted(weights.source)}", *(f"{name} = {getattr(weights, name):.6g}" for name in _NUMBERS)]
+    return "\n".join([*head, "", "[per_element]", *rows])
+
+
+def _quoted(text: str) -> str:
+    import json
+
+    return json.dumps(text, ensure_ascii=False)  # TOML has no pairs of surrogates
+
+
+def _number(path: str, name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ConfigurationError(f"{path}: {name} is {value!r}, a number was expected")
+    try:
+        return float(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return float("inf")

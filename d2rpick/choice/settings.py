@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -11,16 +10,6 @@ if TYPE_CHECKING:
     from d2rpick.deck.geometry import Placement
     from d2rpick.flight.bodies import RigidBody
     from d2rpick.vibration.modes import Mode
-
-# What an argument may be.  A tolerance of 1 accepts a tr that locks in nothing at all.
-_RANGES = (
-    ("margin", 0.0, inf),
-    ("tolerance", 0.0, 1.0),
-    ("max_kinetic_share", 0.0, inf),
-    ("max_residual", 0.0, inf),
-    ("cost_share", 0.0, 1.0),
-    ("step_ratio", 1.0, inf),
-)
 
 
 @dataclass(frozen=True)
@@ -58,12 +47,3 @@ class Settings:
     by_deck: ByDeck | None = field(default=None, compare=False, repr=False)
     kept_off: tuple[int, ...] = field(default=(), compare=False, repr=False)
     ruined: tuple[str, ...] = field(default=(), compare=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Raise ValueError with the name of an argument that is out of its range."""
-        for name, low, high in _RANGES:
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise ValueError(f"{name} is {value:g}, a number from {low:g} to {high:g} was expected")
-        if self.fit_window and not self.fit_window[0] < self.fit_window[1]:
-            raise ValueError("fit_window {:g} to {:g} is empty, the lower time comes first".format(*self.fit_window))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.choice.cost import MEASURED
-from d2rpick.choice.weights_file import written
+from d2rpick.choice.cost import MEASURED, weights_as_toml
 from d2rpick.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, each, many, row
@@ -60,7 +59,7 @@ def as_csv(found: Calibration) -> str:
 
 def as_toml(found: Calibration) -> str:
     """The file that ``--weights`` reads."""
-    return written(found.weights)
+    return weights_as_toml(found.weights)
 
 
 def plain_rows(found: Calibration) -> list[list[tables.Cell]]:

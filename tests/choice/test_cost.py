@@ -11,8 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.cost import CostModel, Weights, saved_share
-from d2rpick.choice.weights_file import read_weights, written
+from d2rpick.choice.cost import CostModel, Weights, read_weights, saved_share, weights_as_toml
 from d2rpick.deck.formulations import ls_dyna, radioss
 from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
@@ -131,7 +130,7 @@ def test_classes_of_formulations(found: Formulation, cost: str | None) -> None:
 
 def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
     weights = Weights({"BT": 0.3, 'a "strange" one': 2.5, "träge \U0001f422": 1.0}, 0.9, 0.01, "site")
-    (tmp_path / "site.toml").write_text(written(weights), "utf-8")
+    (tmp_path / "site.toml").write_text(weights_as_toml(weights), "utf-8")
     assert read_weights(str(tmp_path / "site.toml")) == weights
 
 
