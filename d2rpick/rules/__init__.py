@@ -135,7 +135,8 @@ def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
 def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
     """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck."""
     if radioss_run.recognises(content) if content is not None else radioss_run.run_files(path):
-        return RunCase.of(radioss_run.read_run(path, content), judge)
+        run = radioss_run.read_run(path, content)
+        return RunCase(run.deck, judge, run=run)
     return Case(read_deck(path, content), judge)
 
 

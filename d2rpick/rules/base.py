@@ -181,11 +181,6 @@ class RunCase(Case):
 
     run: Run
 
-    @classmethod
-    def of(cls, run: Run, judge: Judge | None) -> RunCase:
-        """Show a run."""
-        return cls(run.deck, judge, run=run)
-
     @property
     def solver(self) -> str:
         """Whose deck it is."""

@@ -1,0 +1,24 @@
+"""The table of nodes: every id has one place, however large it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.deck.mesh import NO_NODE, NodeTable
+
+IDS = st.lists(st.integers(1, 30), max_size=12)
+
+
+@pytest.mark.parametrize("far", [0, 10**8])  # from there on a table of all ids would be too large
+@given(IDS, IDS, IDS)
+def test_places_are_those_of_the_ids(far: int, placed: list[int], used: list[int], asked: list[int]) -> None:
+    of_elements = np.array([*(one + far for one in used), 0], np.int64)
+    table = NodeTable(np.array(placed, np.int64) + far, [of_elements])
+    assert table.ids.tolist() == [*(one + far for one in placed), *(one + far for one in sorted({*used} - {*placed}))]
+    first = {id_: place for place, id_ in reversed([*enumerate(table.ids.tolist())])}
+    assert table.places(of_elements).tolist() == [first.get(one, NO_NODE) for one in of_elements.tolist()]
+    wanted = np.array([one + far for one in asked] + [far + 99, -3], np.int64)
+    assert table.known(wanted).tolist() == [first[one] for one in wanted.tolist() if one in first]
