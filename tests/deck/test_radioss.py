@@ -117,3 +117,8 @@ def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> 
         assert [finding.rule for finding in check_deck(str(deck)).findings] == ["D2R011"]
     deck.write_text(f"{text}/END\n")
     assert radioss.read(read_run(str(deck))).complete
+
+
+def test_titles_may_be_empty(tmp_path: Path) -> None:
+    part = inventory(tmp_path, f"{nodes(4)}/PART/1\n\n{wide(1, 1)}{PROPS}/SHELL/1\n{wide(1, 1, 2, 3, 4)}").parts[1]
+    assert (part.title, part.section.formulations["shell"].name) == ("", "QEPH")
