@@ -100,7 +100,7 @@ class Suggestion(Judged, choice.Suggestion):
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
         """Write the page, with the card of the recommended pair."""
-        from d2rpick.choice.explored import explored_around
+        from d2rpick.choice.trade_off import explored_around
         from d2rpick.report.pages import suggestion_page
 
         chosen = (self.situation, self.recommended.tr) if self.recommended else None
@@ -149,7 +149,7 @@ class Verdict(Judged, judgement.Verdict):
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
         """Write the page, with the card of the pair where it is good."""
-        from d2rpick.choice.explored import explored_around
+        from d2rpick.choice.trade_off import explored_around
         from d2rpick.report.pages import verdict_page
 
         chosen = (self.situation, self.tr) if self.verified else None

@@ -199,7 +199,7 @@ class Plan(RunAnswer, planning.Plan):
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
         """Write the page, with the cards of the next run."""
-        from d2rpick.choice.explored import explored_flights
+        from d2rpick.choice.trade_off import explored_flights
         from d2rpick.report.pages import plan_page
 
         card = self.card(cards or Cards())

@@ -9,13 +9,14 @@ import numpy as np
 
 from d2rpick.choice.candidates import candidates_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
-from d2rpick.choice.flights import longest_flight
+from d2rpick.choice.flights import bounds, longest_flight
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import suggest_of
 from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.suggest import suggest_at
 from d2rpick.choice.suggest_td import looking, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
+from d2rpick.errors import RangeError
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate, Candidates
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.plan import Plan
     from d2rpick.choice.ranking import Quality
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
@@ -261,3 +263,59 @@ def _cautions(
         yield Caution("margin-kept", f"td up to {inside[1]:.6g}: {kept:.3g} are kept clear up to {window[1]:.6g}")
     if not any(map(_found, offers)):
         yield Caution("no-candidate", "no td in the window has an acceptable tr that saves anything")
+
+
+# td on the grid of a page: some pixels of a screen apart, and finer than anybody drags.
+_STEPS_OF_PAGE: Final = 120
+# td of a flight in a plan of many: a curve of fewer points tells little.
+_FEWEST_STEPS: Final = 40
+
+
+def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
+    """Find what other td cost than those of a plan, for each of its flights; its grids are the coarser the more."""
+    answers = {row.number: row.answer for row in plan.rows if row.answer and row.window}
+    landings = {row.number: row.flight.end for row in plan.rows}
+    reference = reference._replace(history=plan.history)
+    steps = max(_STEPS_OF_PAGE // max(len(answers), 1), _FEWEST_STEPS)
+    found = (
+        explored_around(reference, one.situation, one.td_window, steps=steps, since=landings.get(number - 1))
+        for number, one in answers.items()
+    )
+    return tuple(one for one in found if one)
+
+
+def explored_around(
+    reference: Reference,
+    situation: Situation,
+    window: tuple[float, float] | None = None,
+    *,
+    steps: int = _STEPS_OF_PAGE,
+    since: float | None = None,
+) -> TradeOff | None:
+    """Find what other td cost than that of a situation.
+
+    Parameters
+    ----------
+    reference : Reference
+    situation : Situation
+        What the record tells about the td that was asked for or chosen.
+    window : (float, float), optional
+        Where td was looked for [time].  Default: the flight that td lies in.
+    steps : int, optional
+        So many td on an even grid.  Default: as many as a page needs.
+    since : float, optional
+        No flight is taken to begin before [time].
+
+    Returns
+    -------
+    TradeOff or None
+        None where no flight is known.
+    """
+    flight = situation.flight
+    if window is None and flight.start is None:
+        return None
+    try:
+        span = window or bounds(situation.history, flight)
+        return explore_of(reference, situation.settings, span, td=situation.td, steps=steps, since=since)
+    except RangeError:  # the window holds no state
+        return None

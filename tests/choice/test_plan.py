@@ -11,11 +11,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice import explored
 from d2rpick.choice.of_run import Reference, read, suggest_of
 from d2rpick.choice.plan import Plan, plan_of
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest_td import suggest_in_window
+from d2rpick.choice.trade_off import explored_flights
 from d2rpick.errors import RangeError
 from d2rpick.histories.digits import first_as_read
 from d2rpick.histories.opening import Selection
@@ -269,7 +269,7 @@ def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int, tmp_pa
     plan = plan_of(reference, Settings(replay=False))
     landings = {row.number: row.end for row in plan.rows}
     rows = [row for row in plan.rows if row.window]
-    for row, found in zip(rows, explored.explored_flights(reference, plan), strict=True):
+    for row, found in zip(rows, explored_flights(reference, plan), strict=True):
         assert found.asked is not None
         assert (found.asked.tr, found.asked.td) == row.window
         assert all(one.tr is None or one.tr >= landings.get(row.number - 1, 0.0) for one in found.offers)
