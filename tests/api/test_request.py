@@ -1,0 +1,49 @@
+"""One table of what can be asked: it contradicts nothing, and is written as it is typed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from d2rpick.api.arguments import Choosing
+from d2rpick.api.request import OPTIONS, OSCILLATOR, Request
+from d2rpick.choice.cost import Weights
+from d2rpick.errors import ArgumentError
+
+ONE = {"stiffness": 2.0, "mass": 3.0, "beta": 2.0, "alpha": 0.5, "v0": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("asked", "typed"),
+    [
+        ({"tolerance": 0.1, "part": ("3", "roof")}, ["--part", "3", "--part", "roof", "--tolerance", "0.1"]),
+        ({"fit_window": (0.5, 1.0), "strict": True}, ["--fit-window", "0.5", "1.0", "--strict"]),
+        ({"strict": False, "tolerance": 0.2, "given": {"strict", "tolerance"}}, ["--tolerance", "0.2"]),
+        ({"deck": "a.k", "weights": Weights({"BT": 1.0})}, ["--deck", "a.k", "--weights", "<weights in memory>"]),
+        ({"history": ("a.csv",)}, []),
+    ],
+)
+def test_what_is_asked_is_typed_again(asked: dict[str, Any], typed: list[str]) -> None:
+    assert [*Request(**asked).asking()] == typed
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (ONE | {"v0": None}, "`stiffness` needs `v0`"),
+        (ONE | {"beta": None}, "either `frame_mass` or `beta`"),
+        (ONE | {"no_verify": True}, "an oscillator and `replay` exclude each other"),
+        ({"fit_window": (1.0, 0.5)}, "`fit_window` 1 0.5 is empty"),
+        ({"weights": "site.toml"}, "`weights` needs `deck`"),
+        ({"step_ratio": 2.0}, "`step_ratio` needs `cost_share` or `deck`"),
+    ],
+)
+def test_what_contradicts_itself_is_refused(asked: dict[str, Any], told: str) -> None:
+    with pytest.raises(ArgumentError, match=told):
+        Request(**asked)
+
+
+def test_every_keyword_of_python_is_an_option() -> None:
+    assert Choosing.__annotations__.keys() - OPTIONS.keys() == {"oscillator", "replay"}
+    assert {*OSCILLATOR} <= OPTIONS.keys()
