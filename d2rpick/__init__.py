@@ -11,7 +11,7 @@ What is named here is imported when it is first used: the package itself imports
 
 from __future__ import annotations
 
-from d2rpick.version import __version__ as __version__
+from d2rpick.base.version import __version__ as __version__
 
 TYPE_CHECKING = False  # type checkers take it for theirs; importing typing is left to those who need it
 if TYPE_CHECKING:
@@ -36,14 +36,14 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import read as read
     from d2rpick.api.studies import Study as Study
     from d2rpick.api.studies import study as study
+    from d2rpick.base.errors import ChangedError as ChangedError
+    from d2rpick.base.errors import ConfigurationError as ConfigurationError
+    from d2rpick.base.errors import D2RPickError as D2RPickError
+    from d2rpick.base.errors import DeckError as DeckError
+    from d2rpick.base.errors import FormatError as FormatError
+    from d2rpick.base.errors import HistoryError as HistoryError
+    from d2rpick.base.errors import RangeError as RangeError
     from d2rpick.choice.cost import Weights as Weights
-    from d2rpick.errors import ChangedError as ChangedError
-    from d2rpick.errors import ConfigurationError as ConfigurationError
-    from d2rpick.errors import D2RPickError as D2RPickError
-    from d2rpick.errors import DeckError as DeckError
-    from d2rpick.errors import FormatError as FormatError
-    from d2rpick.errors import HistoryError as HistoryError
-    from d2rpick.errors import RangeError as RangeError
     from d2rpick.vibration.oscillator import Oscillator as Oscillator
 
 _HOME = {
@@ -57,7 +57,7 @@ _HOME = {
             "HistoryError",
             "RangeError",
         ),
-        "errors",
+        "base.errors",
     ),
     **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "api.choices"),
     **dict.fromkeys(("Calibration", "PartTable", "calibrate", "parts"), "api.costs"),

@@ -19,12 +19,12 @@ from random import Random
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import D2RPickError
+from d2rpick.base.workers import answers, cores, on_cores
 from d2rpick.deck.reader import read_deck
-from d2rpick.errors import D2RPickError
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.workers import answers, cores, on_cores
 from tests.command import DECK
 from tests.faults import Fault, damage
 from tests.hdf5_files import plain, written

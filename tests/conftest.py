@@ -13,7 +13,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 import pytest
 from hypothesis import settings
 
-from d2rpick.workers import cores
+from d2rpick.base.workers import cores
 
 # A busy machine is no finding.  Each run asks other examples: half of the usual hundred each time are as good as all.
 settings.register_profile("d2rpick", deadline=None, max_examples=50)

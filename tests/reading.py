@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
+from d2rpick.base.errors import FormatError
+from d2rpick.base.files import at_rest
 from d2rpick.choice.of_run import read
-from d2rpick.errors import FormatError
-from d2rpick.files import at_rest
 from d2rpick.histories.content import OnDisk, Portions
 from d2rpick.histories.database import Legs
 from d2rpick.histories.opening import Run, Selection, open_run, open_sources

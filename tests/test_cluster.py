@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from d2rpick.errors import D2RPickError
-from d2rpick.workers import Cluster
+from d2rpick.base.errors import D2RPickError
+from d2rpick.base.workers import Cluster
 from tests import variants
 from tests.command import ROOT, run
 

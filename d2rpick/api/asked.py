@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from d2rpick.api import arguments
 from d2rpick.api.request import Request
+from d2rpick.base.errors import ArgumentError, listing, name_units
 from d2rpick.choice.of_run import Reference
-from d2rpick.errors import ArgumentError, listing, name_units
 from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:

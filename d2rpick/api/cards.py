@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.api.request import POSITIVE, TIME, UNLIMITED, dashed, option, options_of
-from d2rpick.errors import ArgumentError
+from d2rpick.base.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,9 +10,9 @@ from d2rpick.api.answer import RunAnswer, frame_of
 from d2rpick.api.asked import ask, request_of
 from d2rpick.api.cards import Cards
 from d2rpick.api.request import check_window
+from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import plan as planning
 from d2rpick.choice import trade_off
-from d2rpick.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from d2rpick.errors import ArgumentError
+from d2rpick.base.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from d2rpick.base.errors import INTERNAL_ERROR, FormatError
 from d2rpick.choice.study import stamps
 from d2rpick.choice.study_rows import FAILED, PLAIN, UNREADABLE, Stamp, StudyRow
-from d2rpick.errors import INTERNAL_ERROR, FormatError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,9 +12,9 @@ from d2rpick.api import arguments
 from d2rpick.api.answer import Paged, frame_of
 from d2rpick.api.asked import request_of
 from d2rpick.api.request import needed_time, time_or_window
+from d2rpick.base.workers import answers, on_cores
 from d2rpick.choice import study as core
 from d2rpick.report.shell import positional
-from d2rpick.workers import answers, on_cores
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from d2rpick.api.cards import Cards
     from d2rpick.api.request import Request
     from d2rpick.api.resume_file import Ledger
+    from d2rpick.base.workers import Farm
     from d2rpick.choice.study_rows import StudyRow
-    from d2rpick.workers import Farm
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from d2rpick.base.errors import FormatError
 from d2rpick.choice.cost import ByDeck, CostModel, Weights
 from d2rpick.choice.deck_of_run import (
     bodies_of,
@@ -21,7 +22,6 @@ from d2rpick.deck import read_inventory
 from d2rpick.deck.geometry import Placement
 from d2rpick.deck.model import DISCRETE
 from d2rpick.deck.radioss_run import RUINS
-from d2rpick.errors import FormatError
 from d2rpick.flight.flying_parts import asks_for_recommended
 
 if TYPE_CHECKING:

@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.errors import ConfigurationError, DeckError, FormatError
 from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weights
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck import find_windows, ls_dyna, radioss, read_deck, read_parts, read_switching
 from d2rpick.deck.folder import main_decks
 from d2rpick.deck.radioss_run import find_run_windows, read_run, run_files
-from d2rpick.errors import ConfigurationError, DeckError, FormatError
 from d2rpick.histories.listings import is_glstat, read_timing, read_zone_times
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.errors import FormatError, RangeError, listing
+from d2rpick.base.errors import FormatError, RangeError, listing
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.names import Selection
 from d2rpick.histories.samples import window

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from d2rpick.errors import ConfigurationError, are, name_units
+from d2rpick.base.errors import ConfigurationError, are, name_units
 from d2rpick.histories.source import Source
 
 if TYPE_CHECKING:

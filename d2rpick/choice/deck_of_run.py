@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.base.errors import FormatError, are, name_units
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.pieces import pieces_of, supports_of
 from d2rpick.deck.radioss_run import LEFT_RIGID
-from d2rpick.errors import FormatError, are, name_units
 from d2rpick.flight.bodies import RigidBody
 from d2rpick.histories.surroundings import Support, Surroundings
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from d2rpick.base.errors import RangeError
 from d2rpick.choice.warnings import Caution
-from d2rpick.errors import RangeError
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.flight.work import FEWEST_STATES, work_beyond_gravity
 from d2rpick.histories.samples import window as within

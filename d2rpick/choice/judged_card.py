@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.of_run import Reference, judge_of, verify_of
 from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
-from d2rpick.errors import D2RPickError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

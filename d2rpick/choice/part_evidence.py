@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.errors import FormatError
 from d2rpick.choice.flights import bounds, flights_of
-from d2rpick.errors import FormatError
 from d2rpick.flight.flying_parts import deformable_parts, flying_together
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.samples import window

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.errors import FormatError, RangeError, are, name_units
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share
 from d2rpick.choice.deck_of_run import (
@@ -25,7 +26,6 @@ from d2rpick.choice.part_evidence import facts_of
 from d2rpick.choice.switchable_parts import rows_of, step_growth
 from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.deck.geometry import Placement
-from d2rpick.errors import FormatError, RangeError, are, name_units
 from d2rpick.flight.flying_parts import asks_for_recommended, with_parts_by_number
 from d2rpick.histories.listings import printed_steps
 from d2rpick.histories.names import Selection, select_parts

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.errors import RangeError
+from d2rpick.base.errors import RangeError
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import sum_as_read

@@ -9,6 +9,8 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, D2RPickError, RangeError, listing, one_line
+from d2rpick.base.version import __version__
 from d2rpick.choice.acceptable_windows import acceptable_windows, alike_windows, clear_of_td, error_profile
 from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.study_rows import (
@@ -25,11 +27,9 @@ from d2rpick.choice.study_rows import (
     runs_of,
 )
 from d2rpick.choice.warnings import Caution
-from d2rpick.errors import FORESEEN, INTERNAL_ERROR, D2RPickError, RangeError, listing, one_line
 from d2rpick.histories.names import Selection
 from d2rpick.histories.samples import outline
 from d2rpick.histories.source import expand
-from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

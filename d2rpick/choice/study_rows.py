@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.errors import listing
 from d2rpick.choice.acceptable_windows import common_windows, coverage, error_at
 from d2rpick.choice.ranking import EQUALLY_GOOD
-from d2rpick.errors import listing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.base.errors import RangeError
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.ranking import EQUALLY_GOOD, over_limits, quality_of, rank
 from d2rpick.choice.situation import examine
 from d2rpick.choice.verify import verify_at
 from d2rpick.choice.warnings import Caution, cautions_of, out_of_place
-from d2rpick.errors import RangeError
 from d2rpick.histories.digits import as_read
 
 if TYPE_CHECKING:

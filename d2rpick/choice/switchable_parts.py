@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import name_units
 from d2rpick.deck.geometry import masses_and_steps
 from d2rpick.deck.model import DISCRETE
 from d2rpick.deck.pieces import pieces_of
-from d2rpick.errors import name_units
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence

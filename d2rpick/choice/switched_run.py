@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.errors import RangeError, listing
 from d2rpick.choice.comparison import FEWEST, kinetic_energies, rigid_parts, with_energy
 from d2rpick.choice.warnings import Caution
-from d2rpick.errors import RangeError, listing
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.history import Given
 

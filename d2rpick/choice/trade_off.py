@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.errors import RangeError
 from d2rpick.choice.candidates import candidates_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import bounds, longest_flight
@@ -16,7 +17,6 @@ from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.suggest import suggest_at
 from d2rpick.choice.suggest_td import looking, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
-from d2rpick.errors import RangeError
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from d2rpick.base.errors import RangeError
 from d2rpick.choice.candidates import Candidate, judge
 from d2rpick.choice.ranking import over_limits, quality_of
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of, out_of_place
-from d2rpick.errors import RangeError
 
 if TYPE_CHECKING:
     from d2rpick.choice.comparison import Comparison

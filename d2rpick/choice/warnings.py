@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.errors import listing, name_units
+from d2rpick.base.errors import listing, name_units
 from d2rpick.histories.digits import not_after, window_as_read
 
 if TYPE_CHECKING:

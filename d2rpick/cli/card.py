@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from d2rpick.base.errors import ArgumentError
 from d2rpick.cli import options
 from d2rpick.cli.options import CARDS, FILES, REFERENCE
 from d2rpick.cli.output import text_bytes
 from d2rpick.cli.values import click_type
-from d2rpick.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

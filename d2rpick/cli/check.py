@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from d2rpick.base.errors import INTERNAL_ERROR, ConfigurationError, D2RPickError, DeckError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
 from d2rpick.cli.output import explained, in_words, tell
 from d2rpick.cli.values import click_type
-from d2rpick.errors import INTERNAL_ERROR, ConfigurationError, D2RPickError, DeckError
 from d2rpick.report.formats import FORMATS, write
 
 if TYPE_CHECKING:

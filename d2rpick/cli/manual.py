@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from d2rpick.base.version import __version__
 from d2rpick.cli import d2rpick
-from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,9 +11,9 @@ from click.core import ParameterSource
 
 from d2rpick.api.cards import Cards
 from d2rpick.api.request import CHOOSING, JUDGING, READING, TIME, Option, Request, dashed, options_of
+from d2rpick.base.errors import ArgumentError
 from d2rpick.cli.output import Output, text_bytes, with_options
 from d2rpick.cli.values import click_type
-from d2rpick.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence

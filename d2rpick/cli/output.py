@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from d2rpick.api.request import OPTIONS, dashed, option
-from d2rpick.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
-from d2rpick.files import write_whole
+from d2rpick.base.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
+from d2rpick.base.files import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -98,7 +98,7 @@ def _exhibits(sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples
 
 def _solver(names: Sequence[str]) -> dict[str, dict[str, Samples]]:
     """Read each table by the columns that it has."""
-    from d2rpick.errors import FormatError
+    from d2rpick.base.errors import FormatError
     from d2rpick.histories.opening import Selection, open_run
 
     found = {}
@@ -117,7 +117,7 @@ def _made(folder: str) -> Path:
     """Create the folder where it is missing; D2RPickError where that cannot be done."""
     from pathlib import Path
 
-    from d2rpick.errors import D2RPickError
+    from d2rpick.base.errors import D2RPickError
 
     place = Path(folder)
     try:

@@ -162,7 +162,7 @@ def _run(box: Box, output: Output) -> None:
 
 def _scan(box: Box, output: Output) -> None:
     """Many switched runs, the tr that the tool recommends among them."""
-    from d2rpick.workers import begin, cores
+    from d2rpick.base.workers import begin, cores
 
     begin(box.jobs or cores(), "d2rpick.models.box_run")
     from d2rpick.models.box_run import simulate

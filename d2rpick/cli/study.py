@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import click
 
 from d2rpick.api.request import LIMITS, READING, needed_time, time_or_window
+from d2rpick.base.errors import INTERNAL_ERROR, D2RPickError, FormatError
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
 from d2rpick.cli.output import tell
 from d2rpick.cli.progress import counting
 from d2rpick.cli.values import click_type
-from d2rpick.errors import INTERNAL_ERROR, D2RPickError, FormatError
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from d2rpick.api.request import Request
     from d2rpick.api.resume_file import Ledger
+    from d2rpick.base.workers import Farm
     from d2rpick.cli.output import Output
-    from d2rpick.workers import Farm
 
 EXAMPLES = """\b
 Examples:
@@ -169,7 +169,7 @@ def _known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int
 
 def _farm(jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool) -> Farm:
     """Choose where to compute so many calls; a single one needs no other process."""
-    from d2rpick import workers
+    from d2rpick.base import workers
 
     if scheduler and calls:
         cluster = workers.Cluster(scheduler)

@@ -105,7 +105,7 @@ def _typed_run(ctx: click.Context) -> Run | None:
     """Open the files that were typed before; None where they are none of a run."""
     from pathlib import Path
 
-    from d2rpick.errors import D2RPickError
+    from d2rpick.base.errors import D2RPickError
     from d2rpick.histories.opening import open_run
 
     words = ctx.meta.get("d2rpick.command", ())[1:]  # click has read no argument yet when an option is completed

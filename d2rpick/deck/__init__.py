@@ -38,8 +38,8 @@ def read_inventory(path: str) -> Inventory:
     DeckError
         If the deck cannot be read, or has no parts.
     """
+    from d2rpick.base.errors import DeckError
     from d2rpick.deck import ls_dyna, radioss, radioss_run
-    from d2rpick.errors import DeckError
 
     is_run = radioss_run.run_files(path)
     found = radioss.read(radioss_run.read_run(path)) if is_run else ls_dyna.read(read_deck(path))

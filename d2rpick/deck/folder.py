@@ -6,10 +6,10 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from d2rpick.base.errors import DeckError
 from d2rpick.deck.radioss_run import run_files
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.source import SourceFile
-from d2rpick.errors import DeckError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,6 +11,8 @@ import re
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.errors import DeckError
+from d2rpick.base.version import __version__
 from d2rpick.deck.printed_card import (
     LONGEST,
     PHYSICS,
@@ -21,8 +23,6 @@ from d2rpick.deck.printed_card import (
     comments,
     shortest,
 )
-from d2rpick.errors import DeckError
-from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

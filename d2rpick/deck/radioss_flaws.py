@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.errors import in_rows
 from d2rpick.deck.radioss_engine import number_of
 from d2rpick.deck.radioss_mesh import KINDS, NOT_COUNTED, elements_of, nodes_of
 from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw
 from d2rpick.deck.radioss_starter import reals
-from d2rpick.errors import in_rows
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -15,13 +15,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Value
 from d2rpick.deck.radioss_engine import Leg, blocks, card_of, keyword, read_legs
 from d2rpick.deck.radioss_starter import Starter
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows
-from d2rpick.errors import DeckError, are, in_rows, name_units
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

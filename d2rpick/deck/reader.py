@@ -11,9 +11,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import DeckError
 from d2rpick.deck.card import LONG, STANDARD, Card, Problem, Scope, Transform
 from d2rpick.deck.source import Block, SourceFile
-from d2rpick.errors import DeckError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

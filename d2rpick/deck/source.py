@@ -11,9 +11,9 @@ from itertools import islice, zip_longest
 from threading import Thread
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import DeckError
+from d2rpick.base.files import beyond, long_line
 from d2rpick.deck.stored import Held, OnDisk, stored
-from d2rpick.errors import DeckError
-from d2rpick.files import beyond, long_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, MutableSequence, Sequence

@@ -12,8 +12,8 @@ import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.errors import DeckError
-from d2rpick.files import FileState, at_rest
+from d2rpick.base.errors import DeckError
+from d2rpick.base.files import FileState, at_rest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

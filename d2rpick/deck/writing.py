@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from d2rpick.base.errors import DeckError
+from d2rpick.base.files import write_whole
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.printing import listed, off
 from d2rpick.deck.radioss_engine import blocks, kept_off, keyword, read_legs
@@ -13,8 +15,6 @@ from d2rpick.deck.radioss_run import read_run, run_files
 from d2rpick.deck.reader import cure, cuts, read_deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import find_windows, read_switching
-from d2rpick.errors import DeckError
-from d2rpick.files import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

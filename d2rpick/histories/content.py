@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.errors import ChangedError, FormatError
-from d2rpick.files import FileState, at_rest
+from d2rpick.base.errors import ChangedError, FormatError
+from d2rpick.base.files import FileState, at_rest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
-from d2rpick.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.history import Precision
 from d2rpick.histories.names import quantity_of, resolve, with_namesakes
 from d2rpick.histories.samples import newest_states

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias, T
 
 import numpy as np
 
-from d2rpick.errors import HistoryError, RangeError
+from d2rpick.base.errors import HistoryError, RangeError
 from d2rpick.histories.digits import told_apart
 from d2rpick.histories.samples import find_turns, window
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings

@@ -10,7 +10,7 @@ import re
 from importlib import import_module
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, cast
 
-from d2rpick.errors import FormatError, printable
+from d2rpick.base.errors import FormatError, printable
 from d2rpick.histories.companions import check_companions, check_legs
 from d2rpick.histories.database import Legs
 from d2rpick.histories.names import Selection

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.companions import check_sum, doubts
 from d2rpick.histories.history import History, Momenta, Track
 from d2rpick.histories.names import QUANTITIES, menu, quantity_note, select_parts

@@ -8,8 +8,8 @@ import stat
 import sys
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.errors import FormatError, listing
-from d2rpick.files import FileState, bound, unpacked_beyond
+from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.files import FileState, bound, unpacked_beyond
 from d2rpick.histories.content import stored
 from d2rpick.histories.names import in_seconds, near_miss
 

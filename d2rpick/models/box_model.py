@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from d2rpick.errors import RangeError
+from d2rpick.base.errors import RangeError
 
 Plane = NDArray[np.complex128]
 Values = NDArray[np.float64]

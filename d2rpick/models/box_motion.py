@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick.errors import RangeError
+from d2rpick.base.errors import RangeError
 from d2rpick.models.box_model import GRAVITY, Bars, build, stiffest_rate
 
 if TYPE_CHECKING:

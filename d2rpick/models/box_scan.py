@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.base.errors import RangeError
+from d2rpick.base.workers import answers, cores, on_cores
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.suggest import suggest
-from d2rpick.errors import RangeError
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.models.box_motion import Motion
 from d2rpick.models.box_run import BOX, PARTS, RigidWindow, proceed, run_to
-from d2rpick.workers import answers, cores, on_cores
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

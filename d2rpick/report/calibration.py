@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import printable
 from d2rpick.choice.cost import MEASURED, weights_as_toml
-from d2rpick.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, each, many, row
 

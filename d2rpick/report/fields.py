@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final, Literal, NamedTuple
 
+from d2rpick.base.version import __version__
 from d2rpick.report import tables
-from d2rpick.version import __version__
 
 
 class Kind(NamedTuple):

@@ -14,8 +14,8 @@ import matplotlib as mpl
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.ticker import LogFormatter, NullLocator
 
+from d2rpick.base.errors import FormatError
 from d2rpick.choice.view import BELOW_LEVEL, LOGARITHMIC
-from d2rpick.errors import FormatError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
+from d2rpick.base.errors import name_units, printable
+from d2rpick.base.version import __version__
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.source import STDIN
-from d2rpick.errors import name_units, printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, kind_of, many, one_of, row
 from d2rpick.rules import RULES, Example, Severity
-from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.errors import printable
+from d2rpick.base.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, kind_of, many, maybe, one_of, row
 from d2rpick.report.situation import head, measures_of, spoken

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isinf
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.errors import in_rows, listing, printable
+from d2rpick.base.errors import in_rows, listing, printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, each, many, maybe, one_of, row
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.version import __version__
 from d2rpick.models.published import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, pair_at_peak, residual
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, Kind, kind_of, many, row
-from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.base.errors import listing, printable
 from d2rpick.choice import health as limits
-from d2rpick.errors import listing, printable
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.report.tables import measure
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from d2rpick.base.errors import name_units
 from d2rpick.choice.candidates import MUCH_HIGHER
-from d2rpick.errors import name_units
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row

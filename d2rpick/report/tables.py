@@ -6,7 +6,7 @@ import re
 from operator import gt
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.errors import UNSEEN, printable
+from d2rpick.base.errors import UNSEEN, printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.errors import printable
+from d2rpick.base.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, Kind, kind_of, maybe, row
 from d2rpick.report.situation import heading

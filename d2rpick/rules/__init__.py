@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import ConfigurationError
 from d2rpick.deck import radioss_run, read_deck
-from d2rpick.errors import ConfigurationError
 from d2rpick.rules import energy, reading, runs, sets, switched_parts, times
 from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, RunCase, Severity, Unreadable
 from d2rpick.rules.configuration import Configuration, expected_instead, find_configuration

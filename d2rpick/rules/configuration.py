@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.errors import ConfigurationError
+from d2rpick.base.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from pathlib import Path

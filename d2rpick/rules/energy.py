@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.errors import name_units
+from d2rpick.base.errors import name_units
 from d2rpick.rules.base import BOTH, ERROR, WARNING, Example, grouped, rule
 from d2rpick.rules.examples import END, HEAD, PARTS, PASSES, automatic
 from d2rpick.rules.times import factor_of, mistaken

@@ -8,8 +8,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import name_units
 from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, left_rigid
-from d2rpick.errors import name_units
 from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Example, RunCase, rule
 from d2rpick.rules.examples import GOOD_RUN, WINDOW, engine_files, run_of, starter_deck
 

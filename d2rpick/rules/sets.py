@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
+from d2rpick.base.errors import listing
 from d2rpick.deck.constraints import read_entities
 from d2rpick.deck.switching import BY_TIME
-from d2rpick.errors import listing
 from d2rpick.rules.base import ERROR, WARNING, Example, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import name_units
 from d2rpick.deck.constraints import read_constraints
 from d2rpick.deck.parts import element_cards
-from d2rpick.errors import name_units
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Example, grouped, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import name_units
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME
-from d2rpick.errors import name_units
 from d2rpick.rules.base import BOTH, ERROR, WARNING, Example, grouped, rule
 from d2rpick.rules.examples import BACK, END, GOOD, PARTS, PASSES, THERE, automatic, deck, window
 

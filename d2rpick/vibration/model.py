@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.errors import listing
+from d2rpick.base.errors import listing
 from d2rpick.vibration import measures
 from d2rpick.vibration.identify import MAX_MISFIT, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.modes import Mode

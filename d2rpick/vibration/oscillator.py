@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from d2rpick.errors import RangeError
+from d2rpick.base.errors import RangeError
 from d2rpick.vibration.modes import LARGEST_ENERGY, Mode
 
 if TYPE_CHECKING:

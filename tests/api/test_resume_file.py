@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from d2rpick.api.resume_file import Ledger, fingerprint, line
+from d2rpick.base.errors import FormatError
 from d2rpick.choice import study
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.study import Question, ask
-from d2rpick.errors import FormatError
 from d2rpick.histories.opening import Selection
 from tests import variants
 

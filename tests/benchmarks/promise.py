@@ -19,7 +19,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import d2rpick
-from d2rpick.errors import D2RPickError
+from d2rpick.base.errors import D2RPickError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

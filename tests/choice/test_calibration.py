@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from d2rpick.base.errors import ConfigurationError, DeckError, FormatError
 from d2rpick.choice.calibration import Observation, calibrate, observations_of, observations_of_runs
 from d2rpick.choice.cost import MEASURED
-from d2rpick.errors import ConfigurationError, DeckError, FormatError
 from tests.deck.test_radioss import BEGIN, PROPS, nodes
 from tests.decks import wide
 

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.base.errors import ConfigurationError
 from d2rpick.choice.cost import CostModel, Weights, read_weights, saved_share, weights_as_toml
 from d2rpick.deck.formulations import ls_dyna, radioss
 from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
-from d2rpick.errors import ConfigurationError
 from tests.energies import sure
 
 if TYPE_CHECKING:

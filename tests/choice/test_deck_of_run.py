@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import d2rpick as d2
+from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.deck import read_inventory
-from d2rpick.errors import D2RPickError
 from d2rpick.flight.momentum import flight_around
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part

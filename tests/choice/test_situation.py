@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from d2rpick.base.errors import RangeError
 from d2rpick.choice.of_run import read
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest, suggest_at
-from d2rpick.errors import RangeError
 from d2rpick.flight.bodies import RigidBody
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.oscillator import to_mode

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.base.errors import RangeError
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.expectation import expectation, shortfall
 from d2rpick.choice.of_run import read
@@ -18,7 +19,6 @@ from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.choice.suggest_td import longest_rigid_times, suggest_in_window
-from d2rpick.errors import RangeError
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run

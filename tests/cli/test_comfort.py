@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from d2rpick.base.version import __version__
 from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.manual import manual
-from d2rpick.version import __version__
 from tests.command import ENERGY, GLSTAT, ROLLOVER, ROOT, TIME_LIMIT, answer, run
 
 MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")

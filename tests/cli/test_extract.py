@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.opening import Selection, format_of, open_run, write_table
 from tests.command import BOX as ROLLOVER_T01
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, run

@@ -19,7 +19,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.errors import UNSEEN, printable
+from d2rpick.base.errors import UNSEEN, printable
 from d2rpick.report.figures import with_unit
 from d2rpick.report.shell import positional, shell_line
 from d2rpick.report.tables import as_json, as_line, as_markdown, in_markdown

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.base.errors import DeckError
 from d2rpick.deck import ls_dyna, read_inventory
 from d2rpick.deck.pieces import pieces_of
 from d2rpick.deck.reader import read_deck
-from d2rpick.errors import DeckError
 from tests.decks import read, row, write
 from tests.sample_deck import DECK, FLYING, deck, radioss
 

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.errors import D2RPickError
+from d2rpick.base.errors import D2RPickError
 from d2rpick.rules import check_deck
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS
 from tests.decks import read, spans, write

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.base.errors import DeckError
 from d2rpick.deck.radioss_run import find_run_windows, read_run, recognises, run_files
-from d2rpick.errors import DeckError
 from d2rpick.rules import RULES, check_deck
 from tests.computed import stored
 from tests.decks import write

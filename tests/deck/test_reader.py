@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from d2rpick.base.errors import DeckError
 from d2rpick.deck import read_deck, read_switching
 from d2rpick.deck.radioss_mesh import KINDS, NOT_COUNTED
 from d2rpick.deck.reader import holds_mesh
 from d2rpick.deck.source import Block, SourceFile, find_marks
 from d2rpick.deck.stored import Held
-from d2rpick.errors import DeckError
 from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.decks import found, read, spans
 

@@ -16,10 +16,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.base.errors import DeckError
+from d2rpick.base.files import FileState
 from d2rpick.deck.source import SourceFile, find_marks
 from d2rpick.deck.stored import Held, OnDisk
-from d2rpick.errors import DeckError
-from d2rpick.files import FileState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from d2rpick.base.errors import DeckError
 from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import cards
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.deck.writing import write_deck
-from d2rpick.errors import DeckError
 from d2rpick.rules import RULES, check_deck
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE
 from tests.decks import write

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import d2rpick as d2
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.flight.flying_parts import deformable_parts, flying_parts, with_parts_by_number
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import BOX, ENERGY, GLSTAT, answer, run

@@ -19,8 +19,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.base.errors import ChangedError, D2RPickError
 from d2rpick.choice.overview import survey
-from d2rpick.errors import ChangedError, D2RPickError
 from d2rpick.histories.content import Content
 from d2rpick.histories.formats import csv_table
 from d2rpick.histories.opening import Run, Selection

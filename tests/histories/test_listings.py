@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.listings import printed_steps, read_timing, read_zone_times, wrong_energies
 from d2rpick.histories.opening import open_run
 from tests.command import GLSTAT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.names import Part, select_parts
 
 PARTS = [Part(12, "Roof"), Part(3, "seat, left"), Part(7, ""), Part(19, "door"), Part(20, "door"), Part(4, "12")]

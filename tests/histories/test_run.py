@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from d2rpick.base.errors import FormatError
 from d2rpick.choice.overview import survey
-from d2rpick.errors import FormatError
 from d2rpick.histories.companions import check_companions
 from d2rpick.histories.database import Legs
 from d2rpick.histories.formats import binout, csv_table, glstat, matsum, radioss_th

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.opening import READERS, Selection, open_run
 from d2rpick.histories.source import expand, later_legs, open_files
 from tests.command import run

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.errors import RangeError
+from d2rpick.base.errors import RangeError
 from d2rpick.models.box_model import GRAVITY, Bars, Parameters, Truss, build, stiffest_rate
 from d2rpick.models.box_motion import SLIP, Contact, Motion, RigidBody
 from d2rpick.models.box_run import BOX, RigidWindow, proceed, run_to, simulate

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from d2rpick.base.errors import DeckError
 from d2rpick.deck import ls_dyna, read_inventory
 from d2rpick.deck.reader import read_deck
-from d2rpick.errors import DeckError
 from d2rpick.rules import Checked, check_deck
 from tests.deck.test_ls_dyna import counted
 from tests.real.files import real

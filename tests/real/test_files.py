@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.opening import Selection, open_run
 from tests.reading import read_history
 from tests.real.files import real, rows_of

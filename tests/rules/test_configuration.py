@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.errors import ConfigurationError
+from d2rpick.base.errors import ConfigurationError
 from d2rpick.rules.configuration import Configuration, find_configuration, read_configuration
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from d2rpick.errors import ConfigurationError, DeckError
+from d2rpick.base.errors import ConfigurationError, DeckError
 from d2rpick.rules import RULES, Example, Rule, Severity, check_deck
 from d2rpick.rules.configuration import Configuration
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic

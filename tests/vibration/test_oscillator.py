@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from d2rpick.errors import RangeError
+from d2rpick.base.errors import RangeError
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import Oscillator, Replay, State, from_mode, to_mode, trajectory
 from tests import paper

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import DIGITS, Branched
 from d2rpick.histories.formats.lsda import Lsda, recognises
 from d2rpick.histories.names import Part, plain_text

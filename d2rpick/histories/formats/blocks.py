@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.version import __version__
 from d2rpick.histories.formats.printed import decode
-from d2rpick.version import __version__
 
 if TYPE_CHECKING:
     import re

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.curves import Curves, find_curves

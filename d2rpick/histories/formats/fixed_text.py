@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import content_of
 from d2rpick.histories.formats.blocks import BATCH, CHUNK, UNSURE, Ahead, Stretch, like_example
 from d2rpick.histories.formats.printed import decode

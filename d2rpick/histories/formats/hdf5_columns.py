@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError
-from d2rpick.files import beyond, unpacked_beyond
+from d2rpick.base.errors import FormatError
+from d2rpick.base.files import beyond, unpacked_beyond
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

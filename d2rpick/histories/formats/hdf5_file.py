@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError, listing, printable
+from d2rpick.base.errors import FormatError, listing, printable
 from d2rpick.histories.database import DIGITS, Branched, Database
 from d2rpick.histories.formats.hdf5_columns import Column, check_data, check_file, columns_of, finite
 from d2rpick.histories.formats.printed import of_one_run

@@ -9,8 +9,8 @@ from itertools import islice
 from operator import itemgetter
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.errors import FormatError, listing
-from d2rpick.files import beyond, long_line
+from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.files import beyond, long_line
 from d2rpick.histories.content import Content
 from d2rpick.histories.names import is_time, is_unit, unit_of
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.formats.blocks import Pattern, repeats
 

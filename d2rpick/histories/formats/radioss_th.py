@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.radioss_records import INT, RUN, WIDTH, integers, is_binary, is_text, records_of

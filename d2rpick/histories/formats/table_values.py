@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats.layout import as_number, is_skipped, split
 from d2rpick.histories.names import is_time
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Legs
 from d2rpick.histories.formats import binout
 from d2rpick.histories.formats.binout import Binout, recognises

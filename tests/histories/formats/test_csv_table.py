@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import csv_table
 from d2rpick.histories.formats.layout import Portions, Text
 from d2rpick.histories.history import EXACT, Precision

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import csv_table
 from d2rpick.histories.history import History, Precision
 from d2rpick.histories.opening import Selection

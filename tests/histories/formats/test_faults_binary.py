@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats.binout import Binout
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from tests.faults import cases, some

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import glstat, matsum
 from tests.faults import FAULTS, Fault, cases, damage, glstat_states, is_within, matsum_states
 from tests.text_files import HEAD, glstat_text, matsum_text

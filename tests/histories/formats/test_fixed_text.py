@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import Content
 from d2rpick.histories.formats.fixed_text import PORTIONS, Portions
 from d2rpick.histories.formats.glstat import Glstat

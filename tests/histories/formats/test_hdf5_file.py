@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import hdf5_file
 from d2rpick.histories.formats.hdf5_columns import check_file
 from d2rpick.histories.formats.hdf5_file import SavedBinout

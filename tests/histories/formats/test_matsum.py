@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.errors import FormatError
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import matsum
 from tests.text_files import HEAD, matsum_head, matsum_part, matsum_state, matsum_text
 

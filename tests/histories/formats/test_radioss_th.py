@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.errors import D2RPickError, FormatError
+from d2rpick.base.errors import D2RPickError, FormatError
 from d2rpick.histories.formats import csv_table, radioss_th
 from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
 from d2rpick.histories.opening import Selection, open_run

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from d2rpick.errors import ChangedError
+from d2rpick.base.errors import ChangedError
 from d2rpick.histories import content
 from d2rpick.histories.content import OnDisk
 from d2rpick.histories.formats.layout import Portions, Text

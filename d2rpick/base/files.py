@@ -8,7 +8,7 @@ import time
 from errno import ELOOP
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
-from d2rpick.errors import D2RPickError
+from d2rpick.base.errors import D2RPickError
 
 if TYPE_CHECKING:
     from io import FileIO

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.files import settled_state
+from d2rpick.base.files import settled_state
 
 if TYPE_CHECKING:
     from pathlib import Path

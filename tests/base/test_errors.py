@@ -7,7 +7,7 @@ import unicodedata
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.errors import listing, printable
+from d2rpick.base.errors import listing, printable
 
 
 @given(st.text())

@@ -11,7 +11,7 @@ from multiprocessing import Pipe, get_all_start_methods, get_context, set_forkse
 from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar
 
-from d2rpick.errors import D2RPickError
+from d2rpick.base.errors import D2RPickError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.errors import D2RPickError
-from d2rpick.workers import Cores, Farm, Here, answers, cores
+from d2rpick.base.errors import D2RPickError
+from d2rpick.base.workers import Cores, Farm, Here, answers, cores
 from tests.command import TIME_LIMIT
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def test_an_interrupt_while_the_first_process_imports_is_no_traceback(tmp_path: 
     # the import ends when it is told to, after the interrupt: how long that takes must not matter
     (tmp_path / "slow.py").write_text("print('importing', flush=True); input(); print('imported')")
     code = (
-        "import signal; from d2rpick.workers import Cores, begin\n"
+        "import signal; from d2rpick.base.workers import Cores, begin\n"
         "signal.signal(signal.SIGINT, lambda *_: None)\n"  # an ignored one would be inherited
         "begin(2, 'slow')\n"
         "with Cores(2, 'slow') as farm: print(farm.submit(abs, -7).result())\n"
