@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import Document, Field, Kind, kind_of, maybe, row
+from d2rpick.report.fields import Document, Field, kind_of, maybe, row
 from d2rpick.report.situation import heading
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ MEASURES: Final = row(
     Field("td_ok", "flag?"),
     Field("verified", "flag"),
 )
-_OBJECTIONS: Final = Kind({"type": "array", "items": {"type": "string"}}, tuple)
 SWITCHED: Final = row(
     Field("source", kind_of("texts", minItems=1)),
     Field("energy_frozen", "number", "came back at td"),
@@ -35,7 +34,7 @@ SWITCHED: Final = row(
     Field("momentum_error", "size?",
           "largest deviation after td relative to the largest momentum of the reference there"),
     Field("displacement", "size?", "largest distance of the parts' centre from where the reference has it"),
-    Field("rigid_from", "number?"), Field("rigid_to", "number?"), Field("objections", _OBJECTIONS),
+    Field("rigid_from", "number?"), Field("rigid_to", "number?"), Field("objections", "texts"),
     Field("notes", "texts"),
     name="switched", later=("rigid_from", "rigid_to", "objections"),
 )  # fmt: skip
@@ -123,4 +122,5 @@ def _comparison(switched: Comparison) -> list[str]:
 def _of_switched(answer: Verdict) -> dict[str, Any]:
     """Measures of the switched run under names of their own; empty where there is none."""
     found = SWITCHED.plain(answer.switched) if answer.switched else {}
+    found = {name: "; ".join(value) if name == "objections" else value for name, value in found.items()}
     return {f"switched_{name}": value for name, value in found.items() if name not in ("source", "notes")}

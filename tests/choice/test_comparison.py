@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from csv import DictReader
 from functools import cache
+from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -103,6 +105,9 @@ def test_the_energy_that_was_locked_in_is_judged() -> None:
     found = answer("verify", *pair, ROLLOVER, "--switched", stored("rollover_r20.csv.gz"))
     assert found["verified"] is False
     assert any("locked in, 11.1" in reason for reason in found["reasons"])
+    csv = run("verify", *pair, ROLLOVER, "--switched", stored("rollover_r20.csv.gz"), "-f", "csv").stdout
+    (row,) = DictReader(StringIO(csv))
+    assert row["switched_objections"] == "; ".join(found["switched"]["objections"]) != ""
 
 
 def test_all_files_behind_the_option_are_of_the_switched_run() -> None:
