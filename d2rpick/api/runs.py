@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Parts, Path
     from d2rpick.choice.overview import Overview
     from d2rpick.histories import run as histories
+    from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part, Selection
     from d2rpick.histories.source import Source
 
@@ -249,3 +250,57 @@ def selection_of(
         energy=tuple(str(one) for one in listed),
         channels=tuple((name, str(channel)) for name, channel in named.items()),
     )
+
+
+def extracted(run: histories.Run, selection: Selection) -> tuple[dict[str, Samples], tuple[str, ...]]:
+    """Give the columns of what is selected of a run, with all that is known at its times, and the notes on it.
+
+    ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
+    the momentum by which the flight is seen, each of shape (n,).
+    """
+    from d2rpick.choice.of_run import Reference
+
+    history = Reference.of(run, selection).history
+    table = {"time": history.time, "internal_energy": history.energy}
+    if history.parts and len(history.parts) > 1:
+        energies = run.part_energies(history.parts)
+        table |= {f"part_{part.id}": column for part, column in zip(history.parts, energies.T, strict=True)}
+    return table | run.quantities(history.time) | _of_model(history) | _momentum(history), history.notes
+
+
+def _of_model(history: History) -> dict[str, Samples]:
+    """Columns of the whole model as its balance takes them, where they are written at the times of the energy.
+
+    The kinetic energy is that with rotation; the internal one is there where the chosen one is that of some parts.
+    """
+    import numpy as np
+
+    balance = history.balance
+    if balance is None or not np.array_equal(balance.time, history.time):
+        return {}
+    terms = {"kinetic_energy": balance.kinetic, "total_internal_energy": balance.internal if history.parts else None}
+    return {name: term for name, term in terms.items() if term is not None}
+
+
+def _momentum(history: History) -> dict[str, Samples]:
+    """Columns of the momentum by which the flight is seen, with its mass: of what flies longest, or the chosen parts.
+
+    Where only the velocity of the model is known, columns of that; nothing where neither is written at the times of the
+    energy.
+    """
+    import numpy as np
+
+    from d2rpick.flight.momentum import all_flights, to_be_asked  # not above: a table has no momenta
+
+    asked = [one for one in to_be_asked(history.momenta) if np.array_equal(one.time, history.time)]
+    if not asked:
+        return {}
+    momenta = next((one for one in asked if all_flights(one, history.balance)), asked[0])
+    flights, members = all_flights(momenta, history.balance), momenta.chosen
+    if flights and momenta.parts:
+        longest = max(flights, key=lambda flight: flight.end - flight.start)
+        members = tuple(momenta.parts.index(part) for part in longest.parts or momenta.parts)
+    mass = momenta.mass(members)
+    name = "velocity" if momenta.velocity else "momentum"
+    columns = {f"{axis}_{name}": column for axis, column in zip("xyz", momenta.of(members).T.copy(), strict=True)}
+    return columns | ({"mass": np.full(history.time.shape, mass)} if mass > 0 else {})
