@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.replayed import locked_in, response
-from d2rpick.choice.view import scale_of, view_of
 from d2rpick.histories.samples import outline
 from d2rpick.report.html import Markup, join, resource, tag
 from d2rpick.report.shell import shell_line
 from d2rpick.report.suggestion import acceptable
 from d2rpick.report.tables import measure, short
+from d2rpick.report.view import locked_in, response, scale_of, view_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,8 +26,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.suggest import AcceptableWindow
     from d2rpick.choice.trade_off import Offer, TradeOff
-    from d2rpick.choice.view import View
     from d2rpick.histories.history import Samples
+    from d2rpick.report.view import View
 
 
 # Stretches of the energy in sight, each with its lowest and highest value, and of the whole record in the overview.

@@ -15,7 +15,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.ticker import LogFormatter, NullLocator
 
 from d2rpick.base.errors import FormatError
-from d2rpick.choice.view import BELOW_LEVEL, LOGARITHMIC
+from d2rpick.report.view import BELOW_LEVEL, LOGARITHMIC
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from d2rpick.choice.view import Scale
+    from d2rpick.report.view import Scale
 
 
 FORMATS = ("png", "svg", "pdf")

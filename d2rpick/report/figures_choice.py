@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from d2rpick.choice.replayed import replayed_motion
-from d2rpick.choice.view import merged, scale_of, view_of
 from d2rpick.histories.samples import outline
 from d2rpick.report.figures import (
     BETTER,
@@ -27,6 +25,7 @@ from d2rpick.report.figures import (
     with_unit,
 )
 from d2rpick.report.situation import energy_name
+from d2rpick.report.view import merged, replayed_motion, scale_of, view_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,12 +34,11 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.plan import Plan
-    from d2rpick.choice.replayed import Motion
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.suggest import Pair, Suggestion
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.choice.verify import Verdict
-    from d2rpick.choice.view import View
+    from d2rpick.report.view import Motion, View
 
 
 # Height of a file's figure of the energy alone, and with the motion; on a page, that of a panel [inch].

@@ -9,7 +9,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from d2rpick.choice.study_rows import outliers, runs_of, short_names
-from d2rpick.choice.view import scale_of
 from d2rpick.report.figures import (
     GOOD,
     PAGE_WIDTH,
@@ -22,6 +21,7 @@ from d2rpick.report.figures import (
     show_span,
     with_unit,
 )
+from d2rpick.report.view import scale_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

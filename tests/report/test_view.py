@@ -7,12 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.replayed import replayed_motion
 from d2rpick.choice.settings import Settings
 from d2rpick.choice.situation import examine
-from d2rpick.choice.view import view
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import History
+from d2rpick.report.view import replayed_motion, view
 from tests.command import ENERGY
 from tests.energies import sure
 from tests.reading import read_history
