@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
+from d2rpick.base.graph import reached
 from d2rpick.deck.expression import ExpressionError, Number, evaluate, names_in, number
 
 if TYPE_CHECKING:
@@ -163,16 +164,9 @@ class Scope:
             return None
         return found[-1] if self._whole.latest_wins or found[-1].replaceable else found[0]
 
-    def closure(self, names: tuple[str, ...]) -> tuple[str, ...]:
+    def closure(self, names: tuple[str, ...]) -> list[str]:
         """Return ``names`` and all parameters their definitions refer to, directly or not."""
-        seen: dict[str, None] = {}
-        waiting = list(names)
-        while waiting:
-            name = waiting.pop(0)
-            if name not in seen:
-                seen[name] = None
-                waiting.extend(use for definition in self.definitions(name) for use in definition.uses)
-        return tuple(seen)
+        return reached(names, lambda name: (use for one in self.definitions(name) for use in one.uses), wide=True)
 
     def value(self, text: str) -> Number:
         """Value of a field: a number, a reference, or an expression; ExpressionError if it is none."""

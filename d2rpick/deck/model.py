@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 import numpy as np
 
+from d2rpick.base.graph import reached
 from d2rpick.deck.mesh import NO_NODE, distinct
 
 if TYPE_CHECKING:
@@ -379,12 +380,7 @@ def _together(parts: Collection[int], linked: Callable[[int], Iterable[int]]) ->
     """Groups of parts that are linked to each other, directly or not."""
     left, found = set(parts), []
     while left:
-        waiting, body = [min(left)], set[int]()
-        while waiting:
-            part = waiting.pop()
-            if part in left:
-                left.discard(part)
-                body.add(part)
-                waiting += left.intersection(linked(part))
+        body = reached([min(left)], lambda part: left.intersection(linked(part)))
+        left.difference_update(body)
         found.append(tuple(sorted(body)))
     return tuple(sorted(found))

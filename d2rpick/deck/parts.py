@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.graph import reached
+
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
@@ -94,17 +96,9 @@ class Parts:
             found.update(part for low, high in content.ranges for part in self.materials if low <= part <= high)
         return tuple(sorted(found))
 
-    def reached(self, set_id: int) -> tuple[int, ...]:
+    def reached(self, set_id: int) -> list[int]:
         """Return the set itself and all sets it adds up, directly or not, whether the deck has them or not."""
-        seen: dict[int, None] = {}
-        waiting = [set_id]
-        while waiting:
-            current = waiting.pop()
-            if current not in seen:
-                seen[current] = None
-                content = self.sets.get(current)
-                waiting.extend(content.sets if content else ())
-        return tuple(seen)
+        return reached([set_id], lambda one: content.sets if (content := self.sets.get(one)) else ())
 
 
 def read_parts(deck: Deck) -> Parts:

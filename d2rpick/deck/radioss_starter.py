@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.graph import reached
 from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.radioss_engine import below_title, card_of, keyword, number_of, whole
 
@@ -147,35 +148,29 @@ class Starter:
 
     def parts_in(self, subset: int) -> set[int]:
         """Parts of a subset and of those below it."""
-        waiting, seen = [subset], set[int]()
-        while waiting:
-            current = waiting.pop()
-            if current not in seen:
-                seen.add(current)
-                waiting += self.subsets.get(current, ())
-        return {part for part, line in self.parts.items() if line.subset in seen}
+        subsets = set(reached([subset], lambda one: self.subsets.get(one, ())))
+        return {part for part, line in self.parts.items() if line.subset in subsets}
 
     def group_members(self, group: int) -> tuple[set[int], set[int]] | None:
         """Nodes and whole parts of a group of nodes; None where they cannot be known."""
         nodes, parts = set[int](), set[int]()
-        waiting, seen = [group], set[int]()
-        while waiting:
-            current = waiting.pop()
-            if current in seen:
-                continue
-            seen.add(current)
-            kind, ids = self.groups.get(current, ("", ()))
+        for kind, ids in map(self._group, reached([group], self._groups_in)):
             if kind == "NODE":
                 nodes.update(ids)
             elif kind == "PART":
                 parts.update(ids)
             elif kind == "SUBSET":
                 parts.update(*(self.parts_in(one) for one in ids))
-            elif kind == "GRNOD" and all(one > 0 for one in ids):
-                waiting += ids
-            else:
+            elif kind != "GRNOD" or any(one <= 0 for one in ids):
                 return None
         return nodes, parts
+
+    def _group(self, group: int) -> tuple[str, tuple[int, ...]]:
+        return self.groups.get(group, ("", ()))
+
+    def _groups_in(self, group: int) -> tuple[int, ...]:
+        kind, ids = self._group(group)
+        return ids if kind == "GRNOD" else ()
 
 
 _ID_AT: Final = {"GRNOD": 2, "SENSOR": 2, "PROP": 2}  # where a keyword has its id; others behind their name

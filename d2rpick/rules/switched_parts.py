@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
+from d2rpick.base.graph import reached
 from d2rpick.deck.constraints import read_constraints
 from d2rpick.deck.parts import element_cards
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Example, grouped, rule
@@ -199,7 +200,8 @@ def _torn(case: Case) -> Iterator[Objection]:
     them: the lead part with LRB 0, the others with LRB = the lead.
     """
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
-    bodies = {part: _body(part, first) for part in first}
+    leads = {part: event.line.lead.value for part, event in first.items() if event.line.lead}
+    bodies = {part: _body(part, leads) for part in first}
     cards = element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
@@ -217,16 +219,9 @@ def _of_set(event: Event) -> str:
     return f" (of part set {event.line.part.value})" if event.line.by_set else ""
 
 
-def _body(part: int, first: dict[int, Event]) -> int:
+def _body(part: int, leads: dict[int, int]) -> int:
     """Return the lead at the end of the LRB chain; a part that merges into nobody leads itself."""
-    seen = {part}
-    while part in first:
-        lead = first[part].line.lead
-        if lead is None or not lead.value or lead.value in seen:
-            break
-        part = lead.value
-        seen.add(part)
-    return part
+    return reached([part], lambda one: [lead] if (lead := leads.get(one)) else [])[-1]
 
 
 def _together(case: Case, one: Unit, other: Unit) -> bool:
