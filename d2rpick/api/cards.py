@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from functools import partial
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.api.request import POSITIVE, TIME, UNLIMITED, dashed, option, options_of
 from d2rpick.base.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.asked import Asked
     from d2rpick.choice.judged_card import CardRequest
+    from d2rpick.choice.switched_run import Times
     from d2rpick.choice.verify import Verdict
     from d2rpick.choice.warnings import Caution
-    from d2rpick.deck.printed_card import Printing
+    from d2rpick.deck.printed_card import PrintedCard, Printing
     from d2rpick.deck.printed_card import Solver as Module
-    from d2rpick.histories.history import History
 
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
 _MOST_IDS: Final = 100_000
@@ -75,14 +76,6 @@ class Cards:
         return request
 
 
-def need_ids(request: CardRequest, history: History) -> str:
-    """Say which option names whom the card of the history's solver switches."""
-    from d2rpick.deck.printing import SOLVERS
-
-    solver, _ = request.of(history)
-    return needed(SOLVERS[solver])
-
-
 def needed(solver: Module) -> str:
     """Say which option names whom the card of ``solver`` switches."""
     what = {"part": "the parts to switch", "node": "the main nodes of the rigid bodies"}
@@ -104,10 +97,52 @@ def numbers(name: str, texts: Sequence[str]) -> list[int]:
     return ids
 
 
-def all_cautions(verdict: Verdict) -> tuple[Caution, ...]:
-    """Cautions of a verdict, and the verdict itself where it is an objection."""
+class JudgedCard(NamedTuple):
+    """A card, with what was found of each of its new windows as printed."""
+
+    card: PrintedCard
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def verified(self) -> bool:
+        """Whether all windows are."""
+        return all(verdict.verified for verdict in self.verdicts)
+
+
+def judged(
+    asked: Asked,
+    cards: Cards,
+    windows: Sequence[Times],
+    judge: Callable[[float, float], Verdict] | None = None,
+    done: Sequence[Times] = (),
+) -> JudgedCard:
+    """Print the card of windows that are judged as printed, as `verify` does it or by ``judge``.
+
+    Raises
+    ------
+    ArgumentError
+        If nobody says whom it switches, or an option belongs to another solver.
+    """
+    from d2rpick.choice.judged_card import judged_card
+    from d2rpick.choice.of_run import verify_of
+    from d2rpick.deck.printing import SOLVERS
+
+    reference, request = asked.reference, cards.request(asked).by(asked.settings)
+    judge = judge or partial(verify_of, reference, settings=asked.settings)
+    found = judged_card(windows, reference.history, judge, request, done)
+    if found is None:
+        raise ArgumentError(needed(SOLVERS[request.of(reference.history)[0]]))
+    return JudgedCard(*found)
+
+
+def all_cautions(verdicts: Iterable[Verdict]) -> tuple[Caution, ...]:
+    """Cautions of verdicts, each once, and the verdicts themselves where they are objections."""
+    return tuple(dict.fromkeys(caution for verdict in verdicts for caution in _cautions(verdict)))
+
+
+def _cautions(verdict: Verdict) -> Iterator[Caution]:
     from d2rpick.choice.warnings import Caution
 
-    if verdict.verified:
-        return verdict.cautions
-    return (*verdict.cautions, Caution("not-verified", f"the times as printed: {'; '.join(verdict.reasons)}"))
+    yield from verdict.cautions
+    if not verdict.verified:
+        yield Caution("not-verified", f"the times as printed: {'; '.join(verdict.reasons)}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.asked import Asked
-    from d2rpick.api.cards import Cards
+    from d2rpick.api.cards import Cards, JudgedCard
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.situation import Situation
@@ -97,6 +98,14 @@ class Suggestion(Judged, choice.Suggestion):
         from d2rpick.report.figures_choice import draw_suggestion
 
         return draw_suggestion(self)
+
+    def card(self, cards: Cards) -> JudgedCard | None:
+        """Print the card of the recommended pair, judged as printed; None without one."""
+        from d2rpick.api.cards import judged as judged_card
+
+        pair, asked = self.recommended, self.question
+        judge = partial(of_run.judge_of, asked.reference, self.situation)
+        return judged_card(asked, cards, [(pair.tr, pair.td)], judge) if pair else None
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
         """Write the page, with the card of the recommended pair."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
 from d2rpick.api.asked import ask, request_of
-from d2rpick.api.cards import Cards
+from d2rpick.api.cards import Cards, judged
 from d2rpick.api.request import check_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import plan as planning
@@ -22,11 +22,10 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.asked import Asked
+    from d2rpick.api.cards import JudgedCard
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.switched_run import Times
-    from d2rpick.choice.verify import Verdict
-    from d2rpick.deck.printed_card import PrintedCard
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -191,20 +190,21 @@ class Plan(RunAnswer, planning.Plan):
 
         return draw_plan(self)
 
-    def card(self, cards: Cards, *, every: bool = False) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
-        """Print the card of the next run, its new windows judged; None without one, or nobody to switch."""
-        from d2rpick.choice.judged_card import card_of_plan
-
-        return card_of_plan(self, self.question.reference.run, cards.request(self.question), every=every)
+    def card(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
+        """Print the card of the next run, its new windows judged; None where none is new."""
+        new, asked = self.new_windows(every=every), self.question
+        asked = replace(asked, reference=asked.reference._replace(history=self.history))
+        return judged(asked, cards, new, done=self.done) if new else None
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
         """Write the page, with the cards of the next run."""
         from d2rpick.choice.trade_off import explored_flights
         from d2rpick.report.pages import plan_page
 
-        card = self.card(cards or Cards())
+        cards = cards or Cards()
+        card = self.card(cards) if cards.request(self.question).whom(self.history) else None
         explorer = self._explorer(explored_flights(self.question.reference, self))
-        return plan_page(self, self.question.reference.run, command, card[0].text if card else None, explorer)
+        return plan_page(self, self.question.reference.run, command, card.card.text if card else None, explorer)
 
 
 def plan(

@@ -7,20 +7,19 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.choice.of_run import Reference, judge_of, verify_of
+from d2rpick.choice.of_run import judge_of
 from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from d2rpick.choice.plan import Plan
+    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.settings import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.verify import Verdict
     from d2rpick.deck.printed_card import PrintedCard, Times
     from d2rpick.histories.history import History
-    from d2rpick.histories.run import Run
 
 
 @dataclass(frozen=True)
@@ -38,6 +37,12 @@ class CardRequest:
         ids = self.printing.part or tuple(part.id for part in history.parts or ())
         end = float(history.time[-1]) if self.printing.end is None else self.printing.end
         return self.solver or solver_of(history.format), replace(self.printing, part=ids, end=end)
+
+    def whom(self, history: History) -> tuple[int, ...]:
+        """Give the parts or main nodes that the card switches; none where nobody says it."""
+        solver, printing = self.of(history)
+        switched: tuple[int, ...] = getattr(printing, SOLVERS[solver].switches)
+        return switched
 
     def by(self, settings: Settings) -> CardRequest:
         """Let the parts of each rigid body that a deck tells be merged, and what its run keeps off stay off."""
@@ -80,23 +85,14 @@ def judged_card(
     ``done`` are windows in which the run was switched already: they are printed too, and cannot be judged by it.
     None where nobody says whom the card switches: the chosen parts, or main nodes for a solver that asks for these.
     """
-    solver, printing = request.of(history)
-    if not getattr(printing, SOLVERS[solver].switches):
+    if not request.whom(history):
         return None
+    solver, printing = request.of(history)
     every = sorted((*done, *windows))
     plain = cards(every, printing, solver)
     verdicts = tuple(judge(*times) for asked, times in zip(every, plain.windows, strict=True) if asked not in done)
     remarks = (*_of_done(done, history), *_remarks(verdicts))
     return cards(every, printing, solver, remarks), verdicts
-
-
-def card_of_plan(
-    plan: Plan, run: Run, request: CardRequest, *, every: bool = False
-) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
-    """Print the card of the run that a plan leads to, its new windows judged; None also where none is new."""
-    new = plan.new_windows(every=every)
-    judge = partial(verify_of, Reference(run, plan.history), settings=plan.settings)
-    return judged_card(new, plan.history, judge, request.by(plan.settings), plan.done) if new else None
 
 
 def _of_done(done: Sequence[Times], history: History) -> Iterator[str]:

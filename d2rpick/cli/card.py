@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -105,9 +104,7 @@ def _judged(
 ) -> tuple[PrintedCard, bool]:
     """Write the card with the verdict of the history in its comments, and tell it on stderr too."""
     from d2rpick.api.asked import ask
-    from d2rpick.api.cards import all_cautions, need_ids
-    from d2rpick.choice.judged_card import judged_card
-    from d2rpick.choice.of_run import verify_of
+    from d2rpick.api.cards import all_cautions, judged
     from d2rpick.deck.printing import SOLVERS
 
     asked = ask(run, request, prints=True)
@@ -115,9 +112,6 @@ def _judged(
     module = SOLVERS[wanted.of(history)[0]]
     if wanted.printing.part and module.switches != "part":
         raise ArgumentError(_ONLY_JUDGED.format(module.title))
-    found = judged_card(windows, history, partial(verify_of, asked.reference, settings=asked.settings), wanted)
-    if found is None:
-        raise ArgumentError(need_ids(wanted, history))
-    card, verdicts = found
-    output.notes(history.notes, dict.fromkeys(caution for verdict in verdicts for caution in all_cautions(verdict)))
-    return card, all(verdict.verified for verdict in verdicts)
+    found = judged(asked, cards, windows)
+    output.notes(history.notes, all_cautions(found.verdicts))
+    return found.card, found.verified

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -16,7 +15,6 @@ from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
     from d2rpick.api.cards import Cards
-    from d2rpick.api.choices import Suggestion
     from d2rpick.api.request import Request
     from d2rpick.cli.output import Output
 
@@ -46,6 +44,7 @@ def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, c
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
     """
     from d2rpick.api.asked import ask
+    from d2rpick.api.cards import all_cautions
     from d2rpick.api.choices import suggested
 
     wanted, card = time_or_window(td, td_window), output.output_format == "card"
@@ -58,31 +57,11 @@ def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, c
     output.notes(asked.reference.history.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
     if card:
-        return output.finish(objection=not _card(answer, cards, output), quality=answer.quality)
+        found = answer.card(cards)
+        told = [] if found is None else [one for one in all_cautions(found.verdicts) if one not in answer.cautions]
+        return output.finish(objection=not output.card(found, told), quality=answer.quality)
     output.answer(answer, limit=limit)
     return output.finish(objection=answer.recommended is None, quality=answer.quality)
-
-
-def _card(answer: Suggestion, cards: Cards, output: Output) -> bool:
-    """Print the card of the recommended pair, judged as it is printed; False where there is none or it fails."""
-    from d2rpick.api.cards import all_cautions, need_ids
-    from d2rpick.choice.judged_card import judged_card
-    from d2rpick.choice.of_run import judge_of
-
-    pair, situation = answer.recommended, answer.situation
-    if pair is None:
-        output.content(b"")
-        return False
-    request = cards.request(answer.question).by(situation.settings)
-    judge = partial(judge_of, answer.question.reference, situation)
-    found = judged_card([(pair.tr, pair.td)], situation.history, judge, request)
-    if found is None:
-        raise ArgumentError(need_ids(request, situation.history))
-    card, (verdict,) = found
-    said = set(answer.cautions)
-    output.notes(card.notes, [caution for caution in all_cautions(verdict) if caution not in said])
-    output.content(card.text.encode())
-    return verdict.verified
 
 
 EXPLORE: Final = """\b

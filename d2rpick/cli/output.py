@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from d2rpick.api.answer import Answer, Paged
-    from d2rpick.api.cards import Cards
+    from d2rpick.api.cards import Cards, JudgedCard
     from d2rpick.api.request import Request
     from d2rpick.choice.ranking import Quality
     from d2rpick.choice.warnings import Caution
@@ -158,6 +158,15 @@ class Output:
             self.write(self.file, content)
         else:
             click.echo(content, nl=False)
+
+    def card(self, found: JudgedCard | None, cautions: Iterable[Caution]) -> bool:
+        """Give out the card of an answer with what is to be told of it; False where there is none or one fails."""
+        if found is None:
+            self.content(b"")
+            return False
+        self.notes(found.card.notes, cautions)
+        self.content(found.card.text.encode())
+        return found.verified
 
     def notes(self, notes: Iterable[str], cautions: Iterable[Caution]) -> None:
         """Say what a reader left out, and what the user should know."""

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from d2rpick.api.cards import Cards
     from d2rpick.api.flights import Plan
     from d2rpick.api.request import Request
-    from d2rpick.choice.verify import Verdict
     from d2rpick.cli.output import Output
     from d2rpick.deck.printed_card import PrintedCard
 
@@ -76,6 +75,7 @@ def plan(
     these, then plan the next from the switched run, with --done.
     """
     from d2rpick.api.asked import ask, open_run
+    from d2rpick.api.cards import all_cautions
     from d2rpick.api.flights import planned
 
     form = output.output_format
@@ -92,12 +92,13 @@ def plan(
     answer = planned(asked, min_rigid, options.windows_in(done) if done else (), earlier)
     output.notes(answer.history.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), (), cards))
-    found = _printed(answer, cards, every=every) if form == "card" or write_deck else None
-    checked, passed = _write_and_check(found[0], answer, write_deck, output) if found and write_deck else ("", True)
+    found = answer.card(cards, every=every) if form == "card" or write_deck else None
+    checked, passed = _write_and_check(found.card, answer, write_deck, output) if found and write_deck else ("", True)
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":
-        return output.finish(objection=not (_card(found, output) and passed))
+        told = [] if found is None else all_cautions(one for one in found.verdicts if not one.verified)
+        return output.finish(objection=not (output.card(found, told) and passed))
     output.answer(answer, checked if form == "table" else "", every=every)
     return output.finish(objection=not (answer.supported and passed))
 
@@ -131,31 +132,6 @@ def _by_deck(cards: Cards, deck: str | None) -> Cards:
         return replace(cards, solver=cards.solver or "ls-dyna")
     legs = read_run(deck).legs
     return replace(cards, solver=cards.solver or "radioss", name=cards.name or (legs[0].name if legs else None))
-
-
-def _printed(plan: Plan, cards: Cards, *, every: bool) -> tuple[PrintedCard, tuple[Verdict, ...]] | None:
-    """Print the cards of the next run, judged as they are printed; None without a window."""
-    from d2rpick.api.cards import need_ids
-
-    if not plan.new_windows(every=every):
-        return None
-    found = plan.card(cards, every=every)
-    if found is None:
-        raise ArgumentError(need_ids(cards.request(plan.question), plan.history))
-    return found
-
-
-def _card(found: tuple[PrintedCard, tuple[Verdict, ...]] | None, output: Output) -> bool:
-    """Give out the cards; False where there are none or one fails."""
-    from d2rpick.api.cards import all_cautions
-
-    if found is None:
-        output.content(b"")
-        return False
-    card, verdicts = found
-    output.notes(card.notes, dict.fromkeys(c for one in verdicts for c in all_cautions(one) if not one.verified))
-    output.content(card.text.encode())
-    return all(verdict.verified for verdict in verdicts)
 
 
 def _write_and_check(card: PrintedCard, plan: Plan, folder: str, output: Output) -> tuple[str, bool]:
