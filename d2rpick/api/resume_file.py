@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
-from d2rpick.choice.study import stamps
-from d2rpick.choice.study_rows import FAILED, PLAIN, UNREADABLE, Stamp, StudyRow
+from d2rpick.choice.study import FAILED, UNREADABLE, Stamp, StudyRow, stamps
+from d2rpick.report.study import PLAIN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,7 +37,7 @@ def line(row: StudyRow, asked: str) -> str:
 
     ``asked`` is the ``fingerprint`` of the question.
     """
-    record = row.plain | {
+    record = PLAIN.plain(row) | {
         "acceptable": [windows.tolist() for windows in (row.acceptable, row.alike)],
         "profile": None if row.profile is None else row.profile.tolist(),
         "files": [stamp._asdict() for stamp in row.files],
@@ -110,7 +110,7 @@ class Ledger:
         whole = "profile" in record and ("curve" in record or not self.curve)
         if record["asked"] == self.asked and files and whole:
             self._rows[files] = StudyRow(
-                **{name: record[name] for name in PLAIN if name != "warnings"},
+                **{name: record[name] for name in PLAIN.keys if name != "warnings"},
                 warnings=tuple(record["warnings"]),
                 acceptable=np.array(record["acceptable"][0]).reshape(-1, 2),
                 alike=np.array(record["acceptable"][1]).reshape(-1, 2),

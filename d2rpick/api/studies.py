@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.api.request import Request
     from d2rpick.api.resume_file import Ledger
     from d2rpick.base.workers import Farm
-    from d2rpick.choice.study_rows import StudyRow
+    from d2rpick.choice.study import StudyRow
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.study import row_of
-from d2rpick.choice.study_rows import common_tr
+from d2rpick.choice.study import common_tr, row_of
 from d2rpick.models.box_run import BOX, RigidWindow, simulate
 from d2rpick.models.box_scan import compare, suggestion_for
 from d2rpick.models.published_figures import Curve, Exhibit, Panel, Shape
@@ -17,7 +16,7 @@ from d2rpick.models.published_figures import Curve, Exhibit, Panel, Shape
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from d2rpick.choice.study_rows import StudyRow
+    from d2rpick.choice.study import StudyRow
     from d2rpick.histories.history import Samples
     from d2rpick.models.box_model import Parameters, Plane
     from d2rpick.models.box_run import Record

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from d2rpick.choice.study_rows import outliers, runs_of, short_names
+from d2rpick.choice.study import outliers, runs_of, short_names
 from d2rpick.report.figures import (
     GOOD,
     PAGE_WIDTH,
@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from d2rpick.choice.study import Study
-    from d2rpick.choice.study_rows import StudyRow
+    from d2rpick.choice.study import Study, StudyRow
     from d2rpick.histories.history import Samples
 
 # Okabe and Ito's palette, without the yellow that white swallows; dashes tell apart lines of the same colour.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.study_rows import runs_of
+from d2rpick.choice.study import runs_of
 from d2rpick.report import page, parts, plan, study, suggestion, trade_off, verdict
 from d2rpick.report.explorer import explorer
 from d2rpick.report.html import Markup, document, drawings, pairs, remarks, section, table, tag

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.study_rows import runs_of
+from d2rpick.choice.study import runs_of
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe, one_of, row
@@ -12,8 +12,7 @@ from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe,
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from d2rpick.choice.study import Study
-    from d2rpick.choice.study_rows import StudyRow
+    from d2rpick.choice.study import Study, StudyRow
 
 STATUS: Final = one_of("ok", "none", "unreadable", "out-of-range", "failed", "internal-error")
 _A_NUMBER, _NULL = {"type": "number"}, {"type": "null"}

@@ -20,7 +20,7 @@ from d2rpick.histories.opening import Selection
 from tests import variants
 
 if TYPE_CHECKING:
-    from d2rpick.choice.study_rows import StudyRow
+    from d2rpick.choice.study import StudyRow
 
 QUESTION = Question(variants.TD, Settings())
 

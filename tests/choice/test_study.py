@@ -1,4 +1,4 @@
-"""What many runs have in common: the spread, the agreement, one tr for all, and why there is none."""
+"""What many runs have in common: the spread, the agreement, one tr for all or why none, and which stand out."""
 
 from __future__ import annotations
 
@@ -12,8 +12,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.choice.settings import Settings
-from d2rpick.choice.study import Question, ask, failed, find_runs, summarise
-from d2rpick.choice.study_rows import OK, StudyRow, fewest_digits
+from d2rpick.choice.study import (
+    NONE,
+    OK,
+    UNREADABLE,
+    Question,
+    StudyRow,
+    ask,
+    failed,
+    fewest_digits,
+    find_runs,
+    outliers,
+    short_names,
+    summarise,
+)
 from d2rpick.choice.verify import verify
 from d2rpick.histories.opening import Selection
 from tests import variants
@@ -262,3 +274,30 @@ def test_files_of_all_formats_are_rows_of_one_study() -> None:
     assert [found.source for found in answer.rows] == sources
     assert {"ok", "unreadable", "out-of-range"} <= {found.status for found in rows}
     assert all((found.message is None) == (found.status == OK) for found in rows)
+
+
+def chosen(name: str, tr: float | None = None, status: str = OK) -> StudyRow:
+    return StudyRow(name, status, tr=tr)
+
+
+def test_runs_without_a_tr_and_far_ones_stand_out_the_farthest_first() -> None:
+    near = [chosen(f"run{i}", 1.0 + i / 1000) for i in range(20)]
+    far, farther = chosen("far", 1.1), chosen("farther", 0.5)
+    none, lost = chosen("none", None, NONE), chosen("x", None, UNREADABLE)
+    assert outliers([far, *near, lost, none, farther]) == (none, farther, far)
+    assert outliers(near) == ()
+    assert outliers([none]) == (none,)
+    assert outliers([]) == ()
+
+
+def test_equal_times_let_any_other_stand_out() -> None:
+    runs = [*(chosen("same", 2.0) for _ in range(9)), chosen("other", 2.1)]
+    assert [one.source for one in outliers(runs)] == ["other"]
+
+
+def test_short_names_tell_runs_apart() -> None:
+    assert short_names(["a/b/soft/box/glstat", "a/b/hard/box/glstat"]) == ("soft", "hard")
+    assert short_names(["one.csv"]) == ("one.csv",)
+    assert short_names(["x/one.csv", "x/one.csv"]) == ("one.csv", "one.csv")
+    assert short_names(["one.csv", "deep/er/one.csv"]) == ("one.csv", "deep/er/one.csv")
+    assert short_names([]) == ()

@@ -10,8 +10,7 @@ from matplotlib.patches import Rectangle
 
 import d2rpick as d2
 from d2rpick.choice.settings import Settings
-from d2rpick.choice.study import Study
-from d2rpick.choice.study_rows import Common, StudyRow
+from d2rpick.choice.study import Common, Study, StudyRow
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
 from d2rpick.report.figures_choice import draw_suggestion
