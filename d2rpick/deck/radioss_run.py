@@ -21,7 +21,7 @@ from d2rpick.deck.radioss_engine import Leg, blocks, card_of, keyword, read_legs
 from d2rpick.deck.radioss_starter import Starter
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
-from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows
+from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows, follow
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -248,23 +248,14 @@ def _units(node: int, parts: dict[int, set[int]]) -> list[Unit]:
     return [Unit(part) for part in sorted(parts.get(node, ()))] or [Unit(node, is_body=True)]
 
 
-def _follow(unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg) -> Iterator[Window]:
+def _follow(unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg) -> list[Window]:
     """Windows of a body: on from the start unless the first leg says otherwise."""
     start = LegSwitch(first.run, "plain", None, (), ())
-    opened: Event | None = Event(unit, start, Switched(Value(node, first.run.here), False, True))
+    events = [(0.0, Event(unit, start, Switched(Value(node, first.run.here), False, True)))]
     for one in sets:
-        line = next((line for line in one.switched if line.part.value == node), None)
-        if line is None:
-            continue
-        event = Event(unit, one, line)
-        if not line.to_rigid:
-            if opened and one.at > 0:
-                yield Window(unit, opened.by.time or 0.0, one.at, opened, event)
-            opened = None
-        elif opened is None or (opened.by.time == one.at == 0):
-            opened = event
-    if opened:
-        yield Window(unit, opened.by.time or 0.0, None, opened, None)
+        events += [(max(0.0, one.at), Event(unit, one, line)) for line in one.switched if line.part.value == node][:1]
+    begun = sum(time == 0 for time, _ in events)  # of what is said for the start the last counts
+    return follow(unit, events[begun - 1 :])[0]
 
 
 def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]]) -> Iterator[Window]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
@@ -339,9 +339,13 @@ def find_windows(sets: Iterable[SwitchSet], parts: Parts) -> Windows:
     windows: list[Window] = []
     orphans: list[Event] = []
     for unit in sorted(timed):
-        found, left = _follow(unit, timed[unit])
+        # at equal times the way back counts as the earlier one: both at once is no window
+        found, left = follow(unit, sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)))
+        if left and found and found[-1].td is None:
+            td, closed = left.pop()
+            found[-1] = replace(found[-1], td=td, closed=closed)
         windows += found
-        orphans += left
+        orphans += [event for _, event in left]
     return Windows(
         tuple(windows),
         tuple(orphans),
@@ -362,20 +366,16 @@ def _events(card: SwitchSet, parts: Parts) -> Iterable[Event]:
             yield from (Event(Unit(part), card, line) for part in members)
 
 
-def _follow(unit: Unit, events: list[tuple[float, Event]]) -> tuple[list[Window], list[Event]]:
+def follow(unit: Unit, events: Iterable[tuple[float, Event]]) -> tuple[list[Window], list[tuple[float, Event]]]:
+    """Windows of a unit by its events and their times, in order; and the events that find it deformable already."""
     windows: list[Window] = []
     orphans: list[tuple[float, Event]] = []
-    opened: tuple[float, Event] | None = None
-    # at equal times the way back counts as the earlier one: both at once is no window
-    for time, event in sorted(events, key=lambda timed: (timed[0], timed[1].line.to_rigid)):
-        if event.line.to_rigid:
-            opened = opened or (time, event)
-        elif opened is None:
+    for time, event in events:
+        rigid = bool(windows) and windows[-1].td is None
+        if event.line.to_rigid and not rigid:
+            windows.append(Window(unit, time, None, event, None))
+        elif rigid and not event.line.to_rigid:
+            windows[-1] = replace(windows[-1], td=time, closed=event)
+        elif not event.line.to_rigid:
             orphans.append((time, event))
-        else:
-            windows.append(Window(unit, opened[0], time, opened[1], event))
-            opened = None
-    if opened is not None:
-        td, closed = orphans.pop() if orphans else (None, None)
-        windows.append(Window(unit, opened[0], td, opened[1], closed))
-    return windows, [event for _, event in orphans]
+    return windows, orphans
