@@ -253,9 +253,11 @@ def _follow(unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg) -> l
     start = LegSwitch(first.run, "plain", None, (), ())
     events = [(0.0, Event(unit, start, Switched(Value(node, first.run.here), False, True)))]
     for one in sets:
-        events += [(max(0.0, one.at), Event(unit, one, line)) for line in one.switched if line.part.value == node][:1]
-    begun = sum(time == 0 for time, _ in events)  # of what is said for the start the last counts
-    return follow(unit, events[begun - 1 :])[0]
+        for line in [line for line in one.switched if line.part.value == node][:1]:
+            if one.at == events[-1][0] == 0 and line.to_rigid and events[-1][1].line.to_rigid:
+                events.pop()  # it is this line that says it
+            events.append((one.at or 0.0, Event(unit, one, line)))
+    return [window for window in follow(unit, events)[0] if window.td is None or window.td > 0]
 
 
 def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]]) -> Iterator[Window]:
