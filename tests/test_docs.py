@@ -15,8 +15,7 @@ import pytest
 import d2rpick
 from d2rpick.cli import COMMANDS
 from d2rpick.histories.opening import READERS
-from d2rpick.rules import RULES
-from d2rpick.rules.configuration import read_configuration
+from d2rpick.rules import RULES, read_configuration
 from tests.command import DECK, GLSTAT, ROOT, run
 from tests.examples import (
     PAGES,

@@ -100,8 +100,7 @@ def check(
     >>> [(window.part, window.td) for window in found.windows]
     [(11, 0.0687534), (12, 0.064)]
     """
-    from d2rpick.rules import check_deck, configuration_for
-    from d2rpick.rules.configuration import Configuration
+    from d2rpick.rules import Configuration, check_deck, configuration_for
 
     names = arguments.paths("decks", decks)
     if history is not None:

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.api.request import Request
     from d2rpick.choice.warnings import Caution
     from d2rpick.cli.output import Output
-    from d2rpick.rules import Checked, Unreadable
-    from d2rpick.rules.configuration import Configuration
+    from d2rpick.rules import Checked, Configuration, Unreadable
     from d2rpick.rules.judgement import HistoryJudge
 
 CHECK: Final = """\b
@@ -61,8 +60,7 @@ def check(
     line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) silences one for it.
     """
     from d2rpick.report.findings import Checks
-    from d2rpick.rules import Severity
-    from d2rpick.rules.configuration import Configuration
+    from d2rpick.rules import Configuration, Severity
 
     judge = _judge(request)
     output = output.beside(*deck, *(judge.run.sources if judge else ()))

@@ -11,8 +11,16 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from d2rpick.base.errors import ConfigurationError, DeckError
-from d2rpick.rules import RULES, Example, Rule, Severity, check_deck
-from d2rpick.rules.configuration import Configuration
+from d2rpick.rules import (
+    RULES,
+    Configuration,
+    Example,
+    Rule,
+    Severity,
+    check_deck,
+    find_configuration,
+    read_configuration,
+)
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import answer, run
 from tests.decks import found, write
@@ -252,3 +260,62 @@ def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(tmp_pat
         assert all(one.endswith("or end its last line" if within else "or add that line") for one in told)
     deck.write_text(f"{whole}*END")
     assert not check_deck(str(deck)).findings
+
+
+# Configuration files.
+
+
+OWN = 'select = ["D2R1"]\nignore = ["D2R104"]\n[severity]\nD2R101 = "warning"\n'
+
+
+def test_the_nearest_file_wins(tmp_path: Path) -> None:
+    inner = tmp_path / "a" / "b"
+    inner.mkdir(parents=True)
+    (tmp_path / "d2rpick.toml").write_text(OWN)
+    (tmp_path / "a" / "pyproject.toml").write_text("[project]\nname = 'other'\n")
+    configuration = find_configuration(inner)
+    assert configuration.select == ("D2R1",)
+    assert configuration.ignore == ("D2R104",)
+    assert configuration.severity == {"D2R101": "warning"}
+    assert configuration.source == str(tmp_path / "d2rpick.toml")
+    (tmp_path / "a" / "pyproject.toml").write_text("[tool.d2rpick]\nselect = ['D2R0']\n")
+    assert find_configuration(inner).select == ("D2R0",)
+    (tmp_path / "a" / "d2rpick.toml").write_text("")
+    assert find_configuration(inner).select == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("selct = []", "did you mean 'select'"),
+        ("select = 'D2R1'", "a list"),
+        ("select = [1]", "a list"),
+        ("severity = 3", "a table"),
+        ("[tool]\nd2rpick = 1", "a table was expected"),
+        ("[severity]\nD2R101 = 'fatal'", "one of error"),
+        ("[severity]\nD2R101 = ['error']", "one of error"),
+        ("select = ", "valid TOML"),
+        ("a = '\xff'", "valid TOML"),
+        (f"select = {'9' * 5000}", "valid TOML"),  # Python refuses to read it,
+        (f"[severity]\nD2R101 = 0x{'f' * 5000}", "valid TOML"),  # and to write this one
+        (f"select = {'[' * 9999}", "valid TOML"),
+    ],
+)
+def test_wrong_settings_say_what_is_wrong(tmp_path: Path, text: str, message: str) -> None:
+    name = "pyproject.toml" if "[tool]" in text else "d2rpick.toml"
+    (tmp_path / name).write_bytes(text.encode("latin-1"))
+    with pytest.raises(ConfigurationError, match=message) as caught:
+        find_configuration(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["tool = 3", "[tool]\nother = 1", "[tool.other]\nx = 1"])
+def test_a_pyproject_without_a_table_for_us(tmp_path: Path, text: str) -> None:
+    (tmp_path / "pyproject.toml").write_text(text)
+    assert find_configuration(tmp_path).source != str(tmp_path / "pyproject.toml")
+    assert read_configuration({}) == Configuration()
+
+
+def test_a_near_miss_is_named() -> None:
+    with pytest.raises(ConfigurationError, match="did you mean D2R101"):
+        Configuration(ignore=("D2R10l",)).verify(["D2R101"])
