@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from d2rpick.api import arguments
 from d2rpick.api.request import Request
-from d2rpick.base.errors import ArgumentError, listing, name_units
+from d2rpick.base.errors import ArgumentError, FormatError, listing, name_units
 from d2rpick.choice.of_run import Reference
 from d2rpick.histories.names import Selection
 
@@ -116,11 +116,10 @@ def ask(run: Run, request: Request, *, prints: bool = False, merge: int | None =
     if request.part:
         _check_recommended(request, files)
     if model is not None:
-        from d2rpick.choice import by_deck
-        from d2rpick.choice.deck_of_run import in_deck
+        from d2rpick.choice.deck_of_run import in_deck, with_deck
 
         files = in_deck(files, model.inventory)
-        selection = by_deck.selected(files, selection, settings, model)
+        selection = selected(files, selection, settings, model)
     parts: tuple[str, ...] = ()
     if prints and on_card_only(request, files):
         parts, selection = selection.parts, selection._replace(parts=())
@@ -129,18 +128,51 @@ def ask(run: Run, request: Request, *, prints: bool = False, merge: int | None =
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:
-        settings, cautions = by_deck.with_deck(settings, reference, model)
+        settings, cautions = with_deck(settings, reference, model)
     asked = Asked(run, request, reference, selection, settings, model, parts, cautions)
     return asked if merge is None else _merged(asked, merge)
 
 
 def model_of(request: Request) -> CostModel | None:
-    """Read the deck with its weights; None without one."""
+    """Read the deck with its weights, or the file of these; None without one.
+
+    Raises
+    ------
+    DeckError, ConfigurationError
+        If one of them cannot be read.
+    """
     if request.deck is None:
         return None
-    from d2rpick.choice.by_deck import read_model
+    from d2rpick.choice.cost import CostModel, read_weights
+    from d2rpick.deck import read_inventory
 
-    return read_model(request.deck, request.weights)
+    weights = request.weights
+    return CostModel(read_inventory(request.deck), read_weights(weights) if isinstance(weights, str) else weights)
+
+
+def selected(run: histories.Run, selection: Selection, settings: Settings, model: CostModel) -> Selection:
+    """Complete a selection: the parts of the recommended set for that word, and the springs of deck and energies.
+
+    Raises
+    ------
+    FormatError
+        If no set can be recommended.
+    """
+    from d2rpick.choice.deck_of_run import of_another_model
+    from d2rpick.choice.sets_of_parts import recommended_parts
+    from d2rpick.deck.model import DISCRETE
+    from d2rpick.flight.flying_parts import asks_for_recommended
+
+    if foreign := of_another_model(run, model.inventory):
+        if asks_for_recommended(selection.parts, run):
+            raise FormatError(f"{run.name}: no set of parts can be recommended: {foreign.message}, or the parts")
+        return selection
+    counts = model.inventory.counts
+    springs = {part.id for part in run.springs} | {part for part, kinds in counts.items() if {*kinds} <= DISCRETE}
+    parts = selection.parts
+    if asks_for_recommended(parts, run):
+        parts = tuple(map(str, recommended_parts(run, settings, model)))
+    return selection._replace(parts=parts, springs=tuple(map(str, sorted(springs))))
 
 
 def _check_recommended(request: Request, run: histories.Run) -> None:

@@ -5,15 +5,18 @@ The deck of another model tells numbers of parts that have nothing to do with th
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError, are, name_units
+from d2rpick.choice.cost import ByDeck, Share
 from d2rpick.choice.warnings import Caution
+from d2rpick.deck.geometry import Placement
 from d2rpick.deck.pieces import pieces_of, supports_of
-from d2rpick.deck.radioss_run import LEFT_RIGID
+from d2rpick.deck.radioss_run import LEFT_RIGID, RUINS
 from d2rpick.flight.bodies import RigidBody
 from d2rpick.histories.surroundings import Support, Surroundings
 
@@ -21,6 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from d2rpick.choice.cost import CostModel
+    from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.settings import Settings
     from d2rpick.deck.model import Gravity, Hold, Inventory
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
@@ -140,6 +145,42 @@ def _differ(one: str, other: str) -> bool:
     first, second = (" ".join(title.split()).casefold() for title in plain)
     shorter = min(len(first), len(second))
     return first[:shorter] != second[:shorter]
+
+
+def with_deck(settings: Settings, reference: Reference, model: CostModel) -> tuple[Settings, tuple[Caution, ...]]:
+    """Let the deck tell the cost share of the parts of a history, unless it is given, and which bodies they become.
+
+    What stays unknown is in the cautions; the deck of another model tells nothing.
+    """
+    inventory = model.inventory
+    if foreign := of_another_model(reference.run, inventory):
+        return replace(settings, bodies=()), (foreign,)
+    ids = [part.id for part in reference.history.parts or ()]
+    told = (*doubts_of_solver(ids, inventory), *left_rigid_in(reference.run, inventory))
+    ruined = tuple(RUINS[code] for code in dict.fromkeys(one.code for one in told) if code in RUINS)
+    history, settings = reference.history, replace(settings, kept_off=inventory.kept_off, ruined=ruined)
+    if not history.parts:
+        why = "no parts are named whose elements are saved; give them with `parts`"
+        open_ = [Caution("cost-unknown", f"the run time stays open: {why}")] if settings.cost_share is None else []
+        return replace(settings, bodies=()), (*told, *open_)
+    asked = settings.cost_share is None
+    share = model.saved(ids) if asked else Share(settings.cost_share)
+    found = replace(
+        settings,
+        cost_share=share.value,
+        bodies=bodies_of(inventory, ids),
+        placement=Placement(inventory),
+        by_deck=ByDeck(inventory.files, model.weights if asked else None),
+    )
+    doubts = [
+        *doubts_of(history.parts, inventory),
+        *doubts_of_cost(model, used=asked and share.value is not None),
+        *doubts_of_bodies(ids, inventory),
+        *told,
+    ]
+    if share.reason:
+        doubts.append(Caution("cost-unknown", f"the run time stays open: {share.reason}"))
+    return found, tuple(doubts)
 
 
 def in_deck(run: Run, inventory: Inventory | None) -> Run:

@@ -200,14 +200,6 @@ def recommended_parts(run: Run, settings: Settings, model: CostModel) -> tuple[i
     return found.recommended.parts
 
 
-def with_cost_of(settings: Settings, model: CostModel, parts: Sequence[int]) -> tuple[Settings, Share]:
-    """Let the cost share of the settings be that of these parts, unless one is given."""
-    if settings.cost_share is not None:
-        return settings, Share(settings.cost_share)
-    share = model.saved(parts)
-    return replace(settings, cost_share=share.value), share
-
-
 def _distinct(sets: Sequence[PartSet]) -> list[PartSet]:
     """Leave out what is there already under another name."""
     return [one for at, one in enumerate(sets) if one.parts not in [other.parts for other in sets[:at]]]

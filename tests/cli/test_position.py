@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from d2rpick.api.asked import model_of
+from d2rpick.api.asked import model_of, selected
 from d2rpick.api.request import Request
-from d2rpick.choice.by_deck import selected
 from d2rpick.choice.settings import Settings
 from d2rpick.histories.names import Selection
 from tests.command import answer, run
