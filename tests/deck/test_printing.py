@@ -182,27 +182,6 @@ def test_warnings_are_those_that_apply() -> None:
     assert "DTMAX is 0" not in text(replace(PARTS, step_cap=1e-5))
 
 
-@pytest.mark.parametrize(
-    ("times", "printing"),
-    [
-        ((0.02, 0.09), Printing()),
-        ((0.02, 0.09), Printing(part=(0,))),
-        ((0.02, 0.09), Printing(part=(10**10,))),
-        ((0.02, 0.09), replace(PARTS, merge=10**9)),
-        ((0.02, 0.09), replace(PARTS, swset=(5, 5))),
-        ((1.0000000001, 1.0000000002), PARTS),
-    ],
-)
-def test_what_is_not_a_card(times: tuple[float, float], printing: Printing) -> None:
-    with pytest.raises(DeckError):
-        cards([times], printing)
-
-
-def test_windows_that_only_printing_makes_touch_are_refused() -> None:
-    with pytest.raises(DeckError, match="different times"):
-        cards([(1.0, 2.00000000001), (2.00000000002, 3.0)], PARTS)
-
-
 def test_every_window_has_sets_of_its_own(tmp_path: Path) -> None:
     text = cards([(0.02, 0.09), (0.2, 0.3), (0.4, 0.5)], replace(MERGED, swset=(8, 7))).text
     assert re.findall(r"^ +(\d+) +0 +\S+ +0.0 +0.0 +0 +0 +0$", text, flags=re.MULTILINE) == [
@@ -237,20 +216,29 @@ def test_every_window_has_a_leg_and_one_from_the_start_none_before_it() -> None:
     assert found == [("1", "0.02", "ON"), ("2", "0.05", "OFF"), ("3", "0.09", "ON"), ("4", "0.15", "OFF")]
 
 
+ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
+
+
 @pytest.mark.parametrize(
-    ("end", "message"), [(0.05, "the run ends at 0.05"), (None, "not given"), (float("inf"), "the run ends")]
+    ("solver", "windows", "printing", "message"),
+    [
+        ("ls-dyna", ONE, Printing(), "no id was given"),
+        ("ls-dyna", ONE, Printing(part=(0,)), "id 0 does not fit"),
+        ("ls-dyna", ONE, Printing(part=(10**10,)), "id 10000000000 does not fit"),
+        ("ls-dyna", ONE, replace(PARTS, merge=10**9), "id 1000000000 does not fit"),
+        ("ls-dyna", ONE, replace(PARTS, swset=(5, 5)), "both switch sets are 5"),
+        ("ls-dyna", [(1.0000000001, 1.0000000002)], PARTS, "different times"),
+        ("ls-dyna", [(1.0, 2.00000000001), (2.00000000002, 3.0)], PARTS, "different times"),
+        ("radioss", ONE, replace(LONE, end=0.05), "the run ends at 0.05"),
+        ("radioss", ONE, LONE, "not given"),
+        ("radioss", ONE, replace(LONE, end=float("inf")), "the run ends"),
+        ("radioss", ONE, Printing(end=1.0), "no id was given"),
+        ("radioss", ONE, replace(LONE, end=1.0, name="a/b"), "the name of the run"),
+        ("radioss", [(i, i + 0.5) for i in range(1, 60)], replace(LONE, end=100.0), "at most 99"),
+    ],
 )
-def test_the_end_comes_last(end: float | None, message: str) -> None:
+def test_what_a_solver_cannot_be_told_is_refused(
+    solver: str, windows: list[tuple[float, float]], printing: Printing, message: str
+) -> None:
     with pytest.raises(DeckError, match=message):
-        radioss_cards([(0.02, 0.09)], Printing(node=(1,), end=end))
-
-
-@pytest.mark.parametrize("printing", [Printing(end=1.0), Printing(node=(1,), end=1.0, name="a/b")])
-def test_what_is_not_a_run(printing: Printing) -> None:
-    with pytest.raises(DeckError):
-        radioss_cards([(0.02, 0.09)], printing)
-
-
-def test_more_legs_than_the_solver_numbers_are_refused() -> None:
-    with pytest.raises(DeckError, match="at most 99"):
-        radioss_cards([(i, i + 0.5) for i in range(1, 60)], Printing(node=(1,), end=100.0))
+        cards(windows, printing, solver)

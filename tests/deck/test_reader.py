@@ -245,21 +245,18 @@ def test_a_deck_that_cannot_be_read(tmp_path: Path, name: str) -> None:
         read_deck(f"{tmp_path}/{name}")
 
 
-def test_an_undefined_parameter_is_named(tmp_path: Path) -> None:
-    deck = read(tmp_path, "*PARAMETER_EXPRESSION\nR a       &b*2\n" + automatic(1, "&a", rigid=["1"]))
-    (card,) = read_switching(deck)
-    ((place, problem),) = card.problems
-    assert place.text == "&a"
-    assert "&b is not defined" in problem
-    assert "main.k:2" in problem
-
-
-def test_a_parameter_defined_below_its_card_is_a_problem_with_both_places(tmp_path: Path) -> None:
-    deck = read(tmp_path, automatic(1, "&a", rigid=["1"]) + "*PARAMETER\nR a           0.02\n")
-    ((place, problem),) = (found for card in read_switching(deck) for found in card.problems)
-    assert place.text == "&a"
-    assert "defined only below, at" in problem
-    assert "main.k:8" in problem
+@pytest.mark.parametrize(
+    ("deck", "told", "place"),
+    [
+        ("*PARAMETER_EXPRESSION\nR a       &b*2\n" + automatic(1, "&a", rigid=["1"]), "&b is not defined", "main.k:2"),
+        (automatic(1, "&a", rigid=["1"]) + "*PARAMETER\nR a           0.02\n", "defined only below, at", "main.k:8"),
+    ],
+)
+def test_a_parameter_without_a_value_is_named_with_its_place(tmp_path: Path, deck: str, told: str, place: str) -> None:
+    ((field, problem),) = (found for card in read_switching(read(tmp_path, deck)) for found in card.problems)
+    assert field.text == "&a"
+    assert told in problem
+    assert place in problem
 
 
 @pytest.mark.parametrize("keyword", [*KINDS, *sorted(NOT_COUNTED), "NODE"])
