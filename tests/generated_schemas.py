@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from d2rpick.report.fields import Field, Kind, kind_of
 from d2rpick.report.formats import FORMATS
 from tests.command import ROOT
+from validation.published import reproduction
 
 if TYPE_CHECKING:
     from d2rpick.report.fields import Document
@@ -24,7 +25,7 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 def documents() -> dict[str, Document]:
     """Give the documents of all results by the names of their schemas, as ``suggest-1``."""
-    found = (import_module(f"d2rpick.report.{result}").DOCUMENT for result in FORMATS)
+    found = (reproduction.DOCUMENT, *(import_module(f"d2rpick.report.{result}").DOCUMENT for result in FORMATS))
     return {one.name.removeprefix("d2rpick/").replace("/", "-"): one for one in found}
 
 

@@ -1,5 +1,6 @@
-"""Runs of a real solver that the documentation quotes: decks, results, and how to repeat them.
+"""Runs of a real solver that the documentation quotes: decks, results, how to repeat them; and the published study.
 
 ``python -m validation.run MODEL FOLDER`` runs a deck where OpenRadioss is installed, switched or not;
-``python -m validation.figures`` draws the figures of docs/validation.md from ``results``.
+``python -m validation.figures`` draws the figures of docs/validation.md from ``results``.  ``published`` is what
+``d2rpick reproduce`` calls.
 """

@@ -15,7 +15,6 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.ticker import LogFormatter, NullLocator
 
 from d2rpick.base.errors import FormatError
-from d2rpick.report.view import BELOW_LEVEL, LOGARITHMIC
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -75,13 +74,6 @@ def make_logarithmic(axes: Axes, low: float, high: float) -> None:
         axes.yaxis.set_minor_locator(NullLocator())
     else:
         axes.yaxis.set_minor_formatter(LogFormatter())
-
-
-def show_level(axes: Axes, level: float, highest: float) -> None:
-    """Make the axis logarithmic where the level would vanish on a linear one."""
-    if level > 0 and highest > LOGARITHMIC * level:
-        make_logarithmic(axes, level / BELOW_LEVEL, highest)
-        axes.set_ylim(bottom=level / BELOW_LEVEL)
 
 
 def show_span(axes: Axes, span: tuple[float, float], scale: Scale, above: Sequence[tuple[str, float]]) -> None:

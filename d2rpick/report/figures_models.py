@@ -1,4 +1,4 @@
-"""Figures of the models: the oscillator, the rollover box, the published results with their schemes."""
+"""Figures of the models: the oscillator and the rollover box."""
 
 from __future__ import annotations
 
@@ -6,33 +6,23 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import FancyArrowPatch, Polygon, Rectangle
-from matplotlib.ticker import MaxNLocator
+from matplotlib.patches import Polygon
 
-from d2rpick.models.box_model import Parameters, build
 from d2rpick.models.box_motion import CURB_THICKNESS, Sled
-from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, finish, show_level
+from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, finish
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Sequence
 
     from matplotlib.axes import Axes
 
     from d2rpick.choice.suggest import Suggestion
-    from d2rpick.histories.history import Samples
+    from d2rpick.models.box_model import Parameters
     from d2rpick.models.box_run import Record, RigidWindow
     from d2rpick.models.box_scan import Outcome
-    from d2rpick.models.published_figures import Exhibit, Panel
     from d2rpick.vibration.oscillator import Replay, Trajectory
 
 
-# Okabe and Ito's palette goes on.
-_COLOURS = (REFERENCE, SWITCHED, GOOD, FLIGHT, "#cc79a7", "#e69f00")
-_STYLES: Final[Mapping[str, dict[str, Any]]] = {
-    "line": {"linewidth": 1}, "thin": {"linewidth": 0.6, "linestyle": "--"}, "dots": {"linestyle": "", "marker": "."},
-}  # fmt: skip
-# Dots on a curve: few enough that the line below stays in sight.
-_DOTS = 100
 # Outlines of the rolling box, as many as can be told apart.
 _OUTLINES = 8
 
@@ -52,72 +42,6 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
             axes.axvspan(switched.tr, switched.td, color=FLIGHT, alpha=0.2, label="rigid", linewidth=0)
         finish(axes)
     return figure
-
-
-def draw_exhibit(exhibit: Exhibit) -> Figure:
-    """All panels of an exhibit, or its scheme."""
-    if not exhibit.panels:
-        figure = Figure(figsize=(8, 4.2), layout="constrained")
-        axes = figure.subplots()
-        SCHEMES[exhibit.name](axes)
-        axes.set_aspect("equal")
-        return figure
-    rows, columns = len(exhibit.panels), len(exhibit.panels[0])
-    figure = Figure(figsize=(9 if columns == 1 else 5.2 * columns, 3.4 * rows), layout="constrained")
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for axes, panel in zip(grid.flat, (panel for row in exhibit.panels for panel in row), strict=True):
-        _draw_panel(axes, panel, exhibit.columns)
-    return figure
-
-
-def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
-    drawn = dict.fromkeys(_STYLES, 0)
-    for curve in panel.curves:
-        x, y = columns[curve.x] if curve.x else next(iter(columns.values())), columns[curve.column]
-        shown = slice(None, None, max(1, x.size // _DOTS) if curve.style == "dots" and not panel.span else 1)
-        label = curve.label or "_"
-        axes.plot(x[shown], y[shown], label=label, color=_COLOURS[drawn[curve.style]], **_STYLES[curve.style])
-        drawn[curve.style] += 1
-    for shape, colour in zip(panel.shapes, _COLOURS, strict=False):
-        closed = np.column_stack([shape.outlines, shape.outlines[:, 0]]).T
-        lines = axes.plot(closed.real, closed.imag, color=colour, **_STYLES[shape.style])
-        lines[0].set_label(shape.label)
-        axes.set_aspect("equal")
-    _draw_marks(axes, panel)
-    if panel.span:
-        _show(axes, panel, columns)
-    axes.set_title(panel.title, fontsize="small")
-    axes.set(xlabel=panel.xlabel, ylabel=panel.ylabel)
-    finish(axes, legend=False)
-    if panel.curves and all(curve.x and curve.style == "dots" for curve in panel.curves):
-        axes.margins(x=0.1, y=0.1)  # single runs, which would stand on the edges
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize="x-small", loc="best")
-
-
-def _draw_marks(axes: Axes, panel: Panel) -> None:
-    for name, level in panel.levels:
-        axes.axhline(level, color=SWITCHED, linewidth=0.8, label=name)
-    for place, (name, x) in enumerate(panel.marks):
-        axes.axvline(x, color=_COLOURS[2 + place], linestyle="--", linewidth=1, label=name)
-    for x, y in panel.points:
-        axes.plot(x, y, "o", color=GOOD, markersize=5)
-    if panel.rigid:
-        axes.axvspan(*panel.rigid, color=FLIGHT, alpha=0.2, linewidth=0, label="rigid")
-
-
-def _show(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
-    """Show the span of a panel, and of its curves what lies in it."""
-    assert panel.span is not None
-    low, high = panel.span
-    x = next(iter(columns.values()))
-    values = np.concatenate([columns[curve.column][(low <= x) & (x <= high)] for curve in panel.curves])
-    axes.set_xlim(low, high)
-    room = 0.06 * float(np.ptp(values))
-    axes.set_ylim(float(values.min()) - room, float(values.max()) + room)
-    if panel.levels:
-        show_level(axes, panel.levels[0][1], float(values.max()))
 
 
 def draw_rollover(
@@ -229,81 +153,3 @@ def draw_sled(axes: Axes, parameters: Parameters, place: float) -> None:
     ):
         shape = place + np.array(corners) * turn
         axes.add_patch(Polygon(np.column_stack([shape.real, shape.imag]), closed=True, color=colour, alpha=0.6))
-
-
-def box(axes: Axes) -> None:
-    """The rollover box on its sled."""
-    parameters = Parameters()
-    structure = build(parameters)
-    draw_sled(axes, parameters, 0.0)
-    for truss, colour, width in ((structure.box, REFERENCE, 0.4), (structure.step, GOOD, 1.2)):
-        for one, other in structure.places[truss.ends]:
-            axes.plot([one.real, other.real], [one.imag, other.imag], color=colour, linewidth=width)
-    _arrow(axes, (-1.35, 0.95), (-0.95, 0.95), "sled, 7 m/s, stops in 60 ms")
-    for text, place, at in (
-        ("box, switched", (0.55, 1.2), (0.1, 1.0)), ("step, stays deformable", (0.55, 0.75), (0.02, 0.1)),
-        ("curb with cushion", (0.55, 0.35), (0.07, 0.04)), ("ground", (0.75, -0.08), (0.75, -parameters.ground)),
-    ):  # fmt: skip
-        axes.annotate(text, at, xytext=place, fontsize="small", arrowprops={"arrowstyle": "-", "linewidth": 0.6})
-    axes.set(xlim=(-1.7, 1.5), ylim=(-0.25, 1.7), xlabel="x [m]", ylabel="z [m]")
-
-
-def masses(axes: Axes) -> None:
-    """Two masses, a spring, a damper to each."""
-    _block(axes, 0.0, "m")
-    _block(axes, 3.0, "M")
-    _spring(axes, 1.0, 3.0, 0.65)
-    axes.text(2.0, 0.95, "k", ha="center")
-    for left, name, label in ((0.0, "z", "α m"), (3.0, "y", "α M")):
-        _arrow(axes, (left + 0.5, 1.35), (left + 1.1, 1.35), name)
-        _damper(axes, left + 0.5, label)
-    _arrow(axes, (-1.0, 0.65), (-0.1, 0.65), "V0")
-    axes.text(2.0, -1.25, "β = M/m,  no support: dampers act against the rest", ha="center", fontsize="small")
-    axes.set(xlim=(-1.3, 4.6), ylim=(-1.5, 1.9))
-    axes.axis("off")
-
-
-def elements(axes: Axes) -> None:
-    """Ten bricks as the spring between two lumps of mass."""
-    for number in range(10):
-        axes.add_patch(
-            Rectangle((1.0 + 0.2 * number, 0.55), 0.2, 0.2, facecolor=FLIGHT, edgecolor=REFERENCE, alpha=0.6)
-        )
-    _block(axes, 0.0, "m")
-    _block(axes, 3.0, "M")
-    axes.text(2.0, 0.95, "ten bricks, E A/L = k", ha="center")
-    _arrow(axes, (-1.0, 0.65), (-0.1, 0.65), "V0")
-    axes.text(2.0, -0.5, "masses added to the nodes of the end sections;\nall nodes are one rigid body from tr to td",
-              ha="center", fontsize="small")  # fmt: skip
-    axes.set(xlim=(-1.3, 4.6), ylim=(-0.9, 1.5))
-    axes.axis("off")
-
-
-SCHEMES: Final[Mapping[str, Callable[[Axes], None]]] = {"box": box, "masses": masses, "elements": elements}
-
-
-def _block(axes: Axes, left: float, name: str) -> None:
-    axes.add_patch(Rectangle((left, 0.15), 1.0, 1.0, facecolor="white", edgecolor=REFERENCE, linewidth=1.2))
-    axes.text(left + 0.5, 0.65, name, ha="center", va="center", fontsize="large")
-
-
-def _spring(axes: Axes, left: float, right: float, height: float) -> None:
-    inner = np.linspace(left + 0.3, right - 0.3, 13)
-    x = np.concatenate([[left], inner, [right]])
-    z = height + 0.14 * np.concatenate([[0, 0], np.resize([1.0, -1.0], 11), [0, 0]])
-    axes.plot(x, z, color=REFERENCE, linewidth=1.2)
-
-
-def _damper(axes: Axes, x: float, label: str) -> None:
-    """A dashpot from a mass down to the rest."""
-    axes.plot([x, x], [0.15, -0.25], color=REFERENCE, linewidth=1)
-    axes.plot([x - 0.13, x + 0.13], [-0.25, -0.25], color=REFERENCE, linewidth=2)
-    axes.plot([x - 0.18, x - 0.18, x + 0.18, x + 0.18], [-0.15, -0.45, -0.45, -0.15], color=REFERENCE, linewidth=1)
-    axes.plot([x, x], [-0.45, -0.75], color=REFERENCE, linewidth=1)
-    axes.plot([x - 0.35, x + 0.35], [-0.75, -0.75], color=REFERENCE, linewidth=1.5)
-    axes.text(x + 0.28, -0.4, label, fontsize="small")
-
-
-def _arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], text: str) -> None:
-    axes.add_patch(FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=12, color=SWITCHED))
-    axes.text(start[0], start[1] + 0.08, text, color=SWITCHED, fontsize="small")

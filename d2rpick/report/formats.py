@@ -26,7 +26,7 @@ class Shown(NamedTuple):
     lines: Sequence[str] = ()
 
 
-_PLAIN: Final[Mapping[str, Writer]] = {
+PLAIN: Final[Mapping[str, Writer]] = {
     "table": lambda report, answer, _: report.as_table(answer),
     "json": lambda report, answer, shown: report.DOCUMENT.as_json(answer, shown.command),
     "csv": lambda report, answer, _: report.as_csv(answer),
@@ -36,29 +36,28 @@ _PLAIN: Final[Mapping[str, Writer]] = {
 # The first form of each is the default.
 FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
     "suggestion": {
-        **_PLAIN,
+        **PLAIN,
         "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
         "ndjson": lambda report, answer, shown: report.DOCUMENT.as_line(answer, shown.command),
         "value": lambda report, answer, _: report.as_value(answer),
     },
-    "plan": {**_PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
+    "plan": {**PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
     "trade_off": {
-        **_PLAIN,
+        **PLAIN,
         "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
     },
-    "parts": {**_PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
-    "calibration": {**_PLAIN, "toml": lambda report, answer, _: report.as_toml(answer)},
-    "verdict": _PLAIN,
-    "overview": _PLAIN,
+    "parts": {**PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
+    "calibration": {**PLAIN, "toml": lambda report, answer, _: report.as_toml(answer)},
+    "verdict": PLAIN,
+    "overview": PLAIN,
     "study": {
-        **_PLAIN,
+        **PLAIN,
         "ndjson": lambda report, answer, shown: "\n".join([*shown.lines, report.LAST.as_line(answer, shown.command)]),
     },
-    "reproduction": {**_PLAIN, "csv": lambda report, answer, _: report.as_csv(answer.rows)},
     "rollover": {
-        **_PLAIN,
+        **PLAIN,
         "markdown": lambda report, answer, _: report.as_markdown(answer.outcomes),
         "csv": lambda report, answer, _: report.as_csv(answer.outcomes),
     },

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 
 
 _MOST_FILES: Final = 20  # of a deck that are named
-SIGNED: Final = ("chosen by", "date", "signature")  # lines of a page to be filled in by hand
+# Lines of a page to be filled in by hand.
+SIGNED: Final = ("chosen by", "date", "signature")
+CHECKED: Final = ("checked by", "date", "signature")
 
 
 @dataclass(frozen=True)

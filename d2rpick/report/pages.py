@@ -22,15 +22,12 @@ if TYPE_CHECKING:
     from d2rpick.choice.verify import Verdict
     from d2rpick.histories.opening import Run
     from d2rpick.histories.source import Source
-    from d2rpick.models.published import PublishedValue
-    from d2rpick.models.published_figures import Exhibit
     from d2rpick.report.explorer import Explorer
 
 # More rows than one compares by eye; csv and json hold all.
 _MOST_ROWS = 20
 # What is said of the pair of ``suggest`` beside its times.
 _TOLD = ("quality", "keeps", "saves")
-_CHECKED = ("checked by", "date", "signature")
 
 
 def _draw_suggestion(answer: Suggestion) -> dict[str, str]:
@@ -221,7 +218,7 @@ def _window(row: Planned, found: Plan) -> Markup:
 def study_page(answer: Study, command: Sequence[str]) -> str:
     """Write the page of ``study``; ``command`` are the arguments that repeat it."""
     title = f"Switch times of {runs_of(len(answer.rows))}"
-    return document(title, *_of_study(answer, command), signed=_CHECKED)
+    return document(title, *_of_study(answer, command), signed=page.CHECKED)
 
 
 def _of_study(answer: Study, command: Sequence[str]) -> Iterator[Markup]:
@@ -285,37 +282,3 @@ def _set(best: PartSet | None) -> Markup:
     saved = tag("span", tag("i", "saves about"), f"{best.saving:.0%}", tag("i", " of the run time"))
     listed = tag("p", f"parts {parts.ranges(best.parts)}")
     return tag("div", tag("h2", best.name), tag("div", saved, class_="times"), listed, class_="card chosen")
-
-
-def reproduction_page(rows: Sequence[PublishedValue], exhibits: Sequence[Exhibit], command: Sequence[str]) -> str:
-    """Write the page of ``reproduce``: every figure with what the paper shows and what is found, then the table."""
-    from d2rpick.models.published import MISPRINTS
-    from d2rpick.report import reproduction
-
-    published = table("Published and here", reproduction.HEAD, [reproduction.cells(row) for row in rows])
-    return document(
-        "Analysis of switched-rigid floating oscillator, reproduced",
-        tag("p", f"{reproduction.MODEL}. The box is a model of our own; the paper states none of its figures."),
-        *(_exhibited(one) for one in exhibits),
-        section("Published and here", published),
-        tag("ul", *(tag("li", text) for text in reproduction.pairs_of())),
-        section("Misprints in the paper", tag("ul", *(tag("li", misprint) for misprint in MISPRINTS))),
-        page.repeated(command),
-        signed=_CHECKED,
-    )
-
-
-def _exhibited(one: Exhibit) -> Markup:
-    from d2rpick.report import reproduction
-    from d2rpick.report.figures import svg_element
-    from d2rpick.report.figures_models import draw_exhibit
-
-    drawing = Markup(svg_element(draw_exhibit(one), f"{one.name}-"))
-    class_ = {True: "good", False: "bad", None: "soft"}[one.agrees]
-    return section(
-        reproduction.heading(one),
-        tag("figure", tag("div", drawing, role="img", aria_label=one.title)),
-        tag("p", tag("b", "Paper: "), one.paper),
-        tag("p", tag("b", "Here: "), one.found),
-        tag("p", "Agrees: ", tag("span", reproduction.verdict(one), class_=class_)),
-    )

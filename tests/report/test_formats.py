@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 import pytest
 
 from d2rpick.cli import d2rpick
 from d2rpick.report.formats import FORMATS
 from tests.command import ENERGY, run
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 COMMANDS = {
     "suggestion": ("suggest", "--td", "0.064", ENERGY),
@@ -23,7 +18,6 @@ COMMANDS = {
     "trade_off": ("explore", "--steps", "5", ENERGY),
     "parts": ("parts", "--deck", "sample_data/rollover_box.k", "sample_data/rollover_box.matsum"),
     "calibration": ("calibrate", "sample_data/flying_box"),
-    "reproduction": ("reproduce", "--section", "5", "--overwrite", "--output-dir"),
     "rollover": ("rollover", "--scan"),
     "findings": ("check", "--exit-zero", "sample_data/switching.k", "--history", "sample_data/energy.glstat"),
 }
@@ -34,9 +28,8 @@ QUICK = [(result, form) for result in FORMATS for form in FORMATS[result] if res
 
 
 @pytest.mark.parametrize(("result", "form"), QUICK)
-def test_every_form_is_written(result: str, form: str, tmp_path: Path) -> None:
-    folder = [str(tmp_path)] if result == "reproduction" else []
-    written = run(*COMMANDS[result], *folder, "-f", form)
+def test_every_form_is_written(result: str, form: str) -> None:
+    written = run(*COMMANDS[result], "-f", form)
     assert written.exit_code == 0, written.stderr
     assert written.stdout.strip()
 

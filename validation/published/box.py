@@ -11,7 +11,7 @@ import numpy as np
 from d2rpick.choice.study import common_tr, row_of
 from d2rpick.models.box_run import BOX, RigidWindow, simulate
 from d2rpick.models.box_scan import compare, suggestion_for
-from d2rpick.models.published_figures import Curve, Exhibit, Panel, Shape
+from validation.published.exhibits import Curve, Exhibit, Panel, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

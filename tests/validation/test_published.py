@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from d2rpick.models import published, published_box, published_figures, saving
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.published import MISPRINTS, table
-from d2rpick.report.figures_models import draw_exhibit
-from d2rpick.vibration.oscillator import Oscillator, Replay, State, integrated
+from d2rpick.report.formats import PLAIN
+from d2rpick.vibration.oscillator import Oscillator, Replay, State
 from tests import paper
 from tests.command import ENERGY, ROOT, answer, run
 from tests.json_schemas import check_by_schema
+from validation.published import box, exhibits, saving, values
+from validation.published.drawing import draw_exhibit
+from validation.published.values import MISPRINTS, integrated, table
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 SOLVER = str(ROOT / "sample_data" / "oscillator_solver.csv")
 RUN = str(ROOT / "sample_data" / "oscillator_solver_6_80.csv")
-ALL = {
-    exhibit.name: exhibit for exhibit in (*(make() for _, make in published_figures.exhibits_of({})), saving.exhibit())
-}
+ALL = {exhibit.name: exhibit for exhibit in (*(make() for _, make in exhibits.exhibits_of({})), saving.exhibit())}
 
 
 def test_the_oscillator_is_that_of_the_paper() -> None:
-    assert published.OSCILLATOR == paper.OSCILLATOR
-    assert paper.START == published.START
+    assert values.OSCILLATOR == paper.OSCILLATOR
+    assert paper.START == values.START
 
 
 def test_every_number_of_the_paper_and_every_reference_value_is_met() -> None:
@@ -53,9 +53,9 @@ def test_a_wrong_number_does_not_agree() -> None:
 
 
 def test_the_better_pair_has_no_residual() -> None:
-    assert published.pair_at_peak() == pytest.approx((paper.BETTER_TR, paper.BETTER_TD), rel=1e-12)
-    assert published.residual(published.pair_at_peak()) < 1e-12
-    assert published.residual(published.PUBLISHED) == pytest.approx(0.963, abs=1e-3)
+    assert values.pair_at_peak() == pytest.approx((paper.BETTER_TR, paper.BETTER_TD), rel=1e-12)
+    assert values.residual(values.pair_at_peak()) < 1e-12
+    assert values.residual(values.PUBLISHED) == pytest.approx(0.963, abs=1e-3)
 
 
 @pytest.mark.parametrize("known", [paper.SWITCHED_6_80, paper.SWITCHED_13_64])
@@ -126,11 +126,11 @@ def test_the_saving_is_predicted_beside_what_was_measured() -> None:
 
 def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
     coarse = Parameters(mesh=4)
-    every = tuple(published_box.variants_of(coarse))
+    every = tuple(box.variants_of(coarse))
     some = (every[0], every[2], every[6], every[-1])  # two that act after td, two before
     assert [one.before for one in some] == [False, False, True, True]
-    made = {exhibit.name: exhibit for exhibit in (make() for _, make in published_box.exhibits_of(coarse)[1:-1])}
-    made["variants"] = published_box.exhibit_of(published_box.tried(some))
+    made = {exhibit.name: exhibit for exhibit in (make() for _, make in box.exhibits_of(coarse)[1:-1])}
+    made["variants"] = box.exhibit_of(box.tried(some))
     assert [exhibit.figure for exhibit in made.values()] == ["2a, b", "2c", "8", "section 4"]
     assert made["early"].agrees
     tr = next(name for name in made["revised"].columns if name.startswith("droll") and "70" not in name)
@@ -163,6 +163,22 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
     assert page.read_text("utf-8").count("<figure>") == len(drawn)
     columns = np.genfromtxt(place / "response.csv", delimiter=",", names=True)
     np.testing.assert_array_equal(columns["y_13_64_m"], ALL["response"].columns["y_13_64_m"])
+
+
+def test_without_the_repository_a_line_says_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "validation.published", None)
+    result = run("reproduce", "--output-dir", str(tmp_path / "paper"))
+    assert result.exit_code == 2
+    assert "reproduce needs the folder validation of the repository" in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "paper").exists()
+
+
+@pytest.mark.parametrize("form", PLAIN)
+def test_every_form_is_written(form: str, tmp_path: Path) -> None:
+    written = run("reproduce", "--section", "5", "--output-dir", str(tmp_path), "-f", form)
+    assert written.exit_code == 0, written.stderr
+    assert written.stdout.strip()
 
 
 def test_its_files_are_the_same_every_time_and_replaced_only_when_told(tmp_path: Path) -> None:
@@ -202,7 +218,7 @@ def test_a_solver_s_table_without_its_columns_is_refused(tmp_path: Path) -> None
 
 def test_the_samples_of_the_solver_are_near_the_closed_form() -> None:
     tables = {kind: named_columns(name) for kind, name in (("pairs", SOLVER), ("run", RUN))}
-    made = {exhibit.name: exhibit for exhibit in (make() for _, make in published_figures.exhibits_of(tables))}
+    made = {exhibit.name: exhibit for exhibit in (make() for _, make in exhibits.exhibits_of(tables))}
     pairs, motion = made["solver"].columns, made["motion"].columns
     scale = np.abs(pairs["reference_solver_m"]).max()
     for name in ("published", "better"):

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.choice.cost import POINT, Weights, saved_share
-from d2rpick.models.published_figures import Curve, Exhibit, Panel
 from d2rpick.vibration.measures import run_time_share
+from validation.published.exhibits import Curve, Exhibit, Panel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

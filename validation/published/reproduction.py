@@ -1,19 +1,22 @@
-"""The answer of ``reproduce`` as table, JSON, CSV and Markdown."""
+"""The answer of ``reproduce`` as table, JSON, CSV, Markdown and HTML page."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.version import __version__
-from d2rpick.models.published import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, pair_at_peak, residual
-from d2rpick.report import keys, tables
+from d2rpick.report import keys, page, tables
 from d2rpick.report.fields import Document, Field, Kind, kind_of, many, row
+from d2rpick.report.figures import svg_element
+from d2rpick.report.html import Markup, document, section, table, tag
+from validation.published.drawing import draw_exhibit
+from validation.published.values import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, pair_at_peak, residual
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.models.published import PublishedValue
-    from d2rpick.models.published_figures import Exhibit
+    from validation.published.exhibits import Exhibit
+    from validation.published.values import PublishedValue
 
 MODEL = "k = 660e3 N/m, M = 31.4 kg, beta = 2, alpha = 50 1/s, V0 = 6 m/s"
 _DECIMALS = 12
@@ -92,8 +95,9 @@ def as_markdown(answer: Reproduction, *, pictures: bool = False) -> str:
     return "\n\n".join(blocks)
 
 
-def as_csv(rows: Sequence[PublishedValue]) -> str:
+def as_csv(answer: Reproduction) -> str:
     """Give the rows at full precision."""
+    rows = answer.rows
     body: list[list[tables.Cell]]
     body = [[r.what, r.unit, r.published, r.reference, r.here, r.difference, r.agrees, r.source] for r in rows]
     return tables.as_csv(HEAD, body).rstrip("\n")
@@ -124,3 +128,30 @@ def pairs_of() -> list[str]:
         f"{name} pair: tr = {1e3 * pair[0]:.6g} ms, td = {1e3 * pair[1]:.6g} ms, residual {residual(pair):.3f}"
         for name, pair in (("published", PUBLISHED), ("better", pair_at_peak()))
     ]
+
+
+def as_page(answer: Reproduction, command: Sequence[str]) -> str:
+    """Write the page: every figure with what the paper shows and what is found, then the table."""
+    published = table("Published and here", HEAD, [cells(row) for row in answer.rows])
+    return document(
+        "Analysis of switched-rigid floating oscillator, reproduced",
+        tag("p", f"{MODEL}. The box is a model of our own; the paper states none of its figures."),
+        *(_exhibited(one) for one in answer.exhibits),
+        section("Published and here", published),
+        tag("ul", *(tag("li", text) for text in pairs_of())),
+        section("Misprints in the paper", tag("ul", *(tag("li", misprint) for misprint in MISPRINTS))),
+        page.repeated(command),
+        signed=page.CHECKED,
+    )
+
+
+def _exhibited(one: Exhibit) -> Markup:
+    drawing = Markup(svg_element(draw_exhibit(one), f"{one.name}-"))
+    class_ = {True: "good", False: "bad", None: "soft"}[one.agrees]
+    return section(
+        heading(one),
+        tag("figure", tag("div", drawing, role="img", aria_label=one.title)),
+        tag("p", tag("b", "Paper: "), one.paper),
+        tag("p", tag("b", "Here: "), one.found),
+        tag("p", "Agrees: ", tag("span", verdict(one), class_=class_)),
+    )

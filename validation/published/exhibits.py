@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.models.published import (
+from validation.published.values import (
     INTEGRATED,
     MODE,
     OSCILLATOR,
@@ -16,11 +16,11 @@ from d2rpick.models.published import (
     START,
     TIME,
     deformation_of,
+    integrated,
     pair_at_peak,
     residual,
     switched,
 )
-from d2rpick.vibration.oscillator import integrated
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
