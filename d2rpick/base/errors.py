@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from errno import EBADF
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Sequence
 
 # Control and format characters (escape codes, text direction), line and paragraph separators.
 UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
+_Read = TypeVar("_Read")
 _MOST_NAMED: Final = 20  # things in one line
 
 
@@ -48,6 +49,14 @@ class ConfigurationError(D2RPickError):
 
 INTERNAL_ERROR: Final = "internal-error"  # what becomes of one of several inputs where it meets an error of the program
 FORESEEN: Final = (D2RPickError, OSError, MemoryError)  # what is no error of the program itself
+
+
+def if_written(read: Callable[[], _Read]) -> _Read | None:
+    """Give what is read of a history, None where it is not written, or not in every state."""
+    try:
+        return read()
+    except FormatError:
+        return None
 
 
 def one_line(error: BaseException) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, RangeError, listing
+from d2rpick.base.errors import FormatError, RangeError, if_written, listing
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.names import Selection
 from d2rpick.histories.samples import window
@@ -45,14 +45,6 @@ def with_energy(run: Run, parts: Sequence[Part], history: History) -> tuple[Part
     return tuple(part for part, energy in zip(parts, energies.T, strict=True) if energy.any())
 
 
-def kinetic_energies(run: Run, parts: Sequence[Part]) -> Samples | None:
-    """Kinetic energies of parts, shape (n, parts); None where they are not written."""
-    try:
-        return run.part_kinetic_energies(parts)
-    except FormatError:
-        return None
-
-
 def rigid_parts(run: Run, parts: Sequence[Part], time: Samples, tr: float, td: float) -> NDArray[np.bool_] | None:
     """Tell which of the parts were rigid from tr to td, shape (parts,); None where their states do not tell.
 
@@ -62,7 +54,7 @@ def rigid_parts(run: Run, parts: Sequence[Part], time: Samples, tr: float, td: f
     inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))  # switched at the first step after tr
     if not parts or len(time[inside]) < FEWEST:
         return None
-    energies, kinetic = run.part_energies(parts)[inside], kinetic_energies(run, parts)
+    energies, kinetic = run.part_energies(parts)[inside], if_written(lambda: run.part_kinetic_energies(parts))
     still = np.ptp(energies, axis=0) <= SAME * np.abs(energies).max(axis=0)
     absent = (kinetic[inside] == 0).all(axis=0) if kinetic is not None else np.zeros(len(parts), dtype=bool)
     return np.asarray(still | absent)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, are, name_units
+from d2rpick.base.errors import are, if_written, name_units
 from d2rpick.choice.cost import ByDeck, Share
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.geometry import Placement
@@ -69,10 +69,7 @@ def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
 
 def _has_energy(run: Run, parts: Sequence[Part]) -> bool:
     """Whether parts are seen to have energy."""
-    try:
-        return bool(parts) and bool(run.part_energies(parts).any())
-    except FormatError:  # it is not written
-        return False
+    return bool(parts) and bool(if_written(lambda: run.part_energies(parts).any()))
 
 
 def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, RangeError
+from d2rpick.base.errors import FormatError, RangeError, if_written
 from d2rpick.choice.flights import bounds, flights_of
 from d2rpick.choice.health import Health, assess, cautions_of_health, refuse_unsound, unsound
 from d2rpick.choice.settings import Settings
@@ -102,8 +102,8 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
             time = first.time if first.channels else first.part_time
         states = int(time.size)
     except FormatError as error:  # several columns may be the time: there is still a list of them
-        if first.format == "csv" and _has_one_energy(first):
-            raise  # the table cannot be read
+        if first.format == "csv" and if_written(lambda: first.energy_channel) is not None:
+            raise  # by its one energy it is known which column is the time: the table cannot be read
         notes.append(str(error))
     steps = np.diff(time)
     history = _history(run, selection)
@@ -154,14 +154,6 @@ def _missing(run: Run) -> str:
     return f"{what}: only momenta of the parts show for sure when they fly"
 
 
-def _has_one_energy(database: Legs) -> bool:
-    """Whether it is told which column is the energy, and by this which is its time."""
-    try:
-        return database.energy_channel is not None
-    except FormatError:
-        return False
-
-
 def _notes(database: Legs) -> tuple[str, ...]:
     try:
         return database.notes
@@ -170,20 +162,14 @@ def _notes(database: Legs) -> tuple[str, ...]:
 
 
 def _overviews(run: Run) -> Iterator[PartOverview]:
-    try:
-        energies = run.part_energies(run.parts) if run.parts else np.empty((0, 0))
-    except FormatError:  # some parts come and go, so that their columns have holes
-        yield from (PartOverview(part, _highest(run, part)) for part in run.parts)
-    else:
-        for part, column in zip(run.parts, energies.T, strict=True):
-            yield PartOverview(part, float(column.max()))
+    energies = if_written(lambda: run.part_energies(run.parts)) if run.parts else np.empty((0, 0))
+    if energies is None:  # some parts come and go, so that their columns have holes
+        return (PartOverview(part, _highest(run, part)) for part in run.parts)
+    return (PartOverview(part, float(column.max())) for part, column in zip(run.parts, energies.T, strict=True))
 
 
 def _highest(run: Run, part: Part) -> float | None:
-    try:
-        return float(run.part_energies([part]).max())
-    except FormatError:
-        return None
+    return if_written(lambda: float(run.part_energies([part]).max()))
 
 
 def _health(run: Run, flights: Sequence[FreeFlight]) -> Health | None:
@@ -201,10 +187,7 @@ def _history(run: Run, selection: Selection) -> History | None:
     for wanted in (selection.parts, selection.flying):
         if wanted:
             select_parts(wanted, run.parts, run.name)
-    try:
-        return run.history(selection)
-    except FormatError:
-        return None
+    return if_written(lambda: run.history(selection))
 
 
 def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError
+from d2rpick.base.errors import FormatError, if_written
 from d2rpick.choice.flights import bounds, flights_of
 from d2rpick.flight.flying_parts import deformable_parts, flying_together
 from d2rpick.histories.opening import Selection
@@ -124,10 +124,7 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
 
 def _history(run: Run) -> tuple[History, Sequence[Part] | None]:
     """Energy of the parts that fly together, or of all that deform where momenta do not tell."""
-    try:
-        members: Sequence[Part] | None = flying_together(run)
-    except FormatError:
-        members = None
+    members = if_written(lambda: flying_together(run))
     chosen = members or deformable_parts(run)
     return run.history(Selection(parts=tuple(str(part.id) for part in chosen))), members
 

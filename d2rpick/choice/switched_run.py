@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.errors import RangeError, listing
-from d2rpick.choice.comparison import FEWEST, kinetic_energies, rigid_parts, with_energy
+from d2rpick.base.errors import RangeError, if_written, listing
+from d2rpick.choice.comparison import FEWEST, rigid_parts, with_energy
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.history import Given
@@ -189,7 +189,7 @@ class _Absent(NamedTuple):
 def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     """Times in which parts have no kinetic energy although the run moves: a rigid body has it instead."""
     parts, balance = _deformable(reference), reference.history.balance
-    kinetic = kinetic_energies(reference.run, parts) if parts else None
+    kinetic = if_written(lambda: reference.run.part_kinetic_energies(parts)) if parts else None
     if kinetic is None or balance is None or balance.kinetic is None:
         return ()
     time, least = reference.history.time, round_off(reference.history)
