@@ -1,4 +1,4 @@
-"""Closed streams, full disks, interrupts, hostile names and damaged files: one line, or the result."""
+"""Closed streams, full disks, interrupts and damaged files: one line, or the result."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import gzip
 import io
 import json
 import os
-import re
 import subprocess
 import sys
 import zlib
@@ -24,8 +23,6 @@ from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-
-HOSTILE = "energy\n\x1b[31mred.csv"
 
 
 def child(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:
@@ -191,44 +188,6 @@ def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
         wrong.stderr
         == "d2rpick: D2RPICK_MAX_LINE is 'long', a number above 0 was expected; correct it or leave it out\n"
     )
-
-
-@pytest.fixture
-def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.chdir(tmp_path)
-    Path(HOSTILE).write_bytes(Path(ENERGY).read_bytes())
-    return HOSTILE
-
-
-@pytest.mark.parametrize(
-    "args",
-    [
-        ("suggest", "--td", "0.064"), ("info",), ("info", "-f", "csv"),
-        ("verify", "--tr", "0.0128853", "--td", "0.064"), ("info", "-f", "markdown"), ("study", "--td", "0.064"),
-        ("study", "--td", "0.064", "-f", "csv"), ("study", "--td", "0.064", "-f", "markdown"),
-        ("suggest", "--td", "9"), ("suggest", "--td", "0.064", "--energy", "no\nsuch\x1b"),
-    ],
-)  # fmt: skip
-def test_a_hostile_name_is_shown_escaped(hostile: str, args: tuple[str, ...]) -> None:
-    result = run(*args, hostile)
-    shown = result.stdout + result.stderr
-    assert "\x1b" not in shown
-    if "markdown" in args:
-        shown = re.sub(r"\\([^\w\s])", r"\1", shown)  # as it is displayed
-    assert "energy\\n\\x1b[31mred.csv" in shown
-    assert not any(line.startswith(("red", "[31m", "\\x1b[31m")) for line in shown.splitlines())
-
-
-def test_json_keeps_a_hostile_name(hostile: str) -> None:
-    assert json.loads(run("info", "-f", "json", hostile).stdout)["source"] == [hostile]
-
-
-def test_a_study_of_a_name_that_is_no_text_can_be_reported(tmp_path: Path) -> None:
-    name = os.fsdecode(os.fsencode(tmp_path / "run") + b"\xff.csv")
-    Path(name).write_bytes(Path(ENERGY).read_bytes())
-    result = run("study", "--td", "0.064", "--report", str(tmp_path / "page.html"), name, ENERGY)
-    assert result.exit_code == 0
-    assert "run\ufffd.csv" in (tmp_path / "page.html").read_text("utf-8")
 
 
 def test_an_unforeseen_error_names_the_files_of_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -102,10 +102,24 @@ def test_answers_name_a_file_without_control_codes(command: tuple[str, ...], fol
                 if line
             ]
             assert documents[-1]["command"][-1] == NAME
+            assert command != ("info",) or documents[-1]["source"] == [NAME]
+        if form == "table":
+            assert printable(NAME) in result.stdout + result.stderr
         if form == "csv":
-            assert len({len(row) for row in csv.reader(io.StringIO(result.stdout), strict=True)}) == 1
+            rows = list(csv.reader(io.StringIO(result.stdout), strict=True))
+            assert len({len(row) for row in rows}) == 1
+            assert command[0] != "study" or any(printable(NAME) in cell for cell in rows[1])
         if form == "markdown":
             assert not re.search(r"(?<!\\)<script", result.stdout)
+            assert command[0] not in ("info", "study") or in_markdown(NAME) in result.stdout
+
+
+@pytest.mark.parametrize("asked", [("--td", "9"), ("--td", "0.064", "--energy", "no\nsuch\x1b")])
+def test_refusals_name_a_file_without_control_codes(asked: tuple[str, ...], folder: Path) -> None:
+    shutil.copy(ENERGY, folder / NAME)
+    result = run("suggest", *asked, "--", NAME)
+    assert printable(NAME) in result.stderr
+    assert not unseen(result.stderr)
 
 
 @pytest.mark.parametrize("form", ["table", "json", "csv", "markdown"])
@@ -184,6 +198,13 @@ class Tags(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         for name in (tag, *(key for key, _ in attrs)):
             self.counts[name] = self.counts.get(name, 0) + 1
+
+
+def test_a_study_of_a_name_that_is_no_text_can_be_reported(folder: Path) -> None:
+    shutil.copy(ENERGY, folder / NO_TEXT)
+    result = run("study", "--td", "0.064", "--report", "page.html", NO_TEXT, ENERGY)
+    assert result.exit_code == 0
+    assert "run\ufffd" in (folder / "page.html").read_text("utf-8")
 
 
 def test_a_list_of_runs_may_name_files_with_any_sign_but_a_line_feed(folder: Path) -> None:
