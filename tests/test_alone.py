@@ -105,7 +105,7 @@ def test_a_test_that_swallows_the_error_fails_and_one_of_files_of_others_is_free
 def test_one_line_says_how_many_tests_are_left_out(tmp_path: Path) -> None:
     told = []
     for processes in ("-n0", "-n2"):
-        found = pytest_of(processes, "tests/real", "tests/test_errors.py", D2RPICK_REAL=str(tmp_path / "absent"))
+        found = pytest_of(processes, "tests/real", "tests/base/test_errors.py", D2RPICK_REAL=str(tmp_path / "absent"))
         assert found.returncode == 0, found.stdout
         told += [line for line in found.stdout.splitlines() if "left out" in line]
     assert len(told) == 2
