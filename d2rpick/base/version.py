@@ -1,3 +1,3 @@
 """The version of d2rpick, written down once."""
 
-__version__ = "0.14.0"
+__version__ = "0.15.0"
