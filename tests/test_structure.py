@@ -33,6 +33,7 @@ LAYERS = (
     ("flight",),
     ("choice",),
     ("rules",),
+    ("running",),
     ("models",),
     ("report",),
     ("api",),
