@@ -12,9 +12,8 @@ import numpy as np
 
 from d2rpick.choice.candidates import judge
 from d2rpick.choice.expectation import most_energy
-from d2rpick.histories.samples import find_crossings
+from d2rpick.histories.samples import find_crossings, narrow
 from d2rpick.vibration.measures import TOLERATED_GROWTH
-from d2rpick.vibration.roots import narrow
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.deck.constraints import read_constraints, read_welds
 from d2rpick.deck.mesh import layout, lines_of
 from d2rpick.deck.model import Boundary, Gravity, Hold, Joint, Joints, ids, plateaus
-from d2rpick.deck.parts import material_of, node_sets, rigid_materials
+from d2rpick.deck.parts import material_of, node_sets, read_constraints, read_welds, rigid_materials
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

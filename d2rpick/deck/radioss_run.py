@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Value
-from d2rpick.deck.radioss_engine import Leg, blocks, card_of, keyword, read_legs
-from d2rpick.deck.radioss_starter import Starter
+from d2rpick.deck.radioss_deck import Leg, Starter, blocks, card_of, keyword, read_legs
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows, follow
@@ -27,8 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card, Field
-    from d2rpick.deck.radioss_engine import Leg
-    from d2rpick.deck.radioss_starter import Body
+    from d2rpick.deck.radioss_deck import Body, Leg
 
 THROUGH_WALL: Final = "body-through-wall"
 AT_REST: Final = "body-without-velocity"
@@ -298,7 +296,7 @@ def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[in
     named = {node: set(known[1]) if known else set() for node, known in members.items()}
     of_nodes = {node: known[0] for node, known in members.items() if known and known[0]}
     if of_nodes:
-        from d2rpick.deck.radioss_mesh import parts_within  # loads numpy
+        from d2rpick.deck.mesh import parts_within  # loads numpy
 
         for node, parts in parts_within(starter, of_nodes).items():
             named[node] |= parts

@@ -10,7 +10,7 @@ from d2rpick.base.errors import DeckError
 from d2rpick.base.files import write_whole
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.printing import listed, off
-from d2rpick.deck.radioss_engine import blocks, kept_off, keyword, read_legs
+from d2rpick.deck.radioss_deck import blocks, kept_off, keyword, read_legs
 from d2rpick.deck.radioss_run import read_run, run_files
 from d2rpick.deck.reader import cure, cuts, read_deck
 from d2rpick.deck.source import SourceFile
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.deck.printed_card import PrintedCard
-    from d2rpick.deck.radioss_engine import Leg
+    from d2rpick.deck.radioss_deck import Leg
     from d2rpick.deck.reader import Deck
     from d2rpick.deck.source import Block
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.deck import radioss_run, read_deck
-from d2rpick.rules import energy, reading, runs, sets, switched_parts, times
+from d2rpick.rules import reading, runs, sets, switched_parts, times
 from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, RunCase, Severity, Unreadable
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ __all__ = [
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
 _SEVERITIES: Final = ("error", "warning", "info")
 _KEYS: Final = ("select", "ignore", "severity")
-_MODULES = (reading, sets, times, switched_parts, energy, runs)
+_MODULES = (reading, sets, times, switched_parts, runs)
 _ALL = (one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule))
 RULES: Final[Mapping[str, Rule]] = {rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)}
 

@@ -16,7 +16,7 @@ from d2rpick.rules.examples import GOOD_RUN, WINDOW, engine_files, run_of, start
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.radioss_engine import Leg
+    from d2rpick.deck.radioss_deck import Leg
     from d2rpick.rules.base import Example, Objection
 
 _MOST_CAP = 0.01  # of the rigid window: the release comes up to a step late
@@ -192,7 +192,7 @@ def _deformable_left(case: RunCase, rigid: set[int]) -> bool:
     """Whether an element may lie outside the parts that are rigid; where that is not known it may."""
     if case.run.starter is None or not case.found.parts or case.deck.unread:
         return True
-    from d2rpick.deck.radioss_mesh import parts_with_elements  # loads numpy
+    from d2rpick.deck.mesh import parts_with_elements  # loads numpy
 
     parts = parts_with_elements(case.run.starter)
     return not parts or bool(parts - rigid)

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.errors import listing
-from d2rpick.deck.constraints import read_entities
+from d2rpick.deck.parts import read_entities
 from d2rpick.deck.switching import BY_TIME
 from d2rpick.rules.base import ERROR, WARNING, Example, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
@@ -14,7 +14,7 @@ from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.constraints import Entities, Entity
+    from d2rpick.deck.parts import Entities, Entity
     from d2rpick.deck.switching import Header, SwitchSet, Unit
     from d2rpick.rules.base import Case, Objection
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from d2rpick.vibration.roots import narrow
+from d2rpick.histories.samples import narrow
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

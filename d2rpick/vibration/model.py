@@ -18,9 +18,8 @@ from d2rpick.base.errors import listing
 from d2rpick.vibration import measures
 from d2rpick.vibration.identify import MAX_MISFIT, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.moments import Moments, Profile
+from d2rpick.vibration.moments import ModalEnergy, Moments, Profile, SampledEnergy
 from d2rpick.vibration.uncertainty import residual_bound
-from d2rpick.vibration.whole_energy import ModalEnergy, SampledEnergy
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

@@ -1,21 +1,181 @@
-"""Times that may serve as tr, and how the lock-in error runs between them where it has no closed form."""
+"""Times that may serve as tr: where the energy of all parts together has the level of a td, and the error at others.
+
+The energy around a td is known by its samples, or by modes that describe them.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.histories.samples import find_crossings, find_turns
 from d2rpick.vibration import measures
+from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import Samples
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.measures import Deformation
+    from d2rpick.vibration.modes import Mode, Modes
+    from d2rpick.vibration.span import Span
+
+    Passages = tuple[Samples, NDArray[np.bool_]]
+
+
+# Where the scatter of the last period exceeds this share of the vibration energy at td, the vibration has sunk
+# into it: its sign is no longer certain.
+_DROWNED = 0.2
+# Of a radian: below, a time is the same but for rounding.
+_ZERO = 1e-9
+
+
+class SampledEnergy:
+    """The samples of a record seen from ``td``, linear between them."""
+
+    mode: Mode | Modes | None = None
+
+    def __init__(self, history: History, td: float) -> None:
+        self.history, self.td = history, td
+
+    def energy(self, time: float) -> float:
+        """E at a time: of the modes where they describe the record, of the samples elsewhere [energy]."""
+        return float(self.mode.energy(time)) if self.mode and self.described(time) else self.history.energy_at(time)
+
+    def energies(self, times: Samples) -> Samples:
+        """E at many times, of their shape [energy]."""
+        return self.history.energies_at(times)
+
+    def described(self, time: float) -> bool:  # noqa: ARG002  of samples alone there is no model
+        """Whether the energy at a time is that of modes."""
+        return False
+
+    def peaks(self, start: float, end: float) -> tuple[float, ...]:
+        """Times in (start, end], ascending, where the energy peaks [time]."""
+        peaks = self.history.peaks
+        return tuple(peaks[(start < peaks) & (peaks <= end)].tolist())
+
+    def crossings(self, since: float, passed: Samples | None = None) -> Passages:  # noqa: ARG002
+        """Times of the crossings of the level before td, none before ``since``, and which of them rise, shape (k,).
+
+        ``passed``: when modes pass the level, where that is known [time].
+        """
+        time, energy = self._sampled_before()
+        times, rising = find_crossings(time, energy, energy[-1])
+        asked = (since <= times) & (times < self.td)
+        return times[asked], rising[asked]
+
+    def turns_near(self, tolerance: float, since: float) -> Samples:
+        """Times before td, none before ``since``, where the energy turns within the tolerance of the level (k,)."""
+        time, energy = self._sampled_before()
+        turns = find_turns(energy)[0]
+        near = time[turns[measures.level_error(energy[turns], energy[-1]) <= tolerance]]
+        return near[near >= since]
+
+    def _sampled_before(self) -> tuple[Samples, Samples]:
+        """Times and energies of the samples before td, and td itself with its level at the end."""
+        before = self.history.time < self.td
+        return np.append(self.history.time[before], self.td), np.append(
+            self.history.energy[before], self.energy(self.td)
+        )
+
+    def edges(self) -> Samples:
+        """Times before td between which the energy of modes runs monotone; none but the samples, of these [time]."""
+        return np.zeros(0)
+
+    def reach(self, times: Samples) -> Samples:
+        """How far from each time the energy may have the level at td [time]."""
+        return sampled_reach(self.history, times, self.td, self.energy(self.td))
+
+
+class ModalEnergy(SampledEnergy):
+    """The ``mode`` of a ``fit``, or several, that describes a record within ``span``, seen from a ``td`` in it."""
+
+    mode: Mode | Modes
+
+    def __init__(self, history: History, td: float, fit: Identification, span: Span) -> None:
+        super().__init__(history, td)
+        assert fit.mode
+        self.fit, self.mode, self.span = fit, fit.mode, span
+
+    @cached_property
+    def sunk(self) -> str | None:
+        """Say so when the vibration at td is no more than the scatter of the record about it."""
+        start, end = max(self.td - 2 * np.pi / self.mode.omega, self.span.start), max(self.td, self.span.start)
+        time, energy = self.history.between(start, end)
+        scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
+        vibration = float(self.mode.vibration_energy(self.td))
+        if vibration > 0 and scatter <= _DROWNED * vibration:  # both may be too small for a number
+            return None
+        return (
+            f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}: "
+            "the sign of the deformation is unknown"
+        )
+
+    def energies(self, times: Samples) -> Samples:
+        """E at many times, of their shape [energy]."""
+        return self._each(times, self.mode.energy, self.history.energies_at)
+
+    def described(self, time: float) -> bool:
+        """Whether ``time`` lies in the window that the modes describe."""
+        return self.span.start <= time <= self.span.end
+
+    def peaks(self, start: float, end: float) -> tuple[float, ...]:
+        """Times in (start, end], within the span, where the energy of the modes peaks [time]."""
+        return self.mode.peaks(max(start, self.span.start), min(end, self.span.end))
+
+    @property
+    def before(self) -> float:
+        """Just before the span: its first sample counts like any other [time]."""
+        return self.span.start - _ZERO / self.mode.fastest
+
+    def crossings(self, since: float, passed: Samples | None = None) -> Passages:
+        """Times of the crossings: of the samples before the span, exact ones within it, and which of them rise."""
+        start, known = self.span.start, self.mode.level_crossings(self.td, self.before) if passed is None else passed
+        times = np.maximum(known, start)
+        rising = self.mode.energy_slopes(times)[0] > 0
+        if start <= self.history.time[0]:
+            return times, rising
+        sampled, up = super().crossings(since)
+        return np.append(sampled[sampled < start], times), np.append(up[sampled < start], rising)
+
+    def standstills(self) -> Samples:
+        """Times within the span, up to td itself, where the energy turns [time]."""
+        after = self.td - _ZERO / self.mode.fastest  # td may be an extremum itself
+        times = np.maximum(self.mode.extrema(self.before, after), self.span.start)
+        return times[self.within(times)]
+
+    def edges(self) -> Samples:
+        """Standstills and ends of the span, between which the energy runs monotone [time]."""
+        return np.concatenate([self.mode.extrema(float(self.history.time[0]), self.td), self.span])
+
+    def reach(self, times: Samples) -> Samples:
+        """How far fit, sampling and printed digits leave the true time of the level open [time]."""
+        return self._each(
+            times, lambda inside: fitted_reach(self.history, self.fit, self.mode, inside, self.td), super().reach
+        )
+
+    def within(self, times: Samples) -> NDArray[np.bool_]:
+        """Which times lie in the window that the modes describe."""
+        return (times >= self.span.start) & (times <= self.span.end)
+
+    def _each(
+        self, times: Samples, inside: Callable[[Samples], Samples], outside: Callable[[Samples], Samples]
+    ) -> Samples:
+        """Give one thing for times in the window that the modes describe, another for those outside, of their shape."""
+        here = self.within(times)
+        if here.all():  # as nearly always
+            return inside(times)
+        found = np.empty(times.shape)
+        found[here], found[~here] = inside(times[here]), outside(times[~here])
+        return found
+
 
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
 

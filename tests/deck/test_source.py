@@ -18,14 +18,13 @@ from hypothesis import strategies as st
 
 from d2rpick.base.errors import DeckError
 from d2rpick.base.files import FileState
-from d2rpick.deck.source import SourceFile, find_marks
-from d2rpick.deck.stored import Held, OnDisk
+from d2rpick.deck.source import Held, OnDisk, SourceFile, find_marks
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from d2rpick.deck.stored import Filling
+    from d2rpick.deck.source import Filling
 
 HEAD = b"-----BEGIN PGP MESSAGE"
 MARK = b"\xef\xbb\xbf"

@@ -19,7 +19,7 @@ from tests.decks import write
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.radioss_engine import Leg
+    from d2rpick.deck.radioss_deck import Leg
 
 WINDOWS = [(0.02, 0.09), (0.1, 0.15)]
 CARD = cards(WINDOWS, Printing(part=(1,)))

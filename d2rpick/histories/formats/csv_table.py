@@ -1,4 +1,4 @@
-"""Which columns of a table are meant: by name, by number, or by what they are called."""
+"""Tables: columns meant by name, by number or by what they are called, and their values."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.curves import Curves, find_curves
-from d2rpick.histories.formats.layout import UTF16, Layout, Text, find_layout, is_skipped, split
-from d2rpick.histories.formats.printed import of_one_run
-from d2rpick.histories.formats.table_values import checked_values, line_of, plain_values
+from d2rpick.histories.formats.layout import UTF16, Layout, Text, as_number, find_layout, is_skipped, split
 from d2rpick.histories.names import internal_energies, is_time, meant, near_miss, quantity_of, refuse_other_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.histories.formats.layout import Layout
+    from numpy.typing import NDArray
+
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
@@ -118,10 +117,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Table | C
 
 
 class Table(Database):
-    """One table; a `Database` without parts.
-
-    FormatError when it is no table, or a column that was selected is not there.
-    """
+    """One table, a `Database` without parts; FormatError when it is none, or a selected column is not there."""
 
     format = "csv"
 
@@ -163,7 +159,7 @@ class Table(Database):
     def time(self) -> Samples:
         """Times as they stand in the file, shape (n,) [time]; FormatError where they are not those of one run."""
         place = partial(line_of, self._text, self._begin, self._layout, self._time)
-        return of_one_run(self._values(self._time), lambda state: f"{self.source}:{place(state)}")
+        return printed.of_one_run(self._values(self._time), lambda state: f"{self.source}:{place(state)}")
 
     def channel(self, name: str) -> Samples:
         """One column, shape (n,); FormatError with the line of a value that is no number."""
@@ -214,17 +210,14 @@ class Table(Database):
             columns = plain_values(self._text, self._begin, self._layout, wanted)
             self._plain = columns is not None
             found = zip(wanted, columns or (), strict=self._plain)
-            self._read |= {one: _kept(values) for one, values in found if np.isfinite(values).all()}
+            kept = {one: values for one, values in found if np.isfinite(values).all()}
+            for values in kept.values():
+                values.flags.writeable = False  # so that nobody needs a copy of his own
+            self._read |= kept
         if column not in self._read:
             values = checked_values(self._text, self._begin, self._layout, (self._time, column))
             self._read |= {self._time: values[:, 0].copy(), column: values[:, 1].copy()}
         return self._read[column]
-
-
-def _kept(values: Samples) -> Samples:
-    """Make values read-only, so that nobody needs a copy of his own."""
-    values.flags.writeable = False
-    return values
 
 
 def _is_whole(line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]) -> bool:
@@ -251,3 +244,156 @@ def write(columns: Mapping[str, Samples]) -> bytes:
     csv.writer(head, lineterminator="\n").writerow(columns)
     rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)
     return "\n".join([head.getvalue().removesuffix("\n"), *map(",".join, rows), ""]).encode()
+
+
+def plain_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> list[Samples] | None:
+    """Columns ``used`` of the rows from byte ``begin`` on, each of shape (rows,).
+
+    None unless each row has its number of cells and no line stands between them.
+    """
+    tables = []
+    for piece in text.pieces(begin):
+        values = _plain_piece(piece, layout, used)
+        if values is None:
+            return None
+        tables.append(values)
+    return [np.concatenate([table[:, place] for table in tables]) for place in range(len(used))] if tables else None
+
+
+def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples | None:
+    if layout.decimal == ",":
+        if b"." in piece:
+            return None
+        piece = piece.replace(b",", b".")
+    if b'"' in piece:
+        return None  # a separator in quotes is none
+    whole = piece.decode("latin-1")  # no other character than those of latin-1 belongs to a number
+    taken, chosen = [*range(layout.columns)], None
+    first = whole[: whole.index("\n")]
+    if layout.separator and not (sorted(used) == taken and not first.endswith(layout.separator)):
+        # otherwise numpy sees to it that each row has its cells
+        rows = _separators(piece, layout)
+        if rows is None:
+            return None
+        starts, marks = rows
+        closed = marks.shape[1] == layout.columns
+        taken = sorted({0, *used})  # a comment would show in the first column
+        chosen = taken if closed or len(taken) < layout.columns else None
+    if taken[-1] < layout.columns - 1:  # what follows is not taken apart
+        lines = [whole[start:cut] for start, cut in zip(starts.tolist(), marks[:, taken[-1]].tolist(), strict=True)]
+    else:
+        lines = whole.split("\n")[:-1]
+    if not lines[0].strip():
+        return None  # numpy passes over it, and warns where there is no other
+    try:
+        table = np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=chosen)
+    except ValueError:
+        return None
+    if table.shape != (len(lines), len(taken)):
+        return None  # it passes over blank lines
+    return table if taken == [*used] else table[:, np.searchsorted(taken, used)]
+
+
+def _separators(piece: bytes, layout: Layout) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
+    """Places of the rows (n,) and of their separators (n, k); None unless all rows have their number of cells."""
+    assert layout.separator
+    signs = np.frombuffer(piece, np.uint8)
+    ends = signs == ord("\n")
+    closed = piece.startswith(layout.separator.encode("latin-1"), piece.index(b"\n") - 1)  # rows end with a separator
+    each, rows = layout.columns + closed, np.count_nonzero(ends)
+    marks = np.flatnonzero(ends | (signs == ord(layout.separator)))
+    if marks.size != rows * each:
+        return None
+    table = marks.reshape(rows, each)
+    whole = np.all(ends[table[:, -1]]) and (not closed or np.all(np.diff(table[:, -2:]) == 1))
+    return (np.append(0, table[:-1, -1] + 1), table[:, :-1]) if whole else None
+
+
+def checked_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Samples:
+    """Values with comments and blank lines between the rows, shape (rows, len(used)).
+
+    Where all cells are empty the curve has ended: another one beside it goes on.  FormatError with the line that is
+    wrong.
+    """
+    tables = [table for _, table in _tables(text, begin, layout, used)]
+    return np.concatenate(tables) if tables else np.empty((0, len(used)))
+
+
+def line_of(text: Text, begin: int, layout: Layout, time: int, state: int) -> int:
+    """Give the number of the line in which a state stands, counted from 0."""
+    for numbers, _ in _tables(text, begin, layout, [time]):
+        if state < len(numbers):
+            return numbers[state]
+        state -= len(numbers)
+    raise AssertionError("there is such a state")
+
+
+def _tables(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Iterator[tuple[Sequence[int], Samples]]:
+    """Numbers of lines and their values piece by piece: line by line only where they are not all alike."""
+    curve = _Curve(text.name, layout, used)
+    number = layout.start + 1
+    for piece in text.pieces(begin):
+        table = _plain_piece(piece, layout, used)
+        if table is not None and np.isfinite(table).all() and not curve.stops_before(float(table[0, 0])):
+            yield range(number, number + len(table)), table
+            curve.before, curve.gap = float(table[-1, 0]), False
+        else:
+            states = list(curve.states(text.rows(piece), number))
+            if states:
+                yield [line for line, _ in states], np.array([state for _, state in states])
+        number += piece.count(b"\n")
+
+
+class _Curve:
+    """What of a table was seen so far, where it is taken line by line."""
+
+    def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
+        self._name, self._layout, self._used = name, layout, used
+        self.before: float | None = None  # time of the last state
+        self.gap = self._ended = False
+
+    def stops_before(self, time: float) -> bool:
+        """Whether a state of this time is one of another curve."""
+        return self._ended or (self.gap and self.before is not None and time <= self.before)
+
+    def states(self, rows: Sequence[str], first: int) -> Iterator[tuple[int, list[float]]]:
+        """Give line and values of each state in rows of which ``first`` is the number of the first."""
+        layout, used = self._layout, self._used
+        for number, row in enumerate(rows, first):
+            if is_skipped(row):
+                self.gap = True
+                continue
+            where = f"{self._name}:{number}"
+            cells = _cells(where, row, layout)
+            if not any(cells[column] for column in used) and self.before is not None:
+                self._ended = True
+                continue
+            state = [_value(where, layout, column, cells[column]) for column in used]
+            if self.stops_before(state[0]):
+                found = "a curve continues after empty cells" if self._ended else "the time starts again after a gap"
+                raise FormatError(
+                    f"{where}: {found}, one curve was expected; repair it or put each curve into its own file"
+                )
+            self.gap, self.before = False, state[0]
+            yield number, state
+
+
+def _cells(where: str, row: str, layout: Layout) -> list[str]:
+    cells = split(row, layout.separator)
+    if len(cells) == layout.columns + 1 and not cells[-1]:
+        cells.pop()
+    if layout.names and is_time(cells[0]) and is_time(layout.names[0]):
+        raise FormatError(f"{where}: a second header, another curve begins here; put each curve into its own file")
+    if len(cells) != layout.columns:
+        found = "1 value" if len(cells) == 1 else f"{len(cells)} values"
+        raise FormatError(f"{where}: {found}, {layout.columns} were expected as in the other rows; repair the line")
+    return cells
+
+
+def _value(where: str, layout: Layout, column: int, cell: str) -> float:
+    value = as_number(cell, layout.decimal)
+    if value is None or not np.isfinite(value):
+        raise FormatError(
+            f"{where}: {layout.name(column)!r} is {cell[:60]!r}, a number was expected; repair or delete the line"
+        )
+    return value
