@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -41,6 +41,7 @@ class Cards:
     node: tuple[str, ...] = option("Radioss: main nodes of the rigid bodies.", "names", "IDS", many=True)
     end: float | None = option("Radioss: end of the run.  [default: end of the history]", TIME, "T")
     name: str | None = option("Radioss: name of the run.  [default: Root]", metavar="NAME")
+    starter: str = ""  # cards that the starter deck lacks
 
     @property
     def given(self) -> list[str]:
@@ -54,7 +55,7 @@ class Cards:
         given = {name: getattr(self, name) for name in self.given}
         if self.node:
             given["node"] = tuple(numbers("--node", self.node))
-        return Printing(part=tuple(parts), **given)
+        return Printing(part=tuple(parts), starter=self.starter, **given)
 
     def check_solver(self, solver: str) -> None:
         """Refuse an option that says what the input of ``solver`` has no place for."""
@@ -66,6 +67,21 @@ class Cards:
                 owner = next(one for one, takes in places.items() if name in takes)
                 hint = "" if self.solver else f"; without --solver the card is one for {SOLVERS[solver].title}"
                 raise ArgumentError(f"--{dashed(name)} is an option of --solver {owner}{hint}")
+
+    def for_bodies(self, asked: Asked) -> tuple[Cards, tuple[str, ...]]:
+        """Let the deck say which rigid bodies switch the parts, with what it lacks, and notes of that.
+
+        Only a Radioss deck has any; where main nodes are given they are meant.
+        """
+        from d2rpick.deck.printing import SOLVERS
+
+        deck, parts = asked.request.deck, asked.reference.history.parts
+        if deck is None or not parts or self.node or SOLVERS[self.solver or ""].switches != "node":
+            return self, ()
+        from d2rpick.deck.radioss_bodies import bodies_for
+
+        found = bodies_for(deck, [part.id for part in parts])
+        return replace(self, node=tuple(map(str, found.nodes)), starter=found.cards), found.notes
 
     def request(self, asked: Asked) -> CardRequest:
         """Say how the card of a run is printed."""

@@ -88,9 +88,10 @@ def plan(
         asked = ask(run, request, prints=prints, merge=cards.merge)
         if write_deck:
             _check_model(asked)
+        cards, added = cards.for_bodies(asked) if form == "card" or write_deck else (cards, ())
         earlier = open_run(request, before) if before else None
     answer = planned(asked, min_rigid, options.windows_in(done) if done else (), earlier)
-    output.notes(answer.history.notes, answer.cautions)
+    output.notes((*answer.history.notes, *added), answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), (), cards))
     found = answer.card(cards, every=every) if form == "card" or write_deck else None
     checked, passed = _write_and_check(found.card, answer, write_deck, output) if found and write_deck else ("", True)

@@ -57,6 +57,8 @@ class Printing:
         End of the run [time].
     name : str
         Name of the run.
+    starter : str
+        Cards that the starter deck of the run lacks.
     """
 
     part: tuple[int, ...] = ()
@@ -68,19 +70,22 @@ class Printing:
     step_cap: float | None = None
     end: float | None = None
     name: str = "Root"
+    starter: str = ""
 
 
 @dataclass(frozen=True)
 class PrintedCard:
     """Solver input: ``text`` is all of it, ``files`` the same by the names that the solver expects.
 
-    ``windows`` are the times as printed, ``notes`` say where they are not those asked for.
+    ``windows`` are the times as printed, ``notes`` say where they are not those asked for.  ``starter`` are cards that
+    go into the starter deck, before its ``/END``.
     """
 
     text: str
     windows: tuple[Times, ...]
     files: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    starter: str = ""
 
 
 class Solver(NamedTuple):

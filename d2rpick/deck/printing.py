@@ -192,8 +192,9 @@ def _radioss(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
     spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
     head = comments([f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *_OF_RADIOSS, *remarks])
     text = "".join(f"# {line}\n" for line in head)
+    text += f"# ---- into {name}_0000.rad, before /END\n{printing.starter}" if printing.starter else ""
     text += "".join(f"# ---- {file}\n{content}" for file, content in files.items())
-    return PrintedCard(text, windows, files)
+    return PrintedCard(text, windows, files, starter=printing.starter)
 
 
 def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[EngineFile]:

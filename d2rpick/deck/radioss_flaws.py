@@ -44,13 +44,13 @@ class NodeGroups:
 
     def _members(self, group: int) -> frozenset[int] | None:
         known = self._starter.group_members(group)
-        if known is None or any(part not in self._by_part for part in known[1]):
+        if known is None or any(part not in self.by_part for part in known[1]):
             return None
-        return frozenset(known[0]).union(*(self._by_part[part].tolist() for part in known[1]))
+        return frozenset(known[0]).union(*(self.by_part[part].tolist() for part in known[1]))
 
     @cached_property
-    def _by_part(self) -> Mapping[int, Integers]:
-        """Nodes by part; a part with particles, which are not followed, is left out."""
+    def by_part(self) -> Mapping[int, Integers]:
+        """Ids of nodes by part; a part with particles, which are not followed, is left out."""
         found: dict[int, list[Integers]] = {part: [np.empty(0, np.int64)] for part in self._starter.parts}
         for card in self._starter.named(*KINDS):
             if card.words[1:]:

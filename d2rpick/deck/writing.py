@@ -17,7 +17,7 @@ from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import find_windows, read_switching
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.deck.printed_card import PrintedCard
     from d2rpick.deck.radioss_deck import Leg
@@ -85,7 +85,7 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     ((name, text),) = card.files.items()
     if deck.long:
         text = text.replace("_AUTOMATIC\n", "_AUTOMATIC-\n")  # the minus keeps its fields 10 columns wide
-    yield Path(main).name, _with_include(deck.sources[0], name)
+    yield Path(main).name, with_cards(deck.sources[0], f"*INCLUDE\n{name}\n", deck.sources[0].blocks())
     yield name, text.encode()
     yield from _copies(deck.sources[1:], main, {name, Path(main).name})
 
@@ -114,13 +114,13 @@ def _refuse_switched(deck: Deck, printed: Deck) -> None:
             raise DeckError(f"{found}; print them with other ids")
 
 
-def _with_include(main: SourceFile, name: str) -> bytes:
-    """Insert the include into the bytes of the main file: before ``*END``, else at its end."""
+def with_cards(main: SourceFile, text: str, found: Iterable[Block]) -> bytes:
+    """Insert cards into the bytes of a main file, whose blocks were found: before its end mark, else at its end."""
     content = main.read(0)
     newline = b"\r\n" if b"\r\n" in content else b"\n"
-    *_, last = main.blocks()
+    *_, last = found
     at = len(content) if last.end is None else content.rfind(b"\n", 0, last.end) + 1
-    return content[:at] + newline.join([b"*INCLUDE", name.encode(), b""]) + content[at:]
+    return content[:at] + text.encode().replace(b"\n", newline) + content[at:]
 
 
 def _copies(files: Sequence[SourceFile], main: str, taken: set[str]) -> Iterator[tuple[str, bytes]]:
@@ -147,7 +147,7 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     (leg,) = run.legs
     _refuse_other_run(leg, printed)
     starter = run.starter.sources[0].name
-    yield Path(starter).name, run.starter.sources[0].read(0)
+    yield Path(starter).name, with_cards(run.starter.sources[0], card.starter, blocks(run.starter.sources[0]))
     further = list(blocks(leg.run.block.source))
     for (name, text), mine in zip(card.files.items(), printed, strict=True):
         kept = (_text(block) for block in further if _repeated(keyword(block), mine))

@@ -203,6 +203,12 @@ def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(tmp_path: Path
         assert ["/RBODY/ON" in leg for leg in legs] == [True, False, True, False]
         assert all("/TFILE/4" in leg for leg in legs)
     assert legs[0].splitlines()[1].strip() == "0.277"
+    lacking = starter("DROP2").partition(b"/RBODY")
+    deck.write_bytes(lacking[0] + lacking[2][lacking[2].index(b"/SURF") :])
+    (tmp_path / f"{name}_0001.rad").write_text(engine.replace(f"/RBODY/OFF\n{node}\n", ""))
+    result = run("plan", *args[2:4], *args[6:], str(tmp_path / "c"), history)
+    assert (result.exit_code, "/RBODY with main node 536 is new, for parts 1-5" in result.stderr) == (0, True)
+    assert "parts 1-5: rigid from" in result.stdout
 
 
 DECK = """*KEYWORD

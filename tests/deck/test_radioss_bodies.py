@@ -1,0 +1,163 @@
+"""Rigid bodies that a deck lacks: their parts, their main node, and what moves it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.base.errors import DeckError
+from d2rpick.deck.mesh import nodes_of
+from d2rpick.deck.printed_card import Printing
+from d2rpick.deck.printing import cards
+from d2rpick.deck.radioss_bodies import bodies_for
+from d2rpick.deck.radioss_run import read_run, rigid_parts
+from d2rpick.deck.writing import write_deck
+from d2rpick.rules import check_deck
+from tests.decks import wide
+
+if TYPE_CHECKING:
+    from d2rpick.deck.radioss_run import Run
+
+REAL = 20
+ENGINE = "/RUN/box/1\n 0.4\n/VERS/2022\n/TFILE/4\n1e-5\n"
+ALL = (1, 2, 3, 4)
+BODY = f"/RBODY/7\nbody\n{wide(99, 0, 0, 0, '', 0, 70)}"
+
+
+def quad(part: int, left: float) -> tuple[str, str]:
+    """Nodes and shell of a square part of side 1 from x = left on, and its /PART."""
+    ids = [10 * part + i for i in range(4)]
+    corners = ((left, 0.0), (left + 1, 0.0), (left + 1, 1.0), (left, 1.0))
+    nodes = "".join(wide(n)[:-1] + wide(x, y, 0.0, width=REAL) for n, (x, y) in zip(ids, corners, strict=True))
+    return nodes, f"/PART/{part}\np{part}\n{wide(part, 1)}/SHELL/{part}\n{wide(part, *ids)}"
+
+
+def starter(more: str = "", thickness: tuple[float, ...] = (1.0, 2.0, 1.0)) -> str:
+    """Parts 1 and 2 on springs (part 4), part 3 apart from them."""
+    nodes, parts = zip(*(quad(part, left) for part, left in ((1, 0.0), (2, 2.0), (3, 9.0))), strict=True)
+    text = "#RADIOSS STARTER\n/BEGIN\nbox\n" + wide(2022, 0) + 2 * wide("kg", "m", "s", width=REAL)
+    text += f"/MAT/ELAST/1\nsteel\n{wide(7850.0, width=REAL)}{wide(2.1e11, 0.3, width=REAL)}"
+    for part, depth in enumerate(thickness, start=1):
+        text += (
+            f"/PROP/SHELL/{part}\nshell\n{wide(24)}{wide(0.0, width=REAL)}{wide(3, 0)[:-1]}{wide(depth, width=REAL)}"
+        )
+    text += f"/PROP/SPRING/4\nspring\n{wide(0.0, width=REAL)}{wide(1e4, width=REAL)}"
+    text += "/NODE\n" + "".join(nodes) + wide(99)[:-1] + wide(1.5, 0.5, 0.1, width=REAL) + "".join(parts)
+    return text + f"/PART/4\nspring\n{wide(4, 1)}/SPRING/4\n{wide(41, 11, 20)}{more}/END\n"
+
+
+def deck(folder: Path, more: str = "", engine: str = ENGINE) -> str:
+    folder.mkdir(exist_ok=True)
+    (folder / "box_0001.rad").write_text(engine)
+    main = folder / "box_0000.rad"
+    main.write_text(starter(more))
+    return str(main)
+
+
+def group(number: int, *ids: int, kind: str = "NODE") -> str:
+    return f"/GRNOD/{kind}/{number}\ngroup\n{wide(*ids)}"
+
+
+def velocity(number: int) -> str:
+    return f"/INIVEL/TRA/3\nthrown\n{wide(10.0, 0.0, 0.0, width=REAL)[:-1]}{wide(number)}"
+
+
+def gravity(number: int) -> str:
+    return f"/GRAV/5\ndown\n{wide(0, 'Z', 0, 0, number)[:-1]}{wide(1.0, -9.81, width=REAL)}"
+
+
+def written(tmp_path: Path, more: str = "", parts: tuple[int, ...] = ALL) -> tuple[tuple[int, ...], Run, str]:
+    """Write the deck with the bodies, and read it again."""
+    main = deck(tmp_path / "deck", more)
+    found = bodies_for(main, parts)
+    printing = Printing(node=found.nodes, end=0.4, name="box", starter=found.cards)
+    name = write_deck(main, cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next"))[0]
+    return found.nodes, read_run(name), name
+
+
+def test_each_group_of_joined_parts_gets_a_body(tmp_path: Path) -> None:
+    """Springs go with the parts that they join; the copy is the deck with cards before its end."""
+    nodes, run, name = written(tmp_path)
+    assert run.starter
+    bodies = {body.node.value: body for body in run.starter.bodies}
+    held = rigid_parts(run.starter, {node: body.group for node, body in bodies.items()})
+    assert {node: held[node] for node in nodes} == {100: {1, 2, 4}, 101: {3}}
+    before, after = starter().partition("/END\n")[::2], Path(name).read_text()
+    assert after.startswith(before[0])
+    assert after.endswith("/END\n")
+    checked = check_deck(name)
+    assert not checked.findings
+    assert {(w.part, w.tr, w.td) for w in checked.windows} == {(part, 0.1, 0.2) for part in ALL}
+    assert f"/RBODY/OFF\n{nodes[0]} {nodes[1]}\n" in (Path(name).parent / "box_0001.rad").read_text()
+
+
+def test_the_main_node_lies_at_the_centre_of_mass(tmp_path: Path) -> None:
+    """Centres of the squares are at 0.5 and 2.5, the second has twice the mass; springs without mass count nothing."""
+    nodes, run, _ = written(tmp_path)
+    assert run.starter
+    ids, places = nodes_of(run.starter.named("NODE"))
+    own = [places[ids == node][0].tolist() for node in nodes]
+    assert own == [pytest.approx([(0.5 + 2 * 2.5) / 3, 0.5, 0.0], abs=1e-9), pytest.approx([9.5, 0.5, 0.0], abs=1e-9)]
+
+
+def test_what_moves_and_pulls_the_parts_acts_on_the_main_nodes(tmp_path: Path) -> None:
+    """Else the starter puts the bodies at rest (D2R407), and gravity leaves them alone."""
+    everything = group(1, *(10 * part + i for part in (1, 2, 3) for i in range(4)))
+    wall = "/RWALL/PLANE/3\nground\n" + wide(0, 0, 1, 0) + 2 * wide(0.0, 0.0, 0.0, width=REAL)
+    nodes, run, name = written(tmp_path, everything + velocity(1) + gravity(1) + wall + wide(0.0, 0.0, 1.0, width=REAL))
+    assert not check_deck(name).findings
+    assert run.starter
+    pulled = {number for card in run.starter.named("GRAV") for number in [card.integer(card.rows[1], 4).value]}
+    members = [run.starter.group_members(number) for number in sorted(pulled)]
+    assert [one and one[0] for one in members[1:]] == [{node} for node in nodes]
+    ids = [body.id for body in run.starter.bodies]
+    assert len(set(ids)) == len(ids)
+
+
+def test_gravity_that_acts_on_all_nodes_needs_nothing_more(tmp_path: Path) -> None:
+    assert "/GRAV" not in bodies_for(deck(tmp_path, gravity(0)), ALL).cards
+
+
+def test_a_body_that_the_deck_has_is_taken(tmp_path: Path) -> None:
+    main = deck(tmp_path, group(70, 1, 2, 4, kind="PART") + BODY, ENGINE + "/RBODY/OFF\n99\n")
+    assert bodies_for(main, (1, 2, 4)) == ((99,), "", ())
+    found = bodies_for(main, ALL)
+    assert found.nodes == (99, 100)
+    assert "/RBODY/8\n" in found.cards
+    assert [note.partition(" with ")[0] for note in found.notes] == ["/RBODY"]
+    assert "part 3" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (group(70, 2, kind="PART") + BODY, r"box_0000.rad:\d+: /RBODY 7 holds nodes of parts 1, 2"),
+        (group(70, 10, 11) + BODY, "not these parts alone and whole"),
+        (group(70, 1, 2, 3, kind="PART") + BODY, "not these parts alone and whole"),
+        (group(70, 1, 2, kind="PART") + BODY.replace("99         0", "99         4"), "sensor 4 already"),
+        ("/GRNOD/BOX/70\nbox\n         1\n" + BODY, "nodes of /RBODY 7 are not known"),
+        (group(1, 10, 11) + velocity(1), "does not move all nodes of parts 1, 2, 4 as one body"),
+        ("/INIVEL/NODE/1\nthrown\n" + wide(20), "does not move all nodes"),
+        ("/TRANSFORM/TRA/1\nmoved\n", "/TRANSFORM moves nodes"),
+        ("//SUBMODEL/1\nother\n", "ids of a //SUBMODEL may be moved"),
+        ("#include other.inc\n", "other.inc was not read"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_one_line(tmp_path: Path, more: str, message: str) -> None:
+    with pytest.raises(DeckError, match=message) as refusal:
+        bodies_for(deck(tmp_path, more), (1, 2, 4))
+    assert "\n" not in str(refusal.value)
+
+
+def test_parts_without_nodes_are_named(tmp_path: Path) -> None:
+    with pytest.raises(DeckError, match="parts 7, 8 are without nodes"):
+        bodies_for(deck(tmp_path), (1, 7, 8))
+
+
+def test_pieces_that_nothing_joins_are_told(tmp_path: Path) -> None:
+    nodes, shell = quad(5, 20.0)
+    more = "/NODE\n" + nodes + shell.partition("/SHELL/5\n")[2].join(("/SHELL/3\n", ""))
+    (note,) = bodies_for(deck(tmp_path, more), (3,)).notes
+    assert note.endswith("it keeps 2 pieces together that nothing joins")
