@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from d2rpick.choice.of_run import read
 from d2rpick.choice.plan import plan_of
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.histories.opening import Selection
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import RigidWindow, simulate

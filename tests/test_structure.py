@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from d2rpick.api import request
-from d2rpick.cli import replay
+from d2rpick.cli import models
 from d2rpick.histories.opening import READERS
 from d2rpick.models.files import OSCILLATOR_WRITERS
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
@@ -250,7 +250,7 @@ def test_no_garbage_is_looked_for_at_the_end() -> None:
 
 def test_the_command_line_offers_the_formats_there_are() -> None:
     assert tuple(READERS) == request.FORMATS
-    assert tuple(OSCILLATOR_WRITERS) == replay.FORMATS
+    assert tuple(OSCILLATOR_WRITERS) == models.HISTORIES
 
 
 # The result of each command that knows JSON, and the number of its schema.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import CostModel, Weights
-    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Settings
     from d2rpick.choice.warnings import Caution
     from d2rpick.histories import run as histories
 
@@ -46,7 +46,7 @@ class Asked:
     @property
     def options(self) -> tuple[str, ...]:
         """What follows the times in the command line that asks the same."""
-        from d2rpick.report.shell import positional  # not above: most answers repeat no command
+        from d2rpick.report.tables import positional  # not above: most answers repeat no command
 
         return (*self.request.asking(), *positional(self.request.history))
 
@@ -161,7 +161,7 @@ def selected(run: histories.Run, selection: Selection, settings: Settings, model
     from d2rpick.choice.deck_of_run import of_another_model
     from d2rpick.choice.sets_of_parts import recommended_parts
     from d2rpick.deck.model import DISCRETE
-    from d2rpick.flight.flying_parts import asks_for_recommended
+    from d2rpick.flight.momentum import asks_for_recommended
 
     if foreign := of_another_model(run, model.inventory):
         if asks_for_recommended(selection.parts, run):
@@ -177,7 +177,7 @@ def selected(run: histories.Run, selection: Selection, settings: Settings, model
 
 def _check_recommended(request: Request, run: histories.Run) -> None:
     """Refuse the word for the recommended set beside other parts, or without a deck."""
-    from d2rpick.flight.flying_parts import asks_for_recommended
+    from d2rpick.flight.momentum import asks_for_recommended
 
     if asks_for_recommended(request.part, run):
         if len(request.part) > 1:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, frame_of
 from d2rpick.api.asked import request_of
-from d2rpick.report.shell import positional
+from d2rpick.report.tables import positional
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

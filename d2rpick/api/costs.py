@@ -10,7 +10,7 @@ from d2rpick.api.answer import Answer, Paged, frame_of, written
 from d2rpick.api.asked import model_of, request_of
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import calibration, sets_of_parts
-from d2rpick.report.shell import positional
+from d2rpick.report.tables import positional
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

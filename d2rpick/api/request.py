@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
     from d2rpick.choice.cost import Weights
-    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Settings
     from d2rpick.histories.names import Selection
     from d2rpick.vibration.oscillator import Oscillator
 
@@ -187,7 +187,7 @@ class Request:
     @property
     def settings(self) -> Settings:
         """How to choose and judge."""
-        from d2rpick.choice.settings import Settings
+        from d2rpick.choice.situation import Settings
 
         mode, oscillator = None, self.oscillator
         if oscillator is not None and self.v0 is not None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.cost import CostModel
     from d2rpick.choice.of_run import Reference
-    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Settings
     from d2rpick.deck.model import Gravity, Hold, Inventory
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.settings import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.flight.flight import Flight, all_seen, witnesses
 from d2rpick.flight.window import moments
 from d2rpick.histories.digits import not_after, sum_as_read

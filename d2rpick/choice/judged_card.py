@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.choice.of_run import Reference
-    from d2rpick.choice.settings import Settings
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.situation import Settings, Situation
     from d2rpick.choice.verify import Verdict
     from d2rpick.deck.printed_card import PrintedCard, Times
     from d2rpick.histories.history import History

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.comparison import Comparison
-    from d2rpick.choice.settings import Settings
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.situation import Settings, Situation
     from d2rpick.histories.history import History, Track
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
@@ -40,7 +39,7 @@ class Reference(NamedTuple):
     def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read what is selected of a run that is open; FormatError when it is not there."""
         if selection.parts:
-            from d2rpick.flight.flying_parts import with_parts_by_number  # not above: a table has no parts
+            from d2rpick.flight.momentum import with_parts_by_number  # not above: a table has no parts
 
             selection = with_parts_by_number(run, selection)
         return cls(run, run.history(selection))

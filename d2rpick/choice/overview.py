@@ -10,9 +10,9 @@ import numpy as np
 from d2rpick.base.errors import FormatError, RangeError, if_written
 from d2rpick.choice.flights import bounds, flights_of
 from d2rpick.choice.health import Health, assess, cautions_of_health, refuse_unsound, unsound
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.warnings import cautions_of_engine
-from d2rpick.flight.flying_parts import with_parts_by_number
+from d2rpick.flight.momentum import with_parts_by_number
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance import balance_of
 from d2rpick.histories.companions import doubts

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.ranking import Quality
-    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Settings
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.switched_run import Times
     from d2rpick.flight.flight import Flight

@@ -22,11 +22,10 @@ from d2rpick.choice.deck_of_run import (
     of_another_model,
 )
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
-from d2rpick.choice.part_evidence import facts_of
-from d2rpick.choice.switchable_parts import rows_of, step_growth
+from d2rpick.choice.switchable_parts import facts_of, rows_of, step_growth
 from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.deck.geometry import Placement
-from d2rpick.flight.flying_parts import asks_for_recommended, with_parts_by_number
+from d2rpick.flight.momentum import asks_for_recommended, with_parts_by_number
 from d2rpick.histories.listings import printed_steps
 from d2rpick.histories.names import Selection, select_parts
 from d2rpick.vibration.measures import run_time_share
@@ -35,10 +34,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.cost import Weights
-    from d2rpick.choice.part_evidence import RunFacts
-    from d2rpick.choice.settings import Settings
-    from d2rpick.choice.situation import Situation
-    from d2rpick.choice.switchable_parts import PartRow
+    from d2rpick.choice.situation import Settings, Situation
+    from d2rpick.choice.switchable_parts import PartRow, RunFacts
     from d2rpick.choice.switched_run import Times
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.names import Part

@@ -32,7 +32,7 @@ from d2rpick.histories.source import expand
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Settings
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.history import Samples
 

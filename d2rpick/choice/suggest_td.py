@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.settings import Settings
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.situation import Settings, Situation
     from d2rpick.histories.history import History, Samples
 
     Look = Callable[[float], Situation]

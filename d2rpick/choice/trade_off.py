@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.ranking import Quality
-    from d2rpick.choice.settings import Settings
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.situation import Settings, Situation
     from d2rpick.choice.suggest import AcceptableWindow, Suggestion
     from d2rpick.histories.history import Samples
 

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.health import Health
     from d2rpick.choice.ranking import Quality
-    from d2rpick.choice.settings import Settings
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.situation import Settings, Situation
     from d2rpick.histories.history import History
 
 

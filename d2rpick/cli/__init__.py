@@ -41,7 +41,9 @@ COMMANDS: Final = {
 _MODULES: Final = {
     **dict.fromkeys(("suggest", "explore", "verify", "parts"), "one_run"),
     **dict.fromkeys(("info", "extract"), "histories"),
+    **dict.fromkeys(("replay", "rollover"), "models"),
     "rule": "check",
+    "calibrate": "study",
 }
 COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended

@@ -9,8 +9,7 @@ import click
 from d2rpick.api.request import READING
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, HISTORY, RESULT
-from d2rpick.cli.output import in_words
-from d2rpick.cli.progress import opened
+from d2rpick.cli.output import in_words, opened
 from d2rpick.report.formats import FORMATS, write
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from d2rpick.api.request import LIMITS, READING, check_window, time_or_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.cli import options
 from d2rpick.cli.options import ANSWER, DECK, DECK_OF_PARTS, HISTORY, ONE_RUN, RESULT, WINDOW
-from d2rpick.cli.progress import opened, reading
+from d2rpick.cli.output import opened, reading
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING
 from d2rpick.base.errors import ArgumentError, DeckError, printable
 from d2rpick.cli import options
 from d2rpick.cli.options import CARDS, DECK_OF_PARTS, HISTORY, RESULT
-from d2rpick.cli.progress import opened
+from d2rpick.cli.output import opened
 from d2rpick.cli.values import click_type
 from d2rpick.report.formats import FORMATS
 

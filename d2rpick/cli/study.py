@@ -1,4 +1,4 @@
-"""The command ``study``."""
+"""The commands of many runs: ``study`` and ``calibrate``."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from d2rpick.api.request import LIMITS, READING, needed_time, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, D2RPickError, FormatError
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
-from d2rpick.cli.output import tell
-from d2rpick.cli.progress import counting
+from d2rpick.cli.output import counting, tell
 from d2rpick.cli.values import click_type
 from d2rpick.report.formats import FORMATS
 
@@ -21,9 +20,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.api.request import Request
-    from d2rpick.api.resume_file import Ledger
+    from d2rpick.api.studies import Ledger
     from d2rpick.base.workers import Farm
     from d2rpick.cli.output import Output
+
 
 EXAMPLES = """\b
 Examples:
@@ -78,8 +78,7 @@ def study(
     Each RUN is a file, a folder with the files of one run, or a pattern whose matches are runs.  One that cannot be
     read is listed in its row and does not stop the others.
     """
-    from d2rpick.api.resume_file import Ledger, fingerprint, line
-    from d2rpick.api.studies import rows_of, summary
+    from d2rpick.api.studies import Ledger, fingerprint, line, rows_of, summary
     from d2rpick.choice.study import Question
 
     if scheduler and jobs:
@@ -177,3 +176,28 @@ def _farm(jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool) -
             tell(f"note: {scheduler}: no workers yet, waiting for some")
         return cluster
     return workers.on_cores(min(jobs or workers.cores(), calls), "d2rpick.choice.study")
+
+
+CALIBRATIONS = """\b
+Examples:
+  d2rpick calibrate sample_data/flying_box
+  d2rpick calibrate -f toml -o site.toml sample_data/flying_box
+"""
+
+
+@options.command("calibrate", CALIBRATIONS)
+@click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=click_type("file"))
+@options.takes(*RESULT, forms=FORMATS["calibration"])
+def calibrate(folders: tuple[str, ...], output: Output) -> None:
+    """Fit the cost of elements to what runs of a site took, for --weights.
+
+    Each RUN is the folder of one run, with its deck and what its solver printed: listings of Radioss (NAME_0001.out,
+    with /MON/ON), d3hsp or glstat of LS-DYNA.  Give runs with and without switching of the same model: what they do
+    not tell apart keeps the ratio that was measured.  A run that is named twice counts once.
+    """
+    from d2rpick.api.costs import fitted
+
+    output = output.beside()
+    answer = fitted(folders)
+    output.notes((), answer.cautions)
+    output.answer(answer)

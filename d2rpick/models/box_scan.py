@@ -9,7 +9,7 @@ import numpy as np
 
 from d2rpick.base.errors import RangeError
 from d2rpick.base.workers import answers, cores, on_cores
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part

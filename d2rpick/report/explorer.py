@@ -14,9 +14,8 @@ import numpy as np
 
 from d2rpick.histories.samples import outline
 from d2rpick.report.html import Markup, join, resource, tag
-from d2rpick.report.shell import shell_line
 from d2rpick.report.suggestion import acceptable
-from d2rpick.report.tables import measure, short
+from d2rpick.report.tables import measure, shell_line, short
 from d2rpick.report.view import locked_in, response, scale_of, view_of
 
 if TYPE_CHECKING:

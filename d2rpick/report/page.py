@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.explorer import explorer, scripts, styles
 from d2rpick.report.html import Markup, document, drawings, join, pairs, resource, section, table, tag
-from d2rpick.report.shell import shell_line
 from d2rpick.report.situation import heading, measures_of
-from d2rpick.report.tables import short
+from d2rpick.report.tables import shell_line, short
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -19,8 +18,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.health import Health
     from d2rpick.choice.judged_card import SolverInput
-    from d2rpick.choice.settings import Settings
-    from d2rpick.choice.situation import Situation
+    from d2rpick.choice.situation import Settings, Situation
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
     from d2rpick.report.explorer import Explorer

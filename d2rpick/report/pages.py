@@ -223,7 +223,7 @@ def study_page(answer: Study, command: Sequence[str]) -> str:
 
 def _of_study(answer: Study, command: Sequence[str]) -> Iterator[Markup]:
     from d2rpick.report.figures import svg_element
-    from d2rpick.report.figures_study import draw_study
+    from d2rpick.report.figures_choice import draw_study
 
     yield page.front([_common(answer)], remarks(answer.cautions), pairs(study.outcome(answer)))
     caption = "Internal energies of all runs, with the tr of each, the common one and td"

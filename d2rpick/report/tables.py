@@ -1,8 +1,9 @@
-"""One table, four ways to write it down: for reading, as Markdown, as CSV, and numbers as people read them."""
+"""Tables for reading, as Markdown and as CSV, numbers as people read them, command lines as a shell takes them."""
 
 from __future__ import annotations
 
 import re
+import shlex
 from operator import gt
 from typing import TYPE_CHECKING, Any, Final
 
@@ -10,6 +11,7 @@ from d2rpick.base.errors import UNSEEN, printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
@@ -222,3 +224,34 @@ def _json(result: Any, indent: int | None) -> str:
         return json.dumps(found[0])[1:-1] if unicodedata.category(found[0]) in UNSEEN else found[0]
 
     return re.sub(r"[^\n -~]", seen, json.dumps(result, indent=indent, allow_nan=False, ensure_ascii=False))
+
+
+def shell_line(words: Iterable[str]) -> str:
+    r"""Quote words so that bash, zsh and POSIX shells of 2024 give them back, in printable characters.
+
+    Examples
+    --------
+    >>> print(shell_line(["d2rpick", "info", "my run.csv", "it's\n\udcff"]))
+    d2rpick info 'my run.csv' $'it\'s\012\377'
+    """
+    return " ".join(shlex.quote(word) if word.isprintable() else f"$'{''.join(map(_escaped, word))}'" for word in words)
+
+
+def positional(names: Sequence[str]) -> tuple[str, ...]:
+    """Give names as they are typed behind the options: behind ``--`` where one could be taken for an option.
+
+    Examples
+    --------
+    >>> positional(["glstat", "-"]), positional(["-run.csv"])
+    (('glstat', '-'), ('--', '-run.csv'))
+    """
+    return (*(["--"] if any(name.startswith("-") and name != "-" for name in names) else []), *names)
+
+
+def _escaped(letter: str) -> str:
+    if letter.isprintable():
+        return f"\\{letter}" if letter in "\\'" else letter
+    # Bytes of a file name that are no text come as lone surrogates.
+    errors = "surrogateescape" if "\udc80" <= letter <= "\udcff" else "surrogatepass"
+    # Three octal digits: of hexadecimal ones some shells take more than two, those of the name behind them.
+    return "".join(f"\\{byte:03o}" for byte in letter.encode(errors=errors))

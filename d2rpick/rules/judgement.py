@@ -22,7 +22,7 @@ from d2rpick.rules.base import Fault
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
-    from d2rpick.choice.settings import Settings
+    from d2rpick.choice.situation import Settings
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.verify import Verdict
     from d2rpick.deck import Window

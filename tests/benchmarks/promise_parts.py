@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History

@@ -30,7 +30,7 @@ LOOP = f"""
 import sys
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.of_run import read
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 found = [suggest(read([name]).history, {TD}, Settings()).recommended for name in sys.argv[1:]]
 assert all(found)
 """

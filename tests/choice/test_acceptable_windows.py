@@ -18,7 +18,7 @@ from d2rpick.choice.acceptable_windows import (
     error_at,
     error_profile,
 )
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest import Suggestion, suggest
 from d2rpick.choice.verify import verify, verify_at
 from d2rpick.histories.history import History

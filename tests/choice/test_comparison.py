@@ -14,7 +14,7 @@ import pytest
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs, rigid_parts
 from d2rpick.choice.of_run import Reference, compare_with, read, verify_of
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.switched_run import switched_history
 from d2rpick.histories.history import History, Track
 from d2rpick.histories.opening import Selection, open_run

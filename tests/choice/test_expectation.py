@@ -11,8 +11,7 @@ import pytest
 from d2rpick.choice.acceptable_windows import acceptable_windows
 from d2rpick.choice.candidates import judge
 from d2rpick.choice.expectation import MOST_KEPT, expectation, most_energy
-from d2rpick.choice.settings import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest_at
 from d2rpick.choice.trade_off import offers_of
 from d2rpick.choice.verify import verify_at

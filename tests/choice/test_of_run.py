@@ -9,7 +9,7 @@ import pytest
 
 from d2rpick.choice.judged_card import CardRequest, judged_card
 from d2rpick.choice.of_run import Reference, judge_of, read, suggest_of, verify_of
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.study import Question, ask
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run

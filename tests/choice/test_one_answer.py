@@ -12,7 +12,7 @@ import pytest
 from d2rpick.choice.acceptable_windows import acceptable_windows
 from d2rpick.choice.of_run import read
 from d2rpick.choice.plan import plan_of
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.verify import Verdict, verify, verify_at

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from tests.benchmarks.promise import BAD, Truth, row
 from tests.benchmarks.promise_parts import CLASSES, Motion, Record, history, records, stated
 from tests.energies import sure

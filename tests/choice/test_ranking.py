@@ -22,8 +22,7 @@ from d2rpick.choice.ranking import (
     rank,
     states_per_period,
 )
-from d2rpick.choice.settings import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History

@@ -10,8 +10,7 @@ import pytest
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.of_run import read
-from d2rpick.choice.settings import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.flight.bodies import RigidBody
 from d2rpick.histories.opening import Selection

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.of_run import Reference, read
 from d2rpick.choice.ranking import rank
-from d2rpick.choice.settings import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.choice.trade_off import explore_of
 from d2rpick.histories.history import History

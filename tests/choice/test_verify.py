@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.of_run import read
-from d2rpick.choice.settings import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import Pair, suggest
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.verify import verify, verify_at

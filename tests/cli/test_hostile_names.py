@@ -21,8 +21,7 @@ from hypothesis import strategies as st
 
 from d2rpick.base.errors import UNSEEN, printable
 from d2rpick.report.figures import with_unit
-from d2rpick.report.shell import positional, shell_line
-from d2rpick.report.tables import as_json, as_line, as_markdown, in_markdown
+from d2rpick.report.tables import as_json, as_line, as_markdown, in_markdown, positional, shell_line
 from tests.command import DECK, ENERGY, ROOT, run
 from tests.sample_deck import DECK as SAMPLE_DECK
 

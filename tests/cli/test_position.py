@@ -9,7 +9,7 @@ import pytest
 
 from d2rpick.api.asked import model_of, selected
 from d2rpick.api.request import Request
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.histories.names import Selection
 from tests.command import answer, run
 from tests.computed import starter, stored

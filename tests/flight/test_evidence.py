@@ -10,8 +10,7 @@ import pandas as pd
 import pytest
 
 from d2rpick.choice.flights import find_flights
-from d2rpick.choice.settings import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
 from d2rpick.flight.flight import seen_flight

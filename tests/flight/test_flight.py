@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from d2rpick.choice.settings import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import end_of_load

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.of_run import read
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.balance import spring_energy, springs_among
 from d2rpick.histories.names import Part

@@ -9,12 +9,11 @@ import pytest
 from matplotlib.patches import Rectangle
 
 import d2rpick as d2
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.study import Common, Study, StudyRow
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
-from d2rpick.report.figures_choice import draw_suggestion
-from d2rpick.report.figures_study import draw_study
+from d2rpick.report.figures_choice import draw_study, draw_suggestion
 from tests.command import BOX, ENERGY, ROOT
 
 if TYPE_CHECKING:

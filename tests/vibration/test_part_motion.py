@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from d2rpick.choice.settings import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.vibration.measures import kinetic_share, lock_in_error
 from d2rpick.vibration.part_motion import all_zeros, by_own_modes, followed

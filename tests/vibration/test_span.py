@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from d2rpick.choice.settings import Settings
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.vibration.identify import identify, identify_several, judge_given
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.span import Fits, Span, described_span, span_of

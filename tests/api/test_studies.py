@@ -11,16 +11,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from d2rpick.api.resume_file import Ledger, fingerprint, line
+from d2rpick.api.studies import Ledger, fingerprint, line
 from d2rpick.base.errors import FormatError
 from d2rpick.choice import study
-from d2rpick.choice.settings import Settings
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.study import Question, ask
 from d2rpick.histories.opening import Selection
 from tests import variants
 
 if TYPE_CHECKING:
     from d2rpick.choice.study import StudyRow
+
 
 QUESTION = Question(variants.TD, Settings())
 
