@@ -9,14 +9,13 @@ import numpy as np
 
 from d2rpick.models import files
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import BOX, Record, RigidWindow, simulate
-from d2rpick.models.box_scan import scan, scan_times
+from d2rpick.models.box_run import BOX, Record, RigidWindow, scan, scan_times, simulate
 from tests.command import answer
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from d2rpick.models.box_scan import Outcome
+    from d2rpick.models.box_run import Outcome
 
 T_END = 0.55
 # td is this long before the ground comes [s], to the millisecond; as in the published study.

@@ -261,8 +261,9 @@ def _scan(box: Box, output: Output) -> None:
     from d2rpick.base.workers import begin, cores
 
     begin(box.jobs or cores(), "d2rpick.models.box_run")
-    from d2rpick.models.box_run import simulate
-    from d2rpick.models.box_scan import comparison_end, scan, scan_times, suggestion_for
+    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.suggest import suggest
+    from d2rpick.models.box_run import comparison_end, history_of, scan, scan_times, simulate
     from d2rpick.report.formats import write
     from d2rpick.report.rollover import Scan
 
@@ -271,7 +272,7 @@ def _scan(box: Box, output: Output) -> None:
     reference = simulate(parameters, box.end, interval=box.dt)
     comparison_end(reference, td)
     times = scan_times(reference.released or td / 3, td)
-    answer = suggestion_for(reference, td)
+    answer = suggest(history_of(reference), td, Settings())
     cautions = (*_unbalanced(reference), *answer.cautions)
     output.notes((), cautions)
     if answer.recommended:

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.models.box_model import Parameters
-    from d2rpick.models.box_run import Record, RigidWindow
-    from d2rpick.models.box_scan import Outcome
+    from d2rpick.models.box_run import Outcome, Record, RigidWindow
     from d2rpick.vibration.oscillator import Replay, Trajectory
 
 

@@ -13,8 +13,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.warnings import Caution
-    from d2rpick.models.box_run import Record
-    from d2rpick.models.box_scan import Outcome
+    from d2rpick.models.box_run import Outcome, Record
 
 # Of each run, in JSON and as columns.
 RUN: Final = row(*(Field(key, "number") for key in (

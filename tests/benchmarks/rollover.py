@@ -19,9 +19,10 @@ from time import perf_counter
 
 import numpy as np
 
+from d2rpick.choice.situation import Settings
+from d2rpick.choice.suggest import suggest
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import RigidWindow, simulate
-from d2rpick.models.box_scan import suggestion_for
+from d2rpick.models.box_run import RigidWindow, history_of, simulate
 from tests.rehearsals import SETS, Rehearsal, rehearse
 
 WINDOW = RigidWindow(0.0970, 0.370)  # what suggest recommends for the default
@@ -74,7 +75,7 @@ def main() -> int:
         print(saving(mesh), flush=True)
     run = simulate(Parameters(), 0.4)
     start = perf_counter()
-    suggestion_for(run, 0.37)
+    suggest(history_of(run), 0.37, Settings())
     ratio = run.seconds / (perf_counter() - start)
     print(f"\none run of 400 ms costs {ratio:.1f} runs of suggest on its history, at most 100")
     return int(missed > 0 or ratio > 100)

@@ -22,8 +22,7 @@ from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import simulate
-from d2rpick.models.box_scan import history_of
+from d2rpick.models.box_run import history_of, simulate
 from d2rpick.report.suggestion import outlook
 from tests import chain, paper
 from tests.command import ENERGY, ROLLOVER, answer, run

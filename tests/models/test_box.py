@@ -10,8 +10,17 @@ from hypothesis import strategies as st
 from d2rpick.base.errors import RangeError
 from d2rpick.models.box_model import GRAVITY, Bars, Parameters, Truss, build, stiffest_rate
 from d2rpick.models.box_motion import SLIP, Contact, Motion, RigidBody
-from d2rpick.models.box_run import BOX, RigidWindow, proceed, run_to, simulate
-from d2rpick.models.box_scan import compare, comparison_end, scan, scan_times
+from d2rpick.models.box_run import (
+    BOX,
+    RigidWindow,
+    compare,
+    comparison_end,
+    proceed,
+    run_to,
+    scan,
+    scan_times,
+    simulate,
+)
 
 COARSE = Parameters(mesh=4, damping=1.0)
 INTERVAL = 5e-4

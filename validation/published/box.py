@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.choice.situation import Settings
 from d2rpick.choice.study import common_tr, row_of
-from d2rpick.models.box_run import BOX, RigidWindow, simulate
-from d2rpick.models.box_scan import compare, suggestion_for
+from d2rpick.choice.suggest import suggest
+from d2rpick.models.box_run import BOX, RigidWindow, compare, history_of, simulate
 from validation.published.exhibits import Curve, Exhibit, Panel, Shape
 
 if TYPE_CHECKING:
@@ -176,7 +177,7 @@ def tried(variants: Sequence[Variant]) -> Trial:
     """
     landings = [_run(one.parameters).landed or _END for one in variants]
     td = round(min(landings) - _BEFORE_LANDING, 3)
-    rows = [row_of(one.name, suggestion_for(_run(one.parameters), td)) for one in variants]
+    rows = [row_of(one.name, suggest(history_of(_run(one.parameters)), td, Settings())) for one in variants]
     common = common_tr(rows)
     assert common.tr is not None
     window = RigidWindow(common.tr, td)
@@ -286,7 +287,7 @@ def _of_stiffness(trial: Trial, own: Mapping[str, float]) -> str:
 
 
 def _own(reference: Record, td: float) -> float | None:
-    recommended = suggestion_for(reference, td).recommended
+    recommended = suggest(history_of(reference), td, Settings()).recommended
     return recommended.tr if recommended else None
 
 

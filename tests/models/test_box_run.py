@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.models.box_scan import suggestion_for
+from d2rpick.choice.situation import Settings
+from d2rpick.choice.suggest import suggest
+from d2rpick.models.box_run import history_of
 from tests.faults import thirds
 from tests.rehearsals import SETS, rehearse
 
@@ -28,7 +30,7 @@ def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_annou
     assert found.flight[2] == "momentum"
     assert found.roll_share < 0.1
     assert abs(found.energy_off) < 0.25
-    pair = suggestion_for(found.reference, found.td).recommended
+    pair = suggest(history_of(found.reference), found.td, Settings()).recommended
     assert pair is not None
     # where the printed digits of a matsum leave its start open by a millisecond, another crossing may come first
     released = found.reference.released
