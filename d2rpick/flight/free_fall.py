@@ -90,7 +90,7 @@ class Laws:
     def window(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
         """Give the states around ``td`` in free flight, and its gravity [length/time^2]; None where nothing acts."""
         window = self._lasting(self.fit, td)
-        gravity = self._gravity(window) if window and not self._braked(*window) else None
+        gravity = self.gravity(*window) if window else None
         if gravity is not None:
             return window, gravity
         window = self._lasting(self._steady, td)
@@ -100,6 +100,13 @@ class Laws:
         if window and not self._falls_across:  # a push that balances the weight for a moment leaves it as steady
             return (None if self._carried else window), None
         return self._under_gravity(td)
+
+    def gravity(self, first: int, last: int) -> float | None:
+        """Acceleration between two states that obey the law of free flight: 0 where none is seen, NaN where unknown.
+
+        None where what acts there is not gravity, or a brake [length/time^2].
+        """
+        return None if self._braked(first, last) else self._gravity((first, last))
 
     def _lasting(self, law: Law, td: float, enough: float = 0.0) -> tuple[int, int] | None:
         return lasting_window(law, td, self.extent, self.noise, fades=True, enough=enough)

@@ -129,7 +129,7 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
         return unheld(momenta.surroundings, whole, parts, td) if known else None
     if noise > TOLERANCE * extent:
         return None
-    laws = _laws(momenta, tuple(members), balance)
+    laws = laws_of(momenta, tuple(members), balance)
     states, gravity = laws.window(td)
     if states is None or (not gravity and gravities is None and _falls(momenta)):
         return None  # what does not fall with the others is carried
@@ -144,7 +144,7 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
     return unheld(momenta.surroundings, found, parts, td)
 
 
-def _laws(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None) -> Laws:
+def laws_of(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None) -> Laws:
     """Give the laws of free flight for a set of parts, made once for all td."""
     mass = momenta.mass(members)
     whole = balance if momenta.parts is None or np.isnan(mass) else None
@@ -162,7 +162,7 @@ def _laws(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = 
 def _falls(momenta: Momenta) -> bool:
     """Whether some part by itself is seen to fall under gravity."""
     return momenta.parts is not None and momenta.known.once(
-        "falls", lambda: any(_laws(momenta, (i,)).fall for i in momenta.moving)
+        "falls", lambda: any(laws_of(momenta, (i,)).fall for i in momenta.moving)
     )
 
 

@@ -185,10 +185,10 @@ def longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
     orders are tried.
     """
     last_state = law.time.size - 1
-    first = _farthest(at, 0, lambda i: law.misfit(i, at) <= room)
-    one = first, _farthest(at, last_state, lambda j: law.misfit(first, j) <= room)
-    last = _farthest(at, last_state, lambda j: law.misfit(at, j) <= room)
-    other = _farthest(at, 0, lambda i: law.misfit(i, last) <= room), last
+    first = farthest(at, 0, lambda i: law.misfit(i, at) <= room)
+    one = first, farthest(at, last_state, lambda j: law.misfit(first, j) <= room)
+    last = farthest(at, last_state, lambda j: law.misfit(at, j) <= room)
+    other = farthest(at, 0, lambda i: law.misfit(i, last) <= room), last
     return max(one, other, key=lambda window: _length(law.time, window))
 
 
@@ -265,7 +265,7 @@ def _length(time: Samples, window: tuple[int, int]) -> float:
     return float(time[window[1]] - time[window[0]])
 
 
-def _farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
+def farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
     """Walk from ``start`` towards ``limit`` in doubling steps while it fits, then halve the last step."""
     sign, good, step = (1 if limit > start else -1), start, 1
     while good != limit:

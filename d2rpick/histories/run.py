@@ -118,7 +118,7 @@ class Run:
 
     def _masses(self, momenta: Samples, holder: Legs) -> Samples | None:
         with suppress(FormatError):
-            return np.median(self._of_holder("mass", holder.parts), axis=0)
+            return _median_of_some(self._of_holder("mass", holder.parts))
         axis = int(np.abs(momenta).sum(axis=(0, 1)).argmax())
         try:
             velocity, momentum = self._of_holder(_VELOCITIES[axis], holder.parts), momenta[:, :, axis]
@@ -342,6 +342,16 @@ class _Written:
         from d2rpick.histories.balance import terms_of
 
         return terms_of(self._run.databases)
+
+
+def _median_of_some(values: Samples) -> Samples:
+    """Median over the states of each column of values (n, k) that are not 0: the mass of a rigid part is written so."""
+    some = values != 0
+    if some.all():
+        return np.asarray(np.median(values, axis=0))
+    return np.array(
+        [np.median(one[there]) if there.any() else 0.0 for one, there in zip(values.T, some.T, strict=True)]
+    )
 
 
 def _left_out(springs: str) -> str:

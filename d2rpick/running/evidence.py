@@ -1,0 +1,268 @@
+"""When no force acts, as far as a record tells so far: each answer rests on the states up to it, and on no later one.
+
+The momentum less gravity and damping is constant within 1e-4 of its largest value so far; where none is written, the
+energy of the contacts is.  A force that ends is not seen to have ended for good before a wait is over: in a car that
+hit a block twice, nothing acted for 14 ms between the two (docs/first-run.md, "The wait").
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from d2rpick.flight.free_fall import FreeFall
+from d2rpick.flight.momentum import laws_of
+from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, farthest
+from d2rpick.histories.history import Given
+from d2rpick.histories.samples import window
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.flight.window import Law
+    from d2rpick.histories.history import Balance, History, Momenta, Precision, Samples
+    from d2rpick.histories.names import Part
+
+_Record = TypeVar("_Record", bound="History | Balance | Momenta")
+
+# Of the largest momentum, or contact energy, so far: single precision adds up to a tenth of it.
+CONSTANT: Final = 1e-4
+# A state at which a force was taken for another one than gravity is tried again after so much of the time before it.
+_AGAIN: Final = 0.25
+# Momenta of parts are those of the model within this share of it, or a rigid body has taken some of them.
+_COMPLETE: Final = 1e-2
+
+
+class Waiting(Protocol):
+    """How long nothing must have acted at a state."""
+
+    def needed(self, start: float, now: float) -> float | None:
+        """Wait [time] by what was written up to ``now``, without force since ``start``; None: not known yet."""
+
+
+class Quiet(NamedTuple):
+    """Time without force: ``start``, ``seen`` when the ``wait`` was over, ``end``: the first state with a force [time].
+
+    ``end`` is None where the record ends before.  ``source`` is "momentum" or "contact-energy"; ``left`` what changes
+    from ``start`` to ``seen``, as a share of the largest value so far; ``gravity`` as of `FreeFlight`; ``parts`` are
+    those that fly together, None for the whole model.
+    """
+
+    start: float
+    seen: float
+    end: float | None
+    wait: float
+    source: str
+    left: float
+    gravity: float = 0.0
+    parts: tuple[Part, ...] | None = None
+
+
+class _Witness:
+    """What shows a force: laws over the same ``time`` (n,), and what each may leave at each state (n,).
+
+    ``members`` of ``momenta`` fly together; None where the contact energy is all that tells.
+    """
+
+    def __init__(
+        self, laws: Sequence[tuple[Law, Samples]], momenta: Momenta | None = None, members: tuple[int, ...] = ()
+    ) -> None:
+        self.time, self.momenta, self.members = laws[0][0].time, momenta, members
+        self._laws = laws
+
+    def left(self, first: int, last: int) -> float:
+        """What is left between two states, as a share of what may be."""
+        return max(law.misfit(first, last) / float(room[max(first, last)]) for law, room in self._laws)
+
+    def last_without(self, first: int) -> int:
+        """Last state up to which, from ``first`` on, no force shows."""
+        return farthest(first, self.time.size - 1, lambda last: self.left(first, last) <= 1)
+
+    def first_without(self, last: int, least: int) -> int:
+        """First state, not before ``least``, from which no force shows up to ``last``."""
+        return farthest(last, least, lambda first: self.left(first, last) <= 1)
+
+    def gravity(self, first: int, last: int, balance: Balance | None) -> float | None:
+        """Gravity between two states, as of `Laws.gravity`, by what was written up to then."""
+        if self.momenta is None:
+            return 0.0
+        so_far = _of_states(self.momenta, slice(0, last + 1))
+        if so_far.change(self.members) <= so_far.noise(self.members):
+            return 0.0
+        return laws_of(so_far, self.members, balance).gravity(first, last)
+
+
+def until(history: History, time: float) -> History:
+    """Give what a record was when the run had come to a time."""
+    momenta = tuple(_cut(one, time) for one in history.momenta)
+    balance = _cut(history.balance, time) if history.balance else None
+    return replace(_cut(history, time), evidence=Given(momenta, balance, history.masses))
+
+
+def _cut(record: _Record, time: float) -> _Record:
+    return _of_states(record, window(record.time, -np.inf, time))
+
+
+def _of_states(record: _Record, states: slice) -> _Record:
+    """Give some states of a record alone: all its arrays of as many rows as it has times."""
+    values = {one.name: getattr(record, one.name) for one in fields(record) if one.init}
+    size = record.time.size
+    rows = {name: one[states] for name, one in values.items() if isinstance(one, np.ndarray) and len(one) == size}
+    return replace(record, **rows)  # type: ignore[arg-type]
+
+
+def quiet_times(history: History, waiting: Waiting) -> tuple[Quiet, ...]:
+    """Find all times without force that lasted for a wait, ascending.
+
+    What is found up to a state rests on what was written up to it: as long as the run goes on the answer only grows,
+    but for the ``end`` of its last member.
+    """
+    found = [
+        (one, float(witness.time[-1])) for witness in _witnesses(history) for one in _quiet(history, witness, waiting)
+    ]
+    kept: list[Quiet] = []
+    for one, reach in sorted(found, key=lambda q: q[0].seen):
+        if not kept or (kept[-1].end is not None and one.seen > kept[-1].end):
+            kept.append(_going_on(one, reach, [other for other, _ in found]))
+    return tuple(kept)
+
+
+def _going_on(one: Quiet, reach: float, found: Sequence[Quiet]) -> Quiet:
+    """Let another witness tell how a flight ends that was followed to ``reach``, from where parts are not believed."""
+    if one.end is not None:
+        return one
+    after = (q.end for q in found if q.end is not None and q.start < reach < q.end)
+    return one._replace(end=next(after, None))
+
+
+def can_tell(history: History) -> bool:
+    """Whether momenta or energies of contacts are written that show a force."""
+    return any(True for _ in _witnesses(history))
+
+
+def contact_after(history: History, start: float) -> float | None:
+    """Give the first state after ``start`` at which a force acts that did not then; None where none does [time].
+
+    Nothing acts at ``start`` and in the `FEWEST` states from there on, as in a rigid leg that begins in flight.
+    """
+    for one in _witnesses(history):
+        first = int(np.searchsorted(one.time, start))
+        if first + FEWEST <= one.time.size:
+            last = one.last_without(first)
+            return None if last == one.time.size - 1 else float(one.time[last + 1])
+    return None
+
+
+def highest_energy(history: History, start: float, end: float) -> float:
+    """Give the state from ``start`` to ``end`` with the highest internal energy, tr without td [time].
+
+    The later of two alike: it is never shorter of the end of a load.
+    """
+    time, energy = history.between(start, end)
+    return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
+
+
+def _quiet(history: History, witness: _Witness, waiting: Waiting) -> Iterator[Quiet]:
+    first = 0
+    while first + FEWEST <= witness.time.size:
+        last = witness.last_without(first)
+        if found := _seen(history, witness, waiting, first, last):
+            yield found
+        if last == witness.time.size - 1:
+            return
+        first = witness.first_without(last + 1, first)
+
+
+def _seen(history: History, witness: _Witness, waiting: Waiting, first: int, last: int) -> Quiet | None:
+    """Look at the states from ``first`` to ``last``, between which the law holds, for one at which a wait is over."""
+    time, state = witness.time, first + FEWEST - 1
+    start = float(time[first])
+    while state <= last:
+        now = float(time[state])
+        wait = waiting.needed(start, now)
+        if wait is None or now - start < wait:
+            state += 1
+            continue
+        gravity = (
+            None if history.surroundings.held(history.parts, now) else witness.gravity(first, state, history.balance)
+        )
+        if gravity is not None:
+            momenta, end = witness.momenta, float(time[last + 1]) if last < time.size - 1 else None
+            parts = momenta.parts and tuple(momenta.parts[i] for i in witness.members) if momenta else None
+            source, left = "momentum" if momenta else "contact-energy", CONSTANT * witness.left(first, state)
+            return Quiet(start, now, end, wait, source, left, gravity, parts)
+        state += 1 + int(_AGAIN * (state - first))
+    return None
+
+
+def _witnesses(history: History) -> Iterator[_Witness]:
+    contact, some = _contact(history.balance), False
+    for momenta, members in _flying(history):
+        values = momenta.of(members)
+        room = _room(np.abs(values).max(axis=1), momenta.precision, len(members))
+        if room is not None:
+            some = True
+            every = contact is not None and {*momenta.moving} <= {*members} and contact[1].size == momenta.time.size
+            fall = FreeFall(momenta.time, values), room
+            yield _Witness([fall, contact] if every and contact else [fall], momenta, members)
+    if contact and not some:
+        yield _Witness([contact])
+
+
+def _contact(balance: Balance | None) -> tuple[Law, Samples] | None:
+    """Let the energy of all contacts be constant; None where there is none."""
+    if balance is None or balance.sliding is None or not balance.sliding.any():
+        return None
+    room = _room(np.abs(balance.sliding), balance.precision)
+    return None if room is None else (Constant(balance.time, balance.sliding[:, np.newaxis]), room)
+
+
+def _room(sizes: Samples, precision: Precision, number: int = 1) -> Samples | None:
+    """What may be left at each state of a sum of so many values of some ``sizes`` (n,); None where digits hide more."""
+    largest = np.maximum.accumulate(sizes)
+    noise = number * precision.quanta(largest) / 2
+    tells = noise[-1] <= TOLERANCE * largest[-1] > 0
+    return np.maximum(CONSTANT * largest + noise, np.finfo(float).tiny) if tells else None
+
+
+def _flying(history: History) -> Iterator[tuple[Momenta, tuple[int, ...]]]:
+    """Give momenta, and whose of them may be those of a body that flies, best first.
+
+    Tried are the parts asked for, what hangs on them by the deck, all that move, and the whole model.
+    """
+    whole = next((one for one in history.momenta if one.parts is None), None)
+    for one in history.momenta:
+        if one.parts is None:
+            yield one, (0,)
+            continue
+        sets = dict.fromkeys(_sets(one))
+        for stretch in believed(one, whole):
+            yield from ((_of_states(one, stretch), members) for members in sets)
+
+
+def _sets(momenta: Momenta) -> Iterator[tuple[int, ...]]:
+    assert momenta.parts is not None
+    chosen = tuple(momenta.flying or momenta.chosen)
+    yield chosen
+    number = {part.id: place for place, part in enumerate(momenta.parts)}
+    own = {momenta.parts[i].id for i in chosen}
+    hung = {part for body in momenta.surroundings.bodies() if own & {*body} for part in body}
+    yield tuple(sorted({*chosen, *(number[part] for part in hung if part in number)}))
+    yield tuple(range(momenta.values.shape[1]))
+
+
+def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:
+    """Give the states in which the momenta of parts are those of the ``whole`` model, by stretches.
+
+    In the others a rigid body has taken some of them: then no quantity of a part is believed.
+    """
+    if whole is None or whole.velocity or whole.time.size != momenta.time.size:
+        return (slice(0, momenta.time.size),)
+    everything = range(momenta.values.shape[1])
+    largest = np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1))
+    off = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
+    there = off <= _COMPLETE * largest + 2 * momenta.noise(everything)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(np.int8), [0]]))).reshape(-1, 2)
+    return tuple(slice(first, last) for first, last in edges.tolist() if last - first >= FEWEST)

@@ -1,0 +1,96 @@
+"""When no force acts, and how long it must not: on computed runs, and on made ones whose law is known."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from d2rpick.base.errors import RangeError
+from d2rpick.histories.opening import Selection, open_run
+from d2rpick.running.evidence import contact_after, highest_energy, quiet_times, until
+from d2rpick.running.wait import InnerMotion
+from tests.command import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from d2rpick.histories.history import History
+    from d2rpick.running.evidence import Quiet
+
+# Windows of flights [s]: car with contacts at 2.3-11.8, 28.1-38.5 and 150.4 ms, box that lands at 285.8, 338.4 ms ...
+CAR, BOX = "carT01.gz", "drop2T01.gz"
+
+
+@cache
+def record(*names: str) -> History:
+    return open_run([str(ROOT / "tests/data" / name) for name in names]).history(Selection())
+
+
+def spans(found: Sequence[Quiet]) -> NDArray[np.float64]:
+    """Starts and ends, NaN where none is seen."""
+    return np.array([(one.start, one.end) for one in found], np.float64)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        (CAR, [(0.0, 0.0023), (0.0384, 0.1504)]),
+        (BOX, [(0.0, 0.2858), (0.3022, 0.3386), (0.3396, 0.4196), (0.4204, 0.48), (0.502, 0.5968)]),
+    ],
+)
+def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
+    name: str, expected: list[tuple[float, float]]
+) -> None:
+    history = record(name)
+    found = quiet_times(history, InnerMotion(history))
+    assert spans(found)[: len(expected)] == pytest.approx(np.array(expected), abs=5e-4)
+    assert all(one.seen - one.start >= one.wait and one.left <= 1e-4 for one in found)
+    assert all(one.gravity == pytest.approx(9.81, rel=5e-3) for one in found)
+
+
+@pytest.mark.parametrize("name", [CAR, BOX])
+def test_a_wait_below_half_of_a_known_period_is_refused(name: str) -> None:
+    history = record(name)
+    with pytest.raises(RangeError, match=r"`wait` 0\.002 is below"):
+        quiet_times(history, InnerMotion(history, 0.002))
+
+
+def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
+    history = until(record(CAR), 0.14)
+    last = quiet_times(history, InnerMotion(history, 0.022))[-1]
+    assert last.start == pytest.approx(0.0383, abs=5e-4)
+    assert last.wait == 0.022
+
+
+@pytest.mark.parametrize("name", [CAR, BOX])
+def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
+    history = record(name)
+    found = quiet_times(history, InnerMotion(history))
+    for time in history.time[[300, 560, 640, 900]].tolist():
+        early = until(history, time)
+        seen = quiet_times(early, InnerMotion(early))
+        assert [one[:2] for one in seen] == [one[:2] for one in found if one.seen <= time]
+
+
+def test_a_rigid_leg_shows_its_contact_by_the_model_alone() -> None:
+    switched = record(*(f"drop2_w123_T0{leg}.gz" for leg in (1, 2, 3)))
+    assert contact_after(switched, 0.0) == pytest.approx(0.2858, abs=4e-4)
+    assert contact_after(record("car_all_T02.gz"), 0.05) is None
+
+
+def test_flights_are_seen_before_between_and_in_rigid_legs() -> None:
+    switched = record(*(f"drop2_w123_T0{leg}.gz" for leg in (1, 2, 3, 4)))
+    found = quiet_times(switched, InnerMotion(switched))
+    assert spans(found)[:2] == pytest.approx(np.array([(0.0, 0.2858), (0.3022, 0.3386)]), abs=1e-3)
+
+
+def test_the_highest_energy_is_that_of_a_state_in_the_span() -> None:
+    history = record(CAR)
+    tr = highest_energy(history, 0.0605, 0.0825)
+    assert 0.0605 <= tr <= 0.0825
+    assert history.energy_at(tr) == np.max(history.between(0.0605, 0.0825)[1])
