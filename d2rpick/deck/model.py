@@ -162,7 +162,8 @@ class Section:
     """Section of a part: formulations by kind of element, thickness of shells, area of beams, damping of springs.
 
     ``turns`` False: stresses of its solids do not turn with a rigid body.  ``damped`` is None where it is not known;
-    ``mass`` is that of one spring, ``layers`` are integration points through the thickness of shells.
+    ``mass`` is that of one spring, ``stiffness`` its own along its length where that is constant; ``layers`` are
+    integration points through the thickness of shells.
     """
 
     formulations: Mapping[str, Formulation] = field(default_factory=dict)
@@ -172,6 +173,7 @@ class Section:
     mass: float | None = None
     turns: bool = True
     layers: int | None = None
+    stiffness: float | None = None
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 # What was found: a mesh may have millions of nodes.
-_LABELS: WeakKeyDictionary[Inventory, dict[frozenset[int], Places]] = WeakKeyDictionary()
+_LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]] = WeakKeyDictionary()
 
 
 def pieces_of(inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None) -> int:
@@ -38,20 +38,24 @@ def pieces_of(inventory: Inventory, parts: Collection[int], among: Collection[in
     return np.unique(labels[np.concatenate(nodes)]).size
 
 
-def labels_of(inventory: Inventory, parts: frozenset[int]) -> Places:
+def labels_of(inventory: Inventory, parts: frozenset[int], *, springs: bool = True) -> Places:
     """Number of the piece of each node of the deck (nodes,): what parts, springs and joints make hang together."""
     known = _LABELS.setdefault(inventory, {})
-    if parts not in known:
-        known[parts] = _labels(inventory, parts)
-    return known[parts]
+    if (parts, springs) not in known:
+        known[parts, springs] = _labels(inventory, parts, springs=springs)
+    return known[parts, springs]
 
 
-def _labels(inventory: Inventory, parts: frozenset[int]) -> Places:
+def _labels(inventory: Inventory, parts: frozenset[int], *, springs: bool) -> Places:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     size = len(inventory.coordinates)
-    ends = [np.stack([np.repeat(one[:, 0], one.shape[1]), one.ravel()]) for one in _rows(inventory, parts) if one.size]
+    ends = [
+        np.stack([np.repeat(one[:, 0], one.shape[1]), one.ravel()])
+        for one in _rows(inventory, parts, springs=springs)
+        if one.size
+    ]
     links = np.concatenate([np.empty((2, 0), np.int64), *ends], axis=1)
     # older versions of scipy take no wider numbers
     links = links[:, (links != NO_NODE).all(axis=0)].astype(np.int32)
@@ -59,11 +63,16 @@ def _labels(inventory: Inventory, parts: frozenset[int]) -> Places:
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
-def _rows(inventory: Inventory, parts: frozenset[int]) -> Iterator[Places]:
+def _rows(inventory: Inventory, parts: frozenset[int], *, springs: bool) -> Iterator[Places]:
     """Nodes that hang together, a row each."""
     wanted, own = np.array([*parts], np.int64), inventory.nodes_by_part
     for elements in inventory.elements:
-        yield elements.nodes[np.isin(elements.part, wanted) | (elements.kind == SPRING)]
+        spring = elements.kind == SPRING
+        yield (
+            elements.nodes[np.isin(elements.part, wanted) | spring]
+            if springs or not spring
+            else np.empty((0, 0), np.int64)
+        )
     for _, nodes, named in inventory.joints:
         yield np.concatenate([nodes, *(own[part] for part in named & own.keys())])[np.newaxis]
 

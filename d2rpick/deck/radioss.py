@@ -166,7 +166,7 @@ def _properties(cards: Sequence[Card]) -> Iterator[tuple[int, _Property]]:
         elif type_ in _TRUSSES:
             found = _Property(type_, section=Section(area=_at(rows, 0, 0)))
         elif type_ in _SPRING:
-            found = _Property(type_, section=Section(damped=_at(rows, 1, _REAL) is not None, mass=_at(rows, 0, 0)))
+            found = _Property(type_, section=_of_springs(rows))
         yield number_of(card, 2), found
 
 
@@ -181,7 +181,15 @@ def _section(prop: _Property | None, kinds: set[str], *, turns: bool) -> Section
         if one:
             found[kind] = one
     own = prop.section
-    return Section(found, own.thickness, own.area, own.damped, own.mass, turns, own.layers)
+    return Section(found, own.thickness, own.area, own.damped, own.mass, turns, own.layers, own.stiffness)
+
+
+def _of_springs(rows: Sequence[str]) -> Section:
+    """Mass and stiffness of a spring, which a function of its length would replace."""
+    linear = len(rows) < 3 or not rows[2][:_WIDTH].strip(" 0")
+    return Section(
+        damped=_at(rows, 1, _REAL) is not None, mass=_at(rows, 0, 0), stiffness=_at(rows, 1, 0) if linear else None
+    )
 
 
 def _of_plain_shells(rows: Sequence[str]) -> Section:

@@ -1,0 +1,99 @@
+"""The longest inner period by masses and springs: what a closed form gives, and what is not known."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from d2rpick.deck import read_inventory
+from d2rpick.deck.inner_period import inner_period
+from tests.decks import wide
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+REAL = 20
+DENSITY, MODULUS = 1000.0, 1e9
+
+
+def cubes(
+    masses: tuple[float, ...], springs: list[tuple[int, int, float]], prop: str = "SPRING", more: str = ""
+) -> str:
+    """Write cubes of some masses in a row along x, 10 apart, and springs between corners: 10 is the first of cube 1."""
+    sides = [(mass / DENSITY) ** (1 / 3) for mass in masses]
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    text = "#RADIOSS STARTER\n/BEGIN\nbox\n" + wide(2022, 0) + 2 * wide("kg", "m", "s", width=REAL)
+    text += f"/MAT/ELAST/1\nm\n{wide(DENSITY, width=REAL)}{wide(MODULUS, 0.3, width=REAL)}/PROP/SOLID/1\ns\n{wide(24)}"
+    for number, side in enumerate(sides, start=1):
+        nodes = [(10 * number + i, *(side * one for one in corner)) for i, corner in enumerate(corners)]
+        text += "/NODE\n" + "".join(wide(n)[:-1] + wide(x + 10 * number, y, z, width=REAL) for n, x, y, z in nodes)
+        text += f"/PART/{number}\np\n{wide(1, 1)}/BRICK/{number}\n{wide(number, *(n for n, *_ in nodes))}"
+    for number, (one, other, stiffness) in enumerate(springs, start=50):
+        text += f"/PROP/{prop}/{number}\nk\n{wide(0.0, width=REAL)}{wide(stiffness, 10.0, width=REAL)}{more}"
+        text += f"/PART/{number}\nk\n{wide(number, 1)}/SPRING/{number}\n{wide(number, one, other)}"
+    return text + "/END\n"
+
+
+def period(folder: Path, deck: str) -> tuple[float, ...] | None:
+    name = folder / "box_0000.rad"
+    name.write_text(deck)
+    found = inner_period(read_inventory(str(name)))
+    return found and found[:2]
+
+
+@settings(max_examples=15)
+@given(
+    masses=st.lists(st.floats(1.0, 8.0), min_size=2, max_size=2),
+    stiffness=st.lists(st.floats(1e3, 1e6), min_size=1, max_size=3),
+)
+def test_two_masses_on_parallel_springs(
+    tmp_path_factory: pytest.TempPathFactory, masses: list[float], stiffness: list[float]
+) -> None:
+    """All act along x: both ends of the bracket are the closed form of two masses."""
+    one, other = masses
+    expected = 2 * math.pi * math.sqrt(one * other / (one + other) / sum(stiffness))
+    found = period(tmp_path_factory.mktemp("deck"), cubes((one, other), [(10, 20, k) for k in stiffness]))
+    assert found is not None
+    assert found == pytest.approx((expected, expected))
+
+
+def test_the_longest_of_several_counts_and_light_pieces_do_not(tmp_path: Path) -> None:
+    deck = cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 1.0)])
+    found = period(tmp_path, deck)
+    assert found
+    assert found[0] < 1  # [s]; the light one on its soft spring swings in 0.6 s and against half of all
+    softer = period(tmp_path, cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 0.1)]))
+    assert softer == pytest.approx(found, rel=1e-5)
+    heavier = period(tmp_path, cubes((5.0, 5.0, 1.0), [(10, 20, 1e6), (20, 30, 1.0)]))
+    assert heavier
+    assert heavier[0] > 1
+
+
+def test_springs_at_an_angle_make_a_bracket(tmp_path: Path) -> None:
+    """Two springs k at an angle: k (1 + cos) where they are stiffest, 2 k is what no direction has more of."""
+    side, stiffness = 2.0, 1e5
+    mass = DENSITY * side**3
+    found = period(tmp_path, cubes((mass, mass), [(10, 20, stiffness), (10, 23, stiffness)]))
+    angle = math.atan(side / 10)
+    both = (2 * math.pi * math.sqrt(mass / 2 / stiffness / share) for share in (1 + math.cos(angle), 2))
+    assert found == pytest.approx(tuple(both))
+
+
+@pytest.mark.parametrize(
+    "deck",
+    [
+        cubes((5.0, 5.0), []),
+        cubes((5.0, 5.0), [(10, 20, 0.0)]),
+        cubes((5.0, 5.0), [(10, 20, 1e5)], prop="SPR_GENE"),
+        cubes((5.0, 5.0), [(10, 20, 1e5)], more=wide(7)),
+        cubes((5.0, 5.0), [(10, 20, 1e5)]).replace("/END", "#include other.inc\n/END"),
+        cubes((5.0, 5.0), [(10, 20, 1e5)]).replace(f"{DENSITY:>20}", f"{0.0:>20}"),
+    ],
+    ids=["no springs", "no stiffness", "another kind", "by a function", "not whole", "no density"],
+)
+def test_what_the_deck_does_not_give_is_not_guessed(tmp_path: Path, deck: str) -> None:
+    assert period(tmp_path, deck) is None
