@@ -117,7 +117,7 @@ class Momenta:
 
     def of(self, members: Sequence[int]) -> Samples:
         """Sum over the parts with these indices, shape (n, 3), read-only."""
-        return self.known.once(("sum", *members), lambda: _frozen(self.values[:, list(members)].sum(axis=1)))
+        return self.known.once(("sum", *members), lambda: frozen(self.values[:, list(members)].sum(axis=1)))
 
     def noise(self, members: Sequence[int]) -> float:
         """What the printed digits of these parts leave open in their sum [momentum]."""
@@ -263,7 +263,7 @@ class History:
     known: Memory = field(default_factory=Memory, init=False)
 
     def __post_init__(self) -> None:
-        time, energy = _frozen(self.time), _frozen(self.energy)
+        time, energy = frozen(self.time), frozen(self.energy)
         where = ", ".join(self.source)
         if time.ndim != 1 or time.shape != energy.shape:
             raise HistoryError(
@@ -279,7 +279,7 @@ class History:
             state = int(np.argmax(np.diff(time) <= 0)) + 1
             raise HistoryError(f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}")
         if self.part_energies is not None:
-            terms = _frozen(self.part_energies)
+            terms = frozen(self.part_energies)
             if terms.shape != (time.size, len(self.part_names)):
                 raise HistoryError(
                     f"{where}: the energies of {len(self.part_names)} parts have shape {terms.shape}, "
@@ -377,7 +377,7 @@ class History:
         return self.time[inside], self.energy[inside]
 
 
-def _frozen(values: ArrayLike) -> Samples:
+def frozen(values: ArrayLike) -> Samples:
     """Copy what could change, or holds more in memory than itself."""
     if isinstance(values, np.ndarray) and values.dtype == np.float64 and not values.flags.writeable:
         whole = values if values.base is None else values.base

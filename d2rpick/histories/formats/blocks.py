@@ -176,7 +176,7 @@ def _differing(rows: Bytes, example: Bytes) -> Bytes:
     return np.asarray(np.bitwise_or.reduce(differing, axis=0))
 
 
-BATCH: Final = 1 << 15  # numbers converted at a time: they stay in the cache
+BATCH: Final = 1 << 14  # numbers converted at a time: they stay in the cache
 
 
 class Ahead:
@@ -207,7 +207,8 @@ class Ahead:
         fields, moving = np.concatenate(self._waiting), self._moving
         values = np.empty(fields.shape)
         values[:, ~moving] = decode(fields[0, ~moving], self._decimals)
-        values[:, moving] = decode(fields[:, moving].ravel(), self._decimals).reshape(len(fields), -1)
+        chosen = slice(None) if moving.all() else moving  # without copies, as mostly
+        values[:, chosen] = decode(fields[:, chosen].ravel(), self._decimals).reshape(len(fields), -1)
         self._done.append(values)
         self._waiting, self._moving = [], np.zeros_like(moving)
 

@@ -17,6 +17,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, overlong, release, written_head
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
+from d2rpick.histories.history import frozen
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Mapping, Sequence
@@ -28,7 +29,9 @@ if TYPE_CHECKING:
 
 _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
+_SPRINGS: Final = "spring and damper energy"  # a part of it, which is looked at wherever it is written
 _START: Final = b" time".ljust(32, b".")
+_NEAR: Final = 4096  # bytes that hold the first state
 _WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
 _LAST: Final = "time per zone cycle.(nanosec)"  # in every glstat seen; mass scaling may add lines behind it
@@ -68,7 +71,8 @@ class Glstat(Database):
     ) -> None:
         self.source = source
         self.title, self.version, begin = head(data)
-        self._blocks = Blocks(data, source, begin, _GRAMMAR, (_TIME, _ENERGY), portions)
+        springs = [_SPRINGS] if _SPRINGS.encode() in data[begin : begin + _NEAR] else []
+        self._blocks = Blocks(data, source, begin, _GRAMMAR, (_TIME, _ENERGY, *springs), portions)
         self.channels = self._names()
         names = [_TIME]
         with suppress(FormatError):  # that there is no such line is said when it is read
@@ -85,22 +89,25 @@ class Glstat(Database):
             self.notes += ("the file ends before the time of its next state",)
         if not self.version:
             self.notes += ("the file has no header; everything before its first time line was left out",)
-        self._columns = self._read(names)
+        self._even = True  # until a state lacks what another has
+        self._columns = self._read([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
 
     def channel(self, name: str) -> Samples:
         """Values of the line ``name``, shape (n,); FormatError unless every state has a number in one such line."""
-        if name not in self._columns:
-            self._columns[name] = self._blocks.numbers([name])[:, 0]
+        if name not in self._columns:  # who wants one more mostly wants the others
+            every = dict.fromkeys((*self.channels, name)) if self._even else [name]
+            self._columns |= self._read([one for one in every if one not in self._columns], [name])
         return self._columns[name]
 
-    def _read(self, names: list[str]) -> dict[str, Samples]:
-        """Columns read in one pass; where one cannot be, the time alone, and why is said when it is asked for."""
+    def _read(self, names: list[str], least: list[str]) -> dict[str, Samples]:
+        """Columns in one pass; where a state lacks one, the least alone, and why is said when it is asked for."""
         try:
             columns = self._blocks.numbers(names)
         except FormatError:
-            names, columns = [_TIME], self._blocks.numbers([_TIME])
-        return dict(zip(names, columns.T, strict=True))
+            self._even, names = False, least
+            columns = self._blocks.numbers(least)
+        return dict(zip(names, map(frozen, columns.T), strict=True))
 
     def _names(self) -> tuple[str, ...]:
         layouts = {(run.example, run.stride) for run in self._blocks}

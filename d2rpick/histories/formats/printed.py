@@ -163,7 +163,8 @@ def _median(steps: Samples) -> float:
 
 _NUMBER: Final = re.compile(rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?")
 _EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly
-_POWERS: Final = np.array([float(f"1e{exponent}") for exponent in range(_EXACT + 1)])
+_FACTORS: Final = np.array([float(f"{sign}1e{max(power, 0)}") for sign in "+-" for power in range(-_EXACT, _EXACT + 1)])
+_DIVISORS: Final = _FACTORS[2 * _EXACT :: -1].copy()  # one of both is 1
 
 
 def number(text: bytes) -> float:
@@ -212,28 +213,22 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     width = fields.dtype.itemsize
     column = np.ascontiguousarray(np.ascontiguousarray(fields).view(np.uint8).reshape(-1, width).T)
     point, mark = width - 5 - decimals, width - 4
-    mantissa_columns = [point - 1, *range(point + 1, mark)]
     digit = column - np.uint8(ord("0"))  # wraps around for what is below "0", so one comparison is enough
     negative, shrinks = column[point - 2] == ord("-"), column[mark + 1] == ord("-")
-    usual = np.max(digit[[*mantissa_columns, mark + 2, mark + 3]], axis=0) <= 9
+    usual = np.max(digit[[point - 1, *range(point + 1, mark), mark + 2, mark + 3]], axis=0) <= 9
     usual &= (column[point] == ord(".")) & (column[mark] == ord("E"))
     usual &= negative | (column[point - 2] == ord(" "))
     usual &= shrinks | (column[mark + 1] == ord("+"))
     usual &= np.all(column[: point - 2] == ord(" "), axis=0)
 
-    whole = np.zeros(fields.size, np.int64)
-    for place in mantissa_columns:
-        whole *= 10
-        whole += digit[place]
-    mantissa = whole.astype(np.float64)
-    exponent = digit[mark + 2].astype(np.int16) * 10 + digit[mark + 3]
-    exponent = np.where(shrinks, -exponent, exponent) - decimals
-    values: Samples = np.where(
-        exponent < 0,
-        mantissa / _POWERS[np.clip(-exponent, 0, _EXACT)],
-        mantissa * _POWERS[np.clip(exponent, 0, _EXACT)],
-    )
-    np.negative(values, out=values, where=negative)
+    values: Samples = digit[point - 1].astype(np.float64)
+    for place in range(point + 1, mark):
+        values *= 10
+        values += digit[place]
+    exponent = (digit[mark + 2].astype(np.int64) * 10 + digit[mark + 3]) * (1 - 2 * shrinks) - decimals
+    power = np.clip(exponent, -_EXACT, _EXACT) + (_EXACT + negative * _DIVISORS.size)
+    values *= _FACTORS.take(power)
+    values /= _DIVISORS.take(power, mode="wrap")
 
     far = usual & (np.abs(exponent) > _EXACT)
     values[far] = [float(text) for text in fields[far].tolist()]

@@ -87,7 +87,23 @@ def test_what_is_taken_ahead_is_not_fetched() -> None:
     data = Noted(glstat_text(states, states**2))
     run = Glstat(data, "glstat", ["internal energy"])
     assert run.channel("internal energy").tolist() == (states**2).tolist()
-    assert data.taken == 2  # of the last state, behind which no other one begins
+    assert data.taken == 3  # with that of the springs, of the last state, behind which no other one begins
+
+
+def test_all_other_columns_are_read_in_one_pass_and_a_damaged_one_is_refused_alone() -> None:
+    states = np.arange(200.0)
+    text = glstat_text(states, states)
+    sound, damaged = Noted(text), text.replace(b"work..................   7.0", b"work..................   *.0", 1)
+    run = Glstat(sound, "glstat", ["internal energy"])
+    run.channel("external work")
+    once = sound.taken
+    found = {name: run.channel(name).tolist() for name in run.channels}
+    assert sound.taken == once
+    hurt = Glstat(damaged, "glstat", ["internal energy"])
+    with pytest.raises(FormatError, match=r"'external work' is '\*\.00000E\+00', a number"):
+        hurt.channel("external work")
+    others = [name for name in hurt.channels if name != "external work"]
+    assert {name: hurt.channel(name).tolist() for name in others} == {name: found[name] for name in others}
 
 
 def test_damage_to_a_number_taken_ahead_is_named_with_its_line() -> None:
