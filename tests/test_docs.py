@@ -130,7 +130,11 @@ def test_every_command_has_help_and_is_documented_with_its_options(command: str)
     assert f"| `d2rpick {command} " in README
     shown = run(command, "--help").stdout
     assert re.search(r"Examples:\n +d2rpick", shown)
-    options = set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", shown.split("Options:")[1].split("Examples:")[0]))
+    options = set(
+        re.findall(
+            r"(?<![\w-])--[a-z][a-z0-9-]+", re.split(r"\n[A-Z][a-z ]+:\n", shown, maxsplit=1)[1].split("Examples:")[0]
+        )
+    )
     common = {"--help", "--input-format", "--output-format", "--output-file"}  # by their short names
     assert not {option for option in options - common if option not in ALL}
 
@@ -173,8 +177,16 @@ def test_the_jobs_in_the_documentation_run(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_the_configuration_in_the_documentation_is_one() -> None:
-    (block,) = blocks(ALL, "toml")
-    read_configuration(tomllib.loads(block)).verify(RULES)
+    (rules,) = blocks(text_of("docs/decks.md"), "toml")
+    read_configuration(tomllib.loads(rules)).verify(RULES)
+
+
+def test_the_settings_in_the_documentation_are_taken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (settings,) = blocks(text_of("docs/scripts.md"), "toml")
+    (tmp_path / "d2rpick.toml").write_text(settings)
+    monkeypatch.chdir(tmp_path)
+    shown = run("suggest", "--deck", "x.k", "x.csv", "--show-settings").stdout
+    assert shown.count(f"# settings, {tmp_path / 'd2rpick.toml'}") == len(tomllib.loads(settings)) - 1
 
 
 def test_the_pre_commit_hook_is_the_one_of_the_documentation() -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.api.request import POSITIVE, TIME, UNLIMITED, dashed, option, options_of
+from d2rpick.api.request import OPTIONS, POSITIVE, TIME, UNLIMITED, dashed, option, options_of
 from d2rpick.base.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -90,6 +90,10 @@ class Cards:
         request = CardRequest(self.solver, self.printing(numbers("--part", asked.on_card)))
         self.check_solver(request.of(asked.reference.history)[0])
         return request
+
+
+# Keys of the settings that are for all commands; further ones are for the rules of check, or for one command.
+SETTINGS: Final = (*map(dashed, (*OPTIONS, *options_of(Cards))), "fail-on")
 
 
 def needed(solver: Module) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, frame_of
 from d2rpick.api.asked import request_of
+from d2rpick.api.cards import SETTINGS
 from d2rpick.report.tables import positional
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ def check(
     for name in names:
         if judge:
             judge.beside(name)
-        checked.append(check_deck(name, configuration_for(name, asked), judge))
+        checked.append(check_deck(name, configuration_for(name, asked, SETTINGS), judge))
     files = [text for name in (history.sources if history else ()) for text in ("--history", name)]
     rules = [text for name in ("select", "ignore") for one in getattr(asked, name) for text in (f"--{name}", one)]
     judging = request.asking() if history else ()

@@ -220,7 +220,7 @@ class Request:
     def asking(self, names: Collection[str] | None = None) -> tuple[str, ...]:
         """Give the options that were given, or those of ``names``, as they are typed behind a td."""
         chosen = self._given() if names is None else [name for name in self._given() if name in names]
-        return tuple(text for name in chosen for text in _typed(name, getattr(self, name)))
+        return tuple(text for name in chosen for text in typed(name, getattr(self, name), many=OPTIONS[name].many))
 
     def judging(self) -> tuple[str, ...]:
         """Give the options of ``card`` and ``check`` that judge by the same history."""
@@ -239,18 +239,18 @@ class Request:
                 yield one.name
 
 
-def _typed(name: str, value: Any) -> Iterator[str]:
-    """Write an option with its value as it is typed."""
+def typed(name: str, value: Any, *, many: bool) -> Iterator[str]:
+    """Write an option with its value, or ``many``, as it is typed."""
     if isinstance(value, bool):
         yield from (f"--{dashed(name)}",) * value
         return
-    for one in value if OPTIONS[name].many else [value]:
+    for one in value if many else [value]:
         words = one if isinstance(one, tuple) else (one,)
         yield from (f"--{dashed(name)}", *(word if isinstance(word, str) else _word(word) for word in words))
 
 
 def _word(value: Any) -> str:
-    return repr(value) if isinstance(value, float) else _IN_MEMORY
+    return repr(value) if isinstance(value, int | float) else _IN_MEMORY
 
 
 def channels_of(given: Collection[str]) -> tuple[tuple[str, str], ...]:

@@ -18,9 +18,9 @@ from d2rpick.base.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# Each command in a line, for the help, which does without the modules behind them: those of a run, of many runs, of
-# decks, and the models.
-COMMANDS: Final = {
+# Each command in a line, for the help, which does without the modules behind them: those of a run, of many runs and of
+# decks; and what computes runs of its own.
+_WORK: Final = {
     "info": "Show what is in the files of a run.",
     "plan": "Plan the rigid windows of all flights of a run.",
     "suggest": "Choose tr for a td, or both times.",
@@ -33,10 +33,13 @@ COMMANDS: Final = {
     "check": "Check the switches of decks, also against a run.",
     "rule": "Explain a rule of check, or list all.",
     "calibrate": "Fit the cost of elements to runs of a site.",
+}
+_EXPERIMENTS: Final = {
     "replay": "Compute the floating oscillator in closed form.",
     "rollover": "Compute a box that trips or falls, flies and lands.",
     "reproduce": "Reproduce the published results.",
 }
+COMMANDS: Final = _WORK | _EXPERIMENTS
 # Modules of those that stand in one of another name.
 _MODULES: Final = {
     **dict.fromkeys(("suggest", "explore", "verify", "parts"), "one_run"),
@@ -68,8 +71,9 @@ class _Group(click.Group):
         return list(COMMANDS)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+        for title, commands in (("Commands", _WORK), ("Experiments", _EXPERIMENTS)):
+            with formatter.section(title):
+                formatter.write_dl(list(commands.items()))
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:

@@ -8,8 +8,9 @@ import click
 
 from d2rpick.base.errors import ArgumentError
 from d2rpick.cli import options
-from d2rpick.cli.options import CARDS, FILES, REFERENCE
+from d2rpick.cli.options import FILES, REFERENCE
 from d2rpick.cli.output import text_bytes
+from d2rpick.cli.settings import CARDS
 from d2rpick.cli.values import click_type
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from d2rpick.api.cards import SETTINGS
 from d2rpick.base.errors import INTERNAL_ERROR, ConfigurationError, D2RPickError, DeckError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
@@ -105,7 +106,7 @@ def _checked(
     named, failed = _main_decks(decks)
     for name in _apart(named):
         try:
-            configuration = configuration_for(name, asked)
+            configuration = configuration_for(name, asked, SETTINGS)
             inputs.append(configuration.source)
             content = sys.stdin.buffer.read() if name == STDIN else None
             if judge and content is None:

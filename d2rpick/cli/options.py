@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Final
 
@@ -10,9 +11,10 @@ import click
 from click.core import ParameterSource
 
 from d2rpick.api.cards import Cards
-from d2rpick.api.request import CHOOSING, JUDGING, READING, TIME, Option, Request, dashed, options_of
+from d2rpick.api.request import CHOOSING, JUDGING, OSCILLATOR, READING, TIME, Option, Request, dashed, options_of
 from d2rpick.base.errors import ArgumentError
-from d2rpick.cli.output import Output, text_bytes, with_options
+from d2rpick.cli.output import Output, tell, text_bytes, with_options
+from d2rpick.cli.settings import CARDS, settings_of, spelled, words_of
 from d2rpick.cli.values import click_type
 
 if TYPE_CHECKING:
@@ -26,7 +28,6 @@ Decorated = Any  # a command function; click's decorators do not say more
 # What commands take of the tables, and under which name they get it.
 TABLES: Final[dict[str, Any]] = {"request": Request, "cards": Cards, "output": Output}
 _OPTIONS: Final = {name: (table, one) for table, of in TABLES.items() for name, one in options_of(of).items()}
-CARDS: Final = tuple(options_of(Cards))
 FILES: Final = ("output_file", "overwrite", "quiet")
 RESULT: Final = ("output_format", "exit_zero", *FILES)
 HISTORY: Final = "HISTORY"  # stands for the argument, not the option of that name
@@ -38,18 +39,57 @@ DECK: Final = (
     "and which of them become one rigid body"
 )
 DECK_OF_PARTS: Final = f"{DECK}; `--part recommended` stands for the set that d2rpick parts recommends."
+# Sections of the help, behind the options of a command that are in none.
+GROUPS: Final[dict[str, tuple[str, ...]]] = {
+    "Times": (
+        *("tr", "td", "td_window", "steps", "min_rigid", "after", "margin", "tolerance"),
+        *("max_kinetic_share", "max_residual", "strict"),
+    ),
+    "What to read": ("history", "switched", "from", *READING, "done", "before"),
+    "Deck and cost": ("deck", "weights", "write_deck"),
+    "Cards": CARDS,
+    "Output": ("all", "limit", "plot", "report", "min_quality", *RESULT, "verbose", "show_settings", "debug", "help"),
+    "Advanced": (*OSCILLATOR, "fit_window", "no_verify", "cost_share", "step_ratio"),
+}
 # Options that write files, which the same command would find the next time.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
-_SOURCES: Final = {ParameterSource.COMMANDLINE: "command line", ParameterSource.ENVIRONMENT: "environment"}
+_SOURCES: Final = {
+    ParameterSource.COMMANDLINE: "command line",
+    ParameterSource.ENVIRONMENT: "environment",
+    ParameterSource.DEFAULT_MAP: "settings",
+}
 
 
 class Command(click.Command):
     """A command that can show its settings instead of running, and names options where arguments make no sense."""
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the command line; what neither it nor the environment gives, the settings may."""
+        if not ctx.resilient_parsing:
+            without = click.Context(self, ctx.parent, ctx.info_name, resilient_parsing=True)
+            super().parse_args(without, list(args))
+            ctx.default_map, ctx.meta["d2rpick.settings"] = settings_of(ctx, without)
+        rest = super().parse_args(ctx, args)
+        if words := words_of(ctx):
+            ctx.meta["d2rpick.command"] = inserted(ctx.meta["d2rpick.command"], words)
+        return rest
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options in groups, each where it is looked for."""
+        shown = (one for one in self.get_params(ctx) if isinstance(one, click.Option))
+        records = {spelled(one).replace("-", "_"): one.get_help_record(ctx) for one in shown}
+        grouped = {name for names in GROUPS.values() for name in names}
+        for title, names in {"Options": [one for one in records if one not in grouped], **GROUPS}.items():
+            if rows := [record for name in names if (record := records.get(name))]:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; UsageError for what makes no sense together."""
         if ctx.meta.get("d2rpick.show-settings"):
             return click.echo(text_bytes("\n".join(_settings(ctx))))
+        if (words := words_of(ctx)) and not ctx.params.get("quiet"):
+            tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
         try:
             return super().invoke(ctx)
         except ArgumentError as error:
@@ -226,10 +266,22 @@ def repeat() -> list[str]:
     context = click.get_current_context()
     names = [_variable(context, name) for name in context.params if _source(context, name) == "environment"]
     variables = [f"{name}={os.environ[name]}" for name in names]
-    words = list(context.meta["d2rpick.command"])
+    words = context.meta["d2rpick.command"]
     if not context.params["overwrite"] and any(context.params.get(name) for name in _WRITTEN):
-        words.insert(words.index("--") if "--" in words else len(words), "--overwrite")
+        words = inserted(words, ["--overwrite"])
     return [*(["env", *variables] if variables else []), "d2rpick", *words]
+
+
+def inserted(command: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
+    """Add options to a command line, before the names that are behind ``--``.
+
+    Examples
+    --------
+    >>> inserted(["info", "--", "-x.csv"], ["--quiet"])
+    ('info', '--quiet', '--', '-x.csv')
+    """
+    place = command.index("--") if "--" in command else len(command)
+    return (*command[:place], *words, *command[place:])
 
 
 def _settings(ctx: click.Context) -> Iterator[str]:
@@ -239,9 +291,9 @@ def _settings(ctx: click.Context) -> Iterator[str]:
     for one in ctx.command.get_params(ctx):
         if one.expose_value and one.name:
             value, source = ctx.params[one.name], _source(ctx, one.name)
-            named = f", {_variable(ctx, one.name)}" * (source == "environment")
-            spelled = max(one.opts, key=len).lstrip("-")
-            yield f"{spelled} = {'none' if value in (None, ()) else as_line(value)}  # {source}{named}"
+            named = {"environment": f", {_variable(ctx, one.name)}", "settings": f", {ctx.meta['d2rpick.settings']}"}
+            name = spelled(one) if isinstance(one, click.Option) else one.name
+            yield f"{name} = {'none' if value in (None, ()) else as_line(value)}  # {source}{named.get(source, '')}"
 
 
 def _source(ctx: click.Context, name: str) -> str:

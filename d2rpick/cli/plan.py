@@ -10,8 +10,9 @@ import click
 from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING
 from d2rpick.base.errors import ArgumentError, DeckError, printable
 from d2rpick.cli import options
-from d2rpick.cli.options import CARDS, DECK_OF_PARTS, HISTORY, RESULT
+from d2rpick.cli.options import DECK_OF_PARTS, HISTORY, RESULT
 from d2rpick.cli.output import opened
+from d2rpick.cli.settings import CARDS
 from d2rpick.cli.values import click_type
 from d2rpick.report.formats import FORMATS
 
@@ -145,6 +146,7 @@ def _write_and_check(card: PrintedCard, plan: Plan, folder: str, output: Output)
     passed : bool
         Whether no finding is an error.
     """
+    from d2rpick.api.cards import SETTINGS
     from d2rpick.deck.writing import write_deck
     from d2rpick.report.findings import Checks, as_table
     from d2rpick.rules import Configuration, Severity, check_deck, configuration_for
@@ -154,7 +156,7 @@ def _write_and_check(card: PrintedCard, plan: Plan, folder: str, output: Output)
     written = write_deck(request.deck or "", card, folder, overwrite=output.overwrite)
     done = card.windows[: len(plan.done)]  # as printed
     judge = HistoryJudge(plan.question.reference.run, request.selection(parts=False), plan.settings, done)
-    checked = check_deck(written[0], configuration_for(written[0], Configuration()), judge)
+    checked = check_deck(written[0], configuration_for(written[0], Configuration(), SETTINGS), judge)
     listed = [f"written  {printable(name)}" for name in written]
     text = "\n".join([*listed, "", as_table(Checks([checked]))])
     return text, all(one.severity is not Severity.ERROR for one in checked.findings)

@@ -6,13 +6,13 @@ They are configured by ``d2rpick.toml`` or ``[tool.d2rpick]`` of pyproject.toml;
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import ConfigurationError
+from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
 from d2rpick.deck import radioss_run, read_deck
 from d2rpick.rules import reading, runs, sets, switched_parts, times
 from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, RunCase, Severity, Unreadable
@@ -35,14 +35,11 @@ __all__ = [
     "Unreadable",
     "check_deck",
     "configuration_for",
-    "find_configuration",
     "find_rules",
     "read_configuration",
 ]
 
-_OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
 _SEVERITIES: Final = ("error", "warning", "info")
-_KEYS: Final = ("select", "ignore", "severity")
 _MODULES = (reading, sets, times, switched_parts, runs)
 _ALL = (one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule))
 RULES: Final[Mapping[str, Rule]] = {rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)}
@@ -101,28 +98,13 @@ def _expected_instead(name: str, known: Collection[str]) -> str:
     return "an id like D2R101 or its beginning was expected" + (f"; did you mean {near[0]}?" if near else "")
 
 
-def find_configuration(folder: Path) -> Configuration:
-    """Look for a configuration in ``folder`` and above; in a folder, d2rpick.toml counts before pyproject.toml."""
-    for place in (folder.absolute(), *folder.absolute().parents):
-        own, shared = place / _OWN, place / _SHARED
-        if own.is_file():
-            return read_configuration(_load(own), str(own))
-        if shared.is_file():
-            tools = _load(shared).get("tool")
-            if isinstance(tools, Mapping) and "d2rpick" in tools:
-                return read_configuration(tools["d2rpick"], str(shared))
-    return Configuration()
+def read_configuration(table: Mapping[str, object], source: str = "", others: Collection[str] = ()) -> Configuration:
+    """Configuration from a table of settings; ConfigurationError names what is wrong with it.
 
-
-def read_configuration(table: object, source: str = "") -> Configuration:
-    """Configuration from a table as TOML gives it; ConfigurationError names what is wrong with it."""
-    if not isinstance(table, Mapping):
-        raise ConfigurationError(f"{source}: the configuration is {table!r}, a table was expected")
-    for key in table:
-        if key not in _KEYS:
-            near = difflib.get_close_matches(key, _KEYS, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise ConfigurationError(f"{source}: unknown key {key!r}, one of {', '.join(_KEYS)} was expected{hint}")
+    ``others`` are keys that are about something else; tables, one for each command, are too.
+    """
+    single = [key for key, value in table.items() if key in RULE_KEYS or not isinstance(value, Mapping)]
+    refuse_unknown(single, (*RULE_KEYS, *others), source)
     severity = table.get("severity", {})
     if not isinstance(severity, Mapping):
         raise ConfigurationError(
@@ -143,15 +125,6 @@ def _names(table: Mapping[str, object], key: str, source: str) -> tuple[str, ...
     return tuple(value)
 
 
-def _load(path: Path) -> dict[str, object]:
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-        repr(table)  # as a message may show it: Python refuses to write numbers of thousands of digits, or to read them
-    except (ValueError, OSError, RecursionError) as error:
-        raise ConfigurationError(f"{path}: {error}; valid TOML was expected") from None
-    return table
-
-
 @dataclass(frozen=True)
 class Checked:
     """What was found in one deck; ``cards`` is the number of its switching cards, ``files`` all that were read.
@@ -167,15 +140,15 @@ class Checked:
     remarks: tuple[str, ...] = ()
 
 
-def configuration_for(deck: str, asked: Configuration) -> Configuration:
-    """Take the configuration nearest to a deck; what was asked for overrules its keys.
+def configuration_for(deck: str, asked: Configuration, others: Collection[str] = ()) -> Configuration:
+    """Take the configuration nearest to a deck; what was asked for overrules its keys, ``others`` are none of them.
 
     Raises
     ------
     ConfigurationError
         If it cannot be read, or names a rule that does not exist.
     """
-    found = find_configuration(Path(deck).parent)
+    found = read_configuration(*nearest_settings(Path(deck).parent), others)
     found.verify(RULES)
     return replace(found, select=asked.select or found.select, ignore=asked.ignore or found.ignore)
 

@@ -357,7 +357,11 @@ def test_every_help_ends_with_examples_that_run(command: str, tmp_path: Path, mo
 
 
 def test_the_help_names_each_command_in_a_line() -> None:
-    shown = run("--help").stdout.split("Commands:\n")[1].split("\n\n")[0].split("\n")
+    work, experiments = (
+        run("--help").stdout.split(f"{title}:\n")[1].split("\n\n")[0].split("\n")
+        for title in ("Commands", "Experiments")
+    )
+    shown = [*work, *experiments]
     assert shown == [f"  {name:9}  {line}" for name, line in COMMANDS.items()]
     assert max(map(len, shown)) <= 80
 
@@ -366,7 +370,10 @@ def test_the_help_names_each_command_in_a_line() -> None:
 def test_help_is_the_same_by_its_short_name_and_explains_every_option(command: str) -> None:
     text = run(command, "--help").stdout
     assert run(command, "-h").stdout == text
-    options, _ = text.split("Options:\n")[1].split("\n\n")
-    for entry in options.replace("\n      ", " ").split("\n"):
+    entries = [
+        line for line in text.split("Examples:")[0].replace("\n      ", " ").split("\n") if line.startswith("  -")
+    ]
+    assert entries
+    for entry in entries:
         name, *meaning = entry.split("  ", 3)[1:]
         assert any(part.strip() for part in meaning), f"{name} is not explained"

@@ -18,7 +18,7 @@ from d2rpick.rules import (
     Rule,
     Severity,
     check_deck,
-    find_configuration,
+    configuration_for,
     read_configuration,
 )
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
@@ -265,6 +265,10 @@ def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(tmp_pat
 # Configuration files.
 
 
+def configuration_in(folder: Path) -> Configuration:
+    return configuration_for(str(folder / "deck.k"), Configuration())
+
+
 OWN = 'select = ["D2R1"]\nignore = ["D2R104"]\n[severity]\nD2R101 = "warning"\n'
 
 
@@ -273,15 +277,15 @@ def test_the_nearest_file_wins(tmp_path: Path) -> None:
     inner.mkdir(parents=True)
     (tmp_path / "d2rpick.toml").write_text(OWN)
     (tmp_path / "a" / "pyproject.toml").write_text("[project]\nname = 'other'\n")
-    configuration = find_configuration(inner)
+    configuration = configuration_in(inner)
     assert configuration.select == ("D2R1",)
     assert configuration.ignore == ("D2R104",)
     assert configuration.severity == {"D2R101": "warning"}
     assert configuration.source == str(tmp_path / "d2rpick.toml")
     (tmp_path / "a" / "pyproject.toml").write_text("[tool.d2rpick]\nselect = ['D2R0']\n")
-    assert find_configuration(inner).select == ("D2R0",)
+    assert configuration_in(inner).select == ("D2R0",)
     (tmp_path / "a" / "d2rpick.toml").write_text("")
-    assert find_configuration(inner).select == ()
+    assert configuration_in(inner).select == ()
 
 
 @pytest.mark.parametrize(
@@ -305,14 +309,14 @@ def test_wrong_settings_say_what_is_wrong(tmp_path: Path, text: str, message: st
     name = "pyproject.toml" if "[tool]" in text else "d2rpick.toml"
     (tmp_path / name).write_bytes(text.encode("latin-1"))
     with pytest.raises(ConfigurationError, match=message) as caught:
-        find_configuration(tmp_path)
+        configuration_in(tmp_path)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("text", ["tool = 3", "[tool]\nother = 1", "[tool.other]\nx = 1"])
 def test_a_pyproject_without_a_table_for_us(tmp_path: Path, text: str) -> None:
     (tmp_path / "pyproject.toml").write_text(text)
-    assert find_configuration(tmp_path).source != str(tmp_path / "pyproject.toml")
+    assert configuration_in(tmp_path).source != str(tmp_path / "pyproject.toml")
     assert read_configuration({}) == Configuration()
 
 
