@@ -1,7 +1,10 @@
 """The file of settings nearest to a folder: ``d2rpick.toml``, or ``[tool.d2rpick]`` of pyproject.toml."""
+# ruff: noqa: PTH100, PTH113, PTH118, PTH120, PTH123
+# Every command looks for settings, and pathlib takes longer to import than that.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
@@ -9,13 +12,12 @@ from d2rpick.base.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
-    from pathlib import Path
 
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
 RULE_KEYS: Final = ("select", "ignore", "severity")  # of the deck check, which takes them from beside each deck
 
 
-def nearest_settings(folder: Path) -> tuple[Mapping[str, object], str]:
+def nearest_settings(folder: str) -> tuple[Mapping[str, object], str]:
     """Find the settings for a folder there or above; in a folder, d2rpick.toml counts before pyproject.toml.
 
     Returns
@@ -30,18 +32,16 @@ def nearest_settings(folder: Path) -> tuple[Mapping[str, object], str]:
     ConfigurationError
         If the file is no TOML, or holds no table of settings.
     """
-    for place in (folder.absolute(), *folder.absolute().parents):
-        own, shared = place / _OWN, place / _SHARED
-        found: object = None
-        if own.is_file():
-            found, source = _load(own), own
-        elif shared.is_file():
-            tools = _load(shared).get("tool")
-            found, source = tools.get("d2rpick") if isinstance(tools, Mapping) else None, shared
-        if isinstance(found, Mapping):
-            return found, str(source)
-        if found is not None:
-            raise ConfigurationError(f"{source}: the configuration is {found!r}, a table was expected")
+    place, above = "", os.path.abspath(folder)
+    while place != above:
+        place, above = above, os.path.dirname(above)
+        for name in (_OWN, _SHARED):
+            source = os.path.join(place, name)
+            found = _table(source, shared=name == _SHARED) if os.path.isfile(source) else None
+            if isinstance(found, Mapping):
+                return found, source
+            if found is not None:
+                raise ConfigurationError(f"{source}: the configuration is {found!r}, a table was expected")
     return {}, ""
 
 
@@ -56,16 +56,18 @@ def refuse_unknown(names: Iterable[str], known: Collection[str], source: str) ->
             raise ConfigurationError(f"{source}: unknown key {name!r}, one of {', '.join(known)} was expected{hint}")
 
 
-def _load(path: Path) -> dict[str, object]:
-    """Read TOML; a pyproject.toml that nowhere names d2rpick is not looked into."""
+def _table(path: str, *, shared: bool) -> object:
+    """Read the settings of a file of TOML; None where one that is ``shared`` with other tools has none."""
     try:
-        text = path.read_text(encoding="utf-8")
-        if path.name == _SHARED and "d2rpick" not in text:
-            return {}
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        if shared and not any(sign in text.translate({ord(" "): None}) for sign in ("tool.d2rpick", "[tool]")):
+            return None
         import tomllib
 
         table = tomllib.loads(text)
         repr(table)  # as a message may show it: Python refuses to write numbers of thousands of digits, or to read them
     except (ValueError, OSError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {error}; valid TOML was expected") from None
-    return table
+    tools = table.get("tool")
+    return table if not shared else tools.get("d2rpick") if isinstance(tools, Mapping) else None

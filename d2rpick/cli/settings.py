@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -40,7 +39,7 @@ def settings_of(ctx: click.Context, without: click.Context) -> tuple[dict[str, A
     ConfigurationError
         For a key that is no option, or a value that is none of it.
     """
-    table, source = nearest_settings(Path.cwd())
+    table, source = nearest_settings(os.curdir)
     own = {option: _value(ctx, option, value, place) for option, value, place in _given(ctx.command, table, source)}
     given = {name: one for name, one in without.params.items() if _source(without, name) is not ParameterSource.DEFAULT}
     asked = {**{option.name: value for option, value in own.items()}, **given}
@@ -75,6 +74,8 @@ def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> 
         raise ConfigurationError(f"{place}: {error.message}") from None
     if not isinstance(option.type, File):
         return found
+    from pathlib import Path  # mostly no file is among the settings
+
     folder = os.path.relpath(Path(place.partition(": ")[0]).parent)
     return [str(Path(folder, name)) for name in found] if several else str(Path(folder, found))
 

@@ -6,9 +6,9 @@ They are configured by ``d2rpick.toml`` or ``[tool.d2rpick]`` of pyproject.toml;
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import ConfigurationError
@@ -148,7 +148,7 @@ def configuration_for(deck: str, asked: Configuration, others: Collection[str] =
     ConfigurationError
         If it cannot be read, or names a rule that does not exist.
     """
-    found = read_configuration(*nearest_settings(Path(deck).parent), others)
+    found = read_configuration(*nearest_settings(os.path.dirname(deck)), others)  # noqa: PTH120  a name with a NUL byte has none
     found.verify(RULES)
     return replace(found, select=asked.select or found.select, ignore=asked.ignore or found.ignore)
 
