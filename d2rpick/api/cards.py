@@ -42,6 +42,7 @@ class Cards:
     end: float | None = option("Radioss: end of the run.  [default: end of the history]", TIME, "T")
     name: str | None = option("Radioss: name of the run.  [default: Root]", metavar="NAME")
     starter: str = ""  # cards that the starter deck lacks
+    sensor: int = 901  # first id of sensors that is free
 
     @property
     def given(self) -> list[str]:
@@ -55,7 +56,7 @@ class Cards:
         given = {name: getattr(self, name) for name in self.given}
         if self.node:
             given["node"] = tuple(numbers("--node", self.node))
-        return Printing(part=tuple(parts), starter=self.starter, **given)
+        return Printing(part=tuple(parts), starter=self.starter, sensor=self.sensor, **given)
 
     def check_solver(self, solver: str) -> None:
         """Refuse an option that says what the input of ``solver`` has no place for."""
@@ -81,7 +82,8 @@ class Cards:
         from d2rpick.deck.radioss_bodies import bodies_for
 
         found = bodies_for(deck, [part.id for part in parts])
-        return replace(self, node=tuple(map(str, found.nodes)), starter=found.cards), found.notes
+        nodes = tuple(map(str, found.nodes))
+        return replace(self, node=nodes, starter=found.cards, sensor=found.sensor), found.notes
 
     def request(self, asked: Asked) -> CardRequest:
         """Say how the card of a run is printed."""

@@ -59,6 +59,8 @@ class Printing:
         Name of the run.
     starter : str
         Cards that the starter deck of the run lacks.
+    sensor : int
+        First id of sensors, where these switch.
     """
 
     part: tuple[int, ...] = ()
@@ -71,6 +73,7 @@ class Printing:
     end: float | None = None
     name: str = "Root"
     starter: str = ""
+    sensor: int = 901
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class PrintedCard:
     """Solver input: ``text`` is all of it, ``files`` the same by the names that the solver expects.
 
     ``windows`` are the times as printed, ``notes`` say where they are not those asked for.  ``starter`` are cards that
-    go into the starter deck, before its ``/END``.
+    go into the starter deck, before its ``/END``, and ``sensors`` are those that switch bodies, by main node.
     """
 
     text: str
@@ -86,6 +89,7 @@ class PrintedCard:
     files: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     starter: str = ""
+    sensors: Mapping[int, int] = field(default_factory=dict)
 
 
 class Solver(NamedTuple):

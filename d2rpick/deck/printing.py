@@ -1,13 +1,14 @@
 """Switching windows as solver input: one function per solver, one table of solvers.
 
 LS-DYNA: a pair of *DEFORMABLE_TO_RIGID_AUTOMATIC cards for each window.  Radioss: engine files whose legs end at the
-switching times, with /RBODY/ON and /RBODY/OFF.
+switching times, with /RBODY/ON and /RBODY/OFF, or sensors of times that switch in one run.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -157,6 +158,7 @@ _OF_RADIOSS = (
     "An initial velocity must move the main node of a body too.",
     "Repeat your output keywords (/TFILE, /ANIM, ...) in every file.",
 )
+_OF_SENSORS = tuple(line for line in _OF_RADIOSS[1:-1] if not line.startswith(("The starter looks", "A body that")))
 
 
 class EngineFile(NamedTuple):
@@ -178,23 +180,61 @@ def _radioss(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
     DeckError
         If windows do not follow each other, an id does not fit, or the run does not end after the last window.
     """
+    windows, ids, end = _of_run(windows, printing)
+    files = {
+        f"{printing.name}_{leg.number:04d}.rad": "\n".join(_engine(leg, printing.name, ids, printing.off)) + "\n"
+        for leg in legs(windows, end, printing.step_cap)
+    }
+    return _told(windows, printing, (*_OF_RADIOSS, *remarks), files)
+
+
+def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+    """Print sensors of times that switch the bodies with these main nodes, and one engine file for the whole run.
+
+    The largest step holds for the whole run, so that it is the least of those that the windows ask for.
+
+    Raises
+    ------
+    DeckError
+        As `_radioss` does.
+    """
+    from d2rpick.deck.radioss_sensors import STOPS_SINCE, sensor_cards  # not above: other cards do without
+
+    windows, ids, end = _of_run(windows, printing)
+    sensors, last = sensor_cards(windows, printing.sensor)
+    cap = min(leg.cap for leg in legs(windows, end, printing.step_cap) if leg.cap is not None)
+    lines = (f"/RUN/{printing.name}/1", f"{end!r:>20}", *off(printing.off), *_capped(cap))
+    files = {f"{printing.name}_0001.rad": "\n".join(lines) + "\n"}
+    nodes = ", ".join(map(str, ids))
+    how = (
+        f"Each /RBODY with main node {nodes} takes sensor {last}: sens_ID, columns 11 to 20 below its title.",
+        f"/BEGIN needs version {STOPS_SINCE} or later, which knows when a sensor of time stops.",
+    )
+    told = _told(windows, printing, (*_OF_SENSORS, *how, *remarks), files, sensors)
+    return replace(told, sensors=dict.fromkeys(ids, last))
+
+
+def _of_run(windows: Sequence[Times], printing: Printing) -> tuple[tuple[Times, ...], list[int], float]:
+    """Return the windows, main nodes and end of a run; DeckError where they do not make one."""
     windows, ids = check_windows(windows), check_ids(printing.node)
-    name = printing.name
-    if not _RUN_NAME.fullmatch(name):
-        raise DeckError(f"the name of the run is {name!r}, letters, digits, '.', '_' and '-' were expected")
+    if not _RUN_NAME.fullmatch(printing.name):
+        raise DeckError(f"the name of the run is {printing.name!r}, letters, digits, '.', '_' and '-' were expected")
     if printing.end is None or not windows[-1][1] < printing.end < math.inf:
         found = "the end of the run is not given" if printing.end is None else f"the run ends at {printing.end:g}"
         raise DeckError(f"{found}, a time after td = {windows[-1][1]:g} was expected")
-    files = {
-        f"{name}_{leg.number:04d}.rad": "\n".join(_engine(leg, name, ids, printing.off)) + "\n"
-        for leg in legs(windows, printing.end, printing.step_cap)
-    }
+    return windows, ids, printing.end
+
+
+def _told(
+    windows: tuple[Times, ...], printing: Printing, remarks: Sequence[str], files: Mapping[str, str], more: str = ""
+) -> PrintedCard:
+    """Put comments, cards for the starter deck and engine files together."""
     spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
-    head = comments([f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *_OF_RADIOSS, *remarks])
-    text = "".join(f"# {line}\n" for line in head)
-    text += f"# ---- into {name}_0000.rad, before /END\n{printing.starter}" if printing.starter else ""
+    head = comments([f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *remarks])
+    text, starter = "".join(f"# {line}\n" for line in head), printing.starter + more
+    text += f"# ---- into {printing.name}_0000.rad, before /END\n{starter}" if starter else ""
     text += "".join(f"# ---- {file}\n{content}" for file, content in files.items())
-    return PrintedCard(text, windows, files, starter=printing.starter)
+    return PrintedCard(text, windows, files, starter=starter)
 
 
 def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[EngineFile]:
@@ -226,13 +266,17 @@ def _engine(leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int
         yield from ("/RBODY/ON", *listed(ids))
     yield from off(others if leg.cap is not None else (*ids, *others))
     if leg.cap is not None:
-        yield from ("# with nothing deformable left the step would grow without limit", "/DTIX")
-        yield f"{leg.cap!r} {leg.cap!r}"
+        yield from _capped(leg.cap)
+
+
+def _capped(cap: float) -> Iterator[str]:
+    yield from ("# with nothing deformable left the step would grow without limit", "/DTIX", f"{cap!r} {cap!r}")
 
 
 SOLVERS: Final[Mapping[str, Solver]] = {
     "ls-dyna": Solver("LS-DYNA", ("glstat", "matsum", "binout"), "part", ("merge", "swset", "step_cap"), _ls_dyna),
     "radioss": Solver("Radioss", ("radioss-th",), "node", ("step_cap", "end", "name"), _radioss),
+    "radioss-sensors": Solver("Radioss", (), "node", ("step_cap", "end", "name"), _radioss_sensors),
 }
 DEFAULT: Final = "ls-dyna"  # of histories that name no solver
 

@@ -41,12 +41,13 @@ class Bodies(NamedTuple):
     """Rigid bodies that switch some parts.
 
     ``nodes`` are the main nodes of all of them; ``cards`` is what the starter deck lacks, to stand before its /END,
-    empty where it has all; ``notes`` say what these cards add.
+    empty where it has all; ``notes`` say what these cards add.  ``sensor`` and all ids above it are free for sensors.
     """
 
     nodes: tuple[int, ...]
     cards: str = ""
     notes: tuple[str, ...] = ()
+    sensor: int = 1
 
 
 def bodies_for(path: str, parts: Collection[int]) -> Bodies:
@@ -88,7 +89,7 @@ def bodies_for(path: str, parts: Collection[int]) -> Bodies:
         f"/RBODY with main node {main} is new, for {name_units(group)}{_apart(inventory, group)}"
         for main, group in zip(mains, lacking, strict=True)
     )
-    return Bodies((*nodes, *mains), "".join(text for _, text in texts), notes)
+    return Bodies((*nodes, *mains), "".join(text for _, text in texts), notes, made.next("SENSOR"))
 
 
 def _apart(inventory: Inventory, parts: Sequence[int]) -> str:
@@ -160,21 +161,21 @@ class _Made:
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
         """Main node and cards of the body of some parts, with what moves and pulls its main node."""
-        node, group, alone = self._next("NODE"), self._next("GRNOD"), self._next("GRNOD")
+        node, group, alone = self.next("NODE"), self.next("GRNOD"), self.next("GRNOD")
         moving = "".join(self._moving(parts, alone))
         x, y, z = self._centre(parts)
         text = f"/NODE\n{node:10d}{x:20.12g}{y:20.12g}{z:20.12g}\n"
         rows = (parts[at : at + _PER_LINE] for at in range(0, len(parts), _PER_LINE))
         text += f"/GRNOD/PART/{group}\nparts to be switched\n"
         text += "".join("".join(f"{part:10d}" for part in row) + "\n" for row in rows)
-        text += f"/RBODY/{self._next('RBODY')}\nparts to be switched\n"
+        text += f"/RBODY/{self.next('RBODY')}\nparts to be switched\n"
         text += f"{node:10d}{0:10d}{0:10d}{0:10d}{0:20d}{group:10d}{_STAYS:10d}{0:10d}{0:10d}\n"
         text += 2 * (3 * f"{0:20d}" + "\n") + 3 * f"{0:10d}" + "\n"
         if moving:
             text += f"/GRNOD/NODE/{alone}\nmain node of parts to be switched\n{node:10d}\n{moving}"
         return node, text
 
-    def _next(self, kind: str) -> int:
+    def next(self, kind: str) -> int:
         """Give an id above all that cards of a kind have."""
         if kind not in self._free:
             words = (keyword(block) for block in self._starter.blocks)
@@ -223,6 +224,6 @@ class _Made:
         """Write a card with a new id and another group."""
         title, first, *rest = (row.text for row in card.rows)
         at = 1 + (card.words[0] == "INIVEL")
-        head = "/".join(["", *card.words[:at], str(self._next(card.words[0])), *card.words[at + 1 :]])
+        head = "/".join(["", *card.words[:at], str(self.next(card.words[0])), *card.words[at + 1 :]])
         before, after = first[: 10 * column].ljust(10 * column), first[10 * (column + 1) :]
         return "\n".join([head, title, f"{before}{group:10d}{after}", *rest]) + "\n"

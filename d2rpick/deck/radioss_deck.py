@@ -1,7 +1,7 @@
 """Keyword blocks of Radioss files: engine files, with legs of a run and the rigid bodies they switch, and the starter.
 
 A block is a line that begins with ``/``, and the data lines below it.  Columns of the starter: Altair's public help for
-/RBODY, /PART, /GRNOD, /SUBSET and /SENSOR/TIME, and the solver's published source.
+/RBODY, /PART, /GRNOD and /SUBSET, and the solver's published source.
 """
 
 from __future__ import annotations
@@ -217,7 +217,7 @@ class PartLine(NamedTuple):
 class Starter:
     """What a starter deck says about its rigid bodies; ``sources`` are its files.
 
-    ``walls`` and ``velocities`` are its cards /RWALL and /INIVEL.
+    ``walls`` and ``velocities`` are its cards /RWALL and /INIVEL, ``sensors`` those /SENSOR by id.
     """
 
     name: str = ""
@@ -226,7 +226,7 @@ class Starter:
     parts: dict[int, PartLine] = field(default_factory=dict)
     subsets: dict[int, tuple[int, ...]] = field(default_factory=dict)
     groups: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
-    timed: dict[int, tuple[float, float]] = field(default_factory=dict)  # sensors: active from, to
+    sensors: dict[int, Card] = field(default_factory=dict)
     solids: dict[int, tuple[int, int]] = field(default_factory=dict)  # properties: Isolid, Iframe
     default_solid: tuple[int, int] | None = None
     bricks: set[int] = field(default_factory=set)  # parts of 8-node bricks
@@ -262,6 +262,8 @@ class Starter:
             self.walls.append(card)
         elif first == "INIVEL":
             self.velocities.append(card)
+        elif first == "SENSOR" and words:
+            self.sensors[id_] = card
         elif first == "DEF_SOLID":
             if card.rows and self.default_solid is None:  # the first one counts
                 self.default_solid = _isolid_and_iframe(card, card.rows[0])
@@ -289,9 +291,6 @@ class Starter:
         elif first == "PART":
             prop, subset = card.integer(rows[0], 0).value, card.integer(rows[0], 2).value
             self.parts[id_] = PartLine(card.rows[0].text.strip(), prop, subset)
-        elif first == "SENSOR" and words[:1] == ["TIME"]:
-            start, stop = reals(rows[0], 2)
-            self.timed[id_] = start, stop if stop > 0 else math.inf
 
     @property
     def unturned(self) -> dict[int, str]:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Value
 from d2rpick.deck.radioss_deck import Leg, Starter, blocks, card_of, keyword, read_legs
+from d2rpick.deck.radioss_sensors import active_spans, inactive
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows, follow
@@ -259,22 +260,18 @@ def _follow(unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg) -> l
 
 
 def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]]) -> Iterator[Window]:
-    """Windows of a body with a time sensor: it is rigid while the sensor is not active."""
-    if run.starter is None or body.sensor not in run.starter.timed:
-        return
-    start, stop = run.starter.timed[body.sensor]
-    if math.isnan(start):
+    """Windows of a body with a sensor of times: it is rigid while the sensor is not active."""
+    active = active_spans(run.starter, body.sensor) if run.starter else ""
+    if isinstance(active, str):
         return
     for unit in _units(body.node.value, parts):
-        opened, closed = (
-            Event(unit, LegSwitch(body.card, "plain", None, (), (), at=at), Switched(body.node, False, rigid))
-            for at, rigid in ((0.0, True), (start, False))
-        )
-        if start > 0:
-            yield Window(unit, 0.0, start, opened, closed)
-        if stop < math.inf:
-            again = Event(unit, LegSwitch(body.card, "plain", None, (), (), at=stop), Switched(body.node, False, True))
-            yield Window(unit, stop, None, again, None)
+        for span in inactive(active):
+            opened, closed = (
+                Event(unit, LegSwitch(body.card, "plain", None, (), (), at=at), Switched(body.node, False, rigid))
+                for at, rigid in zip(span, (True, False), strict=True)
+            )
+            ends = span[1] < math.inf
+            yield Window(unit, span[0], span[1] if ends else None, opened, closed if ends else None)
 
 
 def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:

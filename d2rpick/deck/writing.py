@@ -6,12 +6,13 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from d2rpick.base.errors import DeckError
+from d2rpick.base.errors import DeckError, name_units
 from d2rpick.base.files import write_whole
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.printing import listed, off
-from d2rpick.deck.radioss_deck import blocks, kept_off, keyword, read_legs
+from d2rpick.deck.radioss_deck import Starter, blocks, kept_off, keyword, read_legs
 from d2rpick.deck.radioss_run import read_run, run_files
+from d2rpick.deck.radioss_sensors import with_sensors
 from d2rpick.deck.reader import cure, cuts, read_deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import find_windows, read_switching
@@ -147,15 +148,34 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     (leg,) = run.legs
     _refuse_other_run(leg, printed)
     starter = run.starter.sources[0].name
-    yield Path(starter).name, with_cards(run.starter.sources[0], card.starter, blocks(run.starter.sources[0]))
+    _refuse_sensors(run.starter, card)
+    main_text = with_cards(run.starter.sources[0], card.starter, blocks(run.starter.sources[0]))
+    yield Path(starter).name, _sensed(starter, main_text, card)
     further = list(blocks(leg.run.block.source))
     for (name, text), mine in zip(card.files.items(), printed, strict=True):
         kept = (_text(block) for block in further if _repeated(keyword(block), mine))
-        named = {node.value for _, _, ids in mine.switched for node in ids}
+        named = {node.value for _, _, ids in mine.switched for node in ids} | card.sensors.keys()
         others = [node for node in kept_off(run.legs) if node not in named]  # else they would be rigid from time 0
         lines = listed(others) if mine.cap is None else off(others)  # its text ends with the bodies that it puts off
         yield name, (text + "".join(f"{line}\n" for line in lines)).encode() + b"".join(kept)
-    yield from _copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files})
+    for name, content in _copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files}):
+        yield name, _sensed(name, content, card)
+
+
+def _sensed(name: str, content: bytes, card: PrintedCard) -> bytes:
+    return with_sensors(SourceFile(name, content), card.sensors) if card.sensors else content
+
+
+def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
+    """Raise DeckError where sensors of a card have the ids of others, or there is no body for them."""
+    added = Starter()
+    for block in blocks(SourceFile("the card", card.starter.encode())):
+        added.take(block)
+    for number in sorted(added.sensors.keys() & starter.sensors.keys()):
+        raise DeckError(f"{starter.sensors[number].at}: the deck has sensor {number} of the cards already; rename it")
+    mains = {body.node.value for body in (*starter.bodies, *added.bodies)}
+    if unknown := sorted(card.sensors.keys() - mains):
+        raise DeckError(f"{name_units(unknown, 'main node')}: no /RBODY of the deck has it; name main nodes of bodies")
 
 
 def _refuse_other_run(leg: Leg, printed: Sequence[Leg]) -> None:

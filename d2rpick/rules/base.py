@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 from d2rpick.deck import Deck, Parts, SwitchSet, Window, Windows, find_windows, read_parts, read_switching
 from d2rpick.deck.parts import read_sections
 from d2rpick.deck.radioss_run import find_run_windows
+from d2rpick.deck.radioss_sensors import active_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -228,11 +229,12 @@ class RunCase(Case):
     def untimed(self) -> tuple[tuple[Field, str], ...]:
         """Bodies that a sensor switches whose time is not known."""
         starter = self.run.starter
-        bodies = starter.bodies if starter else []
+        bodies = [body for body in starter.bodies if body.sensor] if starter else []
+        found = [(body, active_spans(starter, body.sensor)) for body in bodies if starter]
         return tuple(
-            (body.node.field, f"rigid body {body.id} is switched by sensor {body.sensor}, which is not a time sensor")
-            for body in bodies
-            if starter and body.sensor and body.sensor not in starter.timed
+            (body.node.field, f"rigid body {body.id} is switched by {why}")
+            for body, why in found
+            if isinstance(why, str)
         )
 
     @cached_property
@@ -254,12 +256,12 @@ class RunCase(Case):
 
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[Window]]]:
-        """Index of every leg in which something is rigid, with the windows that hold it."""
+        """Index of every leg in which something becomes or stays rigid, with its windows."""
         found = []
         start = 0.0
         for index, leg in enumerate(self.run.legs):
             stop = leg.stop.value
-            held = [w for w in self.windows.windows if w.tr <= start and (w.td is None or w.td >= stop)]
+            held = [w for w in self.windows.windows if w.tr < stop and (w.td is None or w.td > start)]
             if held and stop > start:
                 found.append((index, held))
             start = stop

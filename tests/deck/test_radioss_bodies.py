@@ -11,7 +11,7 @@ from d2rpick.base.errors import DeckError
 from d2rpick.deck.mesh import nodes_of
 from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import cards
-from d2rpick.deck.radioss_bodies import bodies_for
+from d2rpick.deck.radioss_bodies import Bodies, bodies_for
 from d2rpick.deck.radioss_run import read_run, rigid_parts
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import check_deck
@@ -122,7 +122,7 @@ def test_gravity_that_acts_on_all_nodes_needs_nothing_more(tmp_path: Path) -> No
 
 def test_a_body_that_the_deck_has_is_taken(tmp_path: Path) -> None:
     main = deck(tmp_path, group(70, 1, 2, 4, kind="PART") + BODY, ENGINE + "/RBODY/OFF\n99\n")
-    assert bodies_for(main, (1, 2, 4)) == ((99,), "", ())
+    assert bodies_for(main, (1, 2, 4)) == Bodies((99,))
     found = bodies_for(main, ALL)
     assert found.nodes == (99, 100)
     assert "/RBODY/8\n" in found.cards

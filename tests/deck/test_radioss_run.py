@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.radioss_run import find_run_windows, read_run, recognises, run_files
+from d2rpick.deck.radioss_sensors import sensor_cards
 from d2rpick.rules import RULES, check_deck
 from tests.computed import stored
 from tests.decks import write
@@ -83,20 +84,80 @@ def test_windows_follow_the_legs(
     assert spans(place(tmp_path, legs=legs)) == [(1, "part", tr, td) for tr, td in expected]
 
 
+def clock(number: int, start: float, stop: float | None = None) -> str:
+    return f"/SENSOR/TIME/{number}\nclock\n{start:20}\n" + (f"{stop:20}\n" if stop is not None else "")
+
+
+def either(number: int, one: int, other: int, kind: str = "OR") -> str:
+    return f"/SENSOR/{kind}/{number}\nboth\n{0:20}\n{one:10}{other:10}\n"
+
+
+def neither(number: int, one: int) -> str:
+    return f"/SENSOR/NOT/{number}\nnot\n{0:20}\n{one:10}\n"
+
+
+def sensed(folder: Path, sensor: str, version: int = 2023, sensor_id: int = 5, cap: str = "/DTIX\n1e-5 1e-5\n") -> str:
+    """Write the run with one leg, in which a sensor switches the body."""
+    body = BODY.replace("         0", f"{sensor_id:10}", 1)
+    starter = EXAMPLE.deck.replace(BODY, body).replace("2022", str(version)).replace("/END", f"{sensor}/END")
+    return place(folder, starter, (("0.2", cap),))
+
+
 @pytest.mark.parametrize(
     ("sensor", "expected"),
     [
-        ("/SENSOR/TIME/5\nlate\n                0.05\n", [(0.0, 0.05)]),
-        ("/SENSOR/TIME/5\nonce\n                0.05                0.09\n", [(0.0, 0.05), (0.09, None)]),
-        ("/SENSOR/DIST/5\nnear\n         1         2\n", []),
+        (clock(5, 0.05), [(0.0, 0.05)]),
+        (clock(5, 0.05, 0.09), [(0.0, 0.05), (0.09, None)]),
+        (clock(1, 0, 0.02) + clock(2, 0.09) + either(5, 1, 2), [(0.02, 0.09)]),
+        (clock(1, 0.02, 0.09) + neither(5, 1), [(0.02, 0.09)]),
+        (clock(1, 0.02) + clock(2, 0, 0.09) + either(3, 1, 2, "AND") + neither(5, 3), [(0.02, 0.09)]),
+        (clock(1, 0, 0.02) + clock(2, 0.05, 0.07) + clock(3, 0.09) + either(4, 1, 2) + either(5, 3, 4),
+         [(0.02, 0.05), (0.07, 0.09)]),
     ],
-)
-def test_a_time_sensor_releases_a_body(tmp_path: Path, sensor: str, expected: list[tuple[float, float | None]]) -> None:
-    starter = EXAMPLE.deck.replace(BODY, BODY.replace("         0", "         5", 1)).replace("/END", f"{sensor}/END")
-    path = place(tmp_path, starter, (("0.2", ""),))
+)  # fmt: skip
+def test_a_body_is_rigid_while_its_sensor_is_not_active(
+    tmp_path: Path, sensor: str, expected: list[tuple[float, float | None]]
+) -> None:
+    path = sensed(tmp_path, sensor)
     assert spans(path) == [(1, "part", tr, td) for tr, td in expected]
     found = {finding.rule for finding in check_deck(path).findings}
-    assert found == ({"D2R104"} if len(expected) == 2 else set() if expected else {"D2R302"})
+    assert found == ({"D2R104"} if expected[-1][1] is None else set())
+
+
+def test_a_step_without_a_cap_is_told_of_sensors_too(tmp_path: Path) -> None:
+    (finding,) = check_deck(sensed(tmp_path, clock(1, 0, 0.02) + clock(2, 0.09) + either(5, 1, 2), cap="")).findings
+    assert finding.rule == "D2R404"
+
+
+def test_before_2023_a_sensor_of_time_never_stops(tmp_path: Path) -> None:
+    assert spans(sensed(tmp_path, clock(5, 0.05, 0.09), version=2022)) == [(1, "part", 0.0, 0.05)]
+
+
+@pytest.mark.parametrize(
+    ("sensor", "told"),
+    [
+        ("/SENSOR/DIST/5\nnear\n         1         2\n", "sensor 5, which is not a time sensor"),
+        ("", "sensor 5, which the deck has not"),
+        (neither(5, 5), "sensor 5, of sensor 5, which asks for itself"),
+        (clock(1, 0) + either(5, 1, 2), "sensor 5, of sensor 2, which the deck has not"),
+        (clock(1, 0) + neither(5, 1).replace(" 0\n", " 1\n", 1), "sensor 5, whose delay is not followed"),
+        ("/SENSOR/TIME/5\nlate\n soon\n", "sensor 5, whose time is no number"),
+    ],
+)
+def test_a_sensor_that_cannot_be_followed_is_told(tmp_path: Path, sensor: str, told: str) -> None:
+    (finding,) = check_deck(sensed(tmp_path, sensor)).findings
+    assert finding.rule == "D2R302"
+    assert told in finding.message
+
+
+@settings(max_examples=15)
+@given(cuts=st.lists(st.integers(0, 1000), min_size=2, max_size=8, unique=True).filter(lambda cuts: len(cuts) % 2 == 0))
+def test_printed_sensors_hold_their_windows(tmp_path_factory: pytest.TempPathFactory, cuts: list[int]) -> None:
+    times = sorted(one / 1000 for one in cuts)
+    windows = list(zip(times[::2], times[1::2], strict=True))
+    text, last = sensor_cards(windows, 5)
+    path = sensed(tmp_path_factory.mktemp("run"), text, sensor_id=last)
+    assert spans(path) == [(1, "part", tr, td) for tr, td in windows]
 
 
 SOLID = "/PROP/SOLID/1\nsolid\n" + "".join(f"{n:10d}" for n in (1, 0, 0, 0, 0, 0, 0, 0)) + "\n"

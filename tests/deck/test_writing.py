@@ -19,6 +19,7 @@ from tests.decks import write
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from d2rpick.deck.printed_card import PrintedCard
     from d2rpick.deck.radioss_deck import Leg
 
 WINDOWS = [(0.02, 0.09), (0.1, 0.15)]
@@ -190,6 +191,58 @@ def test_a_run_that_does_not_suit_is_refused(tmp_path: Path, engine: str, name: 
     card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name=name), "radioss")
     with pytest.raises(DeckError, match=message):
         write_deck(radioss_run(tmp_path / "ref", engine), card, str(tmp_path / "next"))
+
+
+def sensed(**more: object) -> PrintedCard:
+    printing = Printing(node=(1808,), end=0.4, name="box", **more)  # type: ignore[arg-type]
+    return cards(WINDOWS, printing, "radioss-sensors")
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_all_windows_fit_one_engine_run_by_sensors(tmp_path: Path, newline: str) -> None:
+    main = radioss_run(tmp_path / "ref", ENGINE.replace("1808\n", "1808 1809\n"))
+    Path(main).write_bytes(RUN.deck.replace("\n", newline).encode())
+    starter, engine = write_deck(main, sensed(), str(tmp_path / "next"))
+    assert [(one.part, one.tr, one.td) for one in check_deck(starter).windows] == [(1, tr, td) for tr, td in WINDOWS]
+    text = Path(engine).read_text()
+    assert "/RBODY/OFF\n1809\n" in text  # what the run keeps off; the one with a sensor has no leg
+    assert text.count("/DTIX\n5e-05 5e-05\n") == text.count("/DTIX") == 1  # of the shortest window
+    assert "/INIV" in text
+    deck = Path(starter).read_bytes().decode()
+    assert deck.count(newline) == deck.count("\n")
+    same = [one == other for one, other in zip(RUN.deck.splitlines(), deck.splitlines(), strict=False)]
+    changed = [line for line, kept in zip(deck.splitlines(), same, strict=False) if not kept]
+    assert changed[:2] == [
+        "      2023         0",
+        "      1808       905         0         0                   0         7",
+    ]
+    assert changed[2] == "/SENSOR/TIME/901"  # in place of /END
+
+
+@pytest.mark.parametrize(
+    ("deck", "message"),
+    [
+        (RUN.deck.replace("      1808         0", "      1808         4"), "sensor 4 switches this /RBODY already"),
+        (RUN.deck.replace("/END", "/SENSOR/TIME/903\nown\n 1.0\n/END"), "has sensor 903 of the cards already"),
+        (RUN.deck.replace("      1808 ", "      1807 "), "main node 1808: no /RBODY"),
+    ],
+)
+def test_sensors_that_the_deck_cannot_take_are_refused(tmp_path: Path, deck: str, message: str) -> None:
+    main = radioss_run(tmp_path / "ref")
+    Path(main).write_text(deck)
+    with pytest.raises(DeckError, match=message):
+        write_deck(main, sensed(), str(tmp_path / "next"))
+    assert not (tmp_path / "next").exists() or not list((tmp_path / "next").iterdir())
+
+
+def test_bodies_that_a_deck_lacks_get_their_sensor(tmp_path: Path) -> None:
+    head, _, behind = RUN.deck.partition("/RBODY/1\n")
+    _, _, rest = behind.partition("7\n")
+    main = radioss_run(tmp_path / "ref", ENGINE.replace("/RBODY/OFF\n1808\n", ""))
+    Path(main).write_text(head + rest)
+    body = "/RBODY/1\nbox\n      1808         0         0         0                   0         7\n"
+    starter, _ = write_deck(main, sensed(starter=body, sensor=4), str(tmp_path / "next"))
+    assert windows(starter) == [(1, tr, td) for tr, td in WINDOWS]
 
 
 def test_the_card_is_one_for_the_solver_of_the_deck(tmp_path: Path) -> None:
