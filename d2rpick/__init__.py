@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from d2rpick.api.flights import Plan as Plan
     from d2rpick.api.flights import explore as explore
     from d2rpick.api.flights import plan as plan
+    from d2rpick.api.following import follow as follow
     from d2rpick.api.runs import Run as Run
     from d2rpick.api.runs import from_frame as from_frame
     from d2rpick.api.runs import read as read
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from d2rpick.base.errors import HistoryError as HistoryError
     from d2rpick.base.errors import RangeError as RangeError
     from d2rpick.choice.cost import Weights as Weights
+    from d2rpick.running.events import Event as Event
     from d2rpick.vibration.oscillator import Oscillator as Oscillator
 
 _HOME = {
@@ -65,6 +67,8 @@ _HOME = {
     **dict.fromkeys(("Exploration", "Plan", "explore", "plan"), "api.flights"),
     **dict.fromkeys(("Run", "from_frame", "read"), "api.runs"),
     **dict.fromkeys(("Study", "study"), "api.studies"),
+    "Event": "running.events",
+    "follow": "api.following",
     "Oscillator": "vibration.oscillator",
     "Weights": "choice.cost",
 }

@@ -28,6 +28,7 @@ _WORK: Final = {
     "parts": "Say which parts may be switched, and what that saves.",
     "verify": "Judge a pair of times, or a finished switched run.",
     "study": "Choose tr for many runs, and one tr for all.",
+    "follow": "Watch a run while it is computed: when it flies, when to switch.",
     "extract": "Write the chosen energy as csv or hdf5.",
     "card": "Print solver input for switching windows.",
     "check": "Check the switches of decks, also against a run.",

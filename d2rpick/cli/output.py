@@ -37,7 +37,7 @@ _PRINTED: Final = (".pdf", ".doc", ".docx")
 
 
 # Arguments that messages name in backticks, and which options set them where these have other names.
-ARGUMENTS: Final = (*OPTIONS, "td", "td_window", "tr", "min_rigid", "overwrite", "write_as", "done", "before")
+ARGUMENTS: Final = (*OPTIONS, "td", "td_window", "tr", "min_rigid", "overwrite", "write_as", "done", "before", "wait")
 _OTHERS: Final = {"parts": "part", "channels": "channel", "replay": "no_verify"}
 _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 

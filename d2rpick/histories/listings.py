@@ -55,6 +55,33 @@ def wrong_energies(histories: Iterable[str]) -> Iterator[str]:
                 yield f"{listing}: {old}"
 
 
+WITH_AN_ERROR: Final = "with an error"
+# What stands at the end of Radioss' engine listing, of LS-DYNA's messag and d3hsp.
+_ENDINGS: Final = {
+    b"ERROR TERMINATION": WITH_AN_ERROR,
+    b"E r r o r   t e r m i n a t i o n": WITH_AN_ERROR,
+    b"NORMAL TERMINATION": "normally",
+    b"N o r m a l    t e r m i n a t i o n": "normally",
+}
+_STOPPED: Final = b"USER BREAK"
+
+
+def ending(history: str) -> str | None:
+    """Say how a run has ended, by the listing beside its last history; None where that does not say so.
+
+    A leg that was told to stop has not ended the run, nor has one whose next leg lies there.
+    """
+    found = _HISTORY.fullmatch(history)
+    if found is None:
+        tails = [_ends(str(Path(history).parent / name))[1] for name in ("messag", "d3hsp")]
+    elif Path(f"{found['root']}_{int(found['leg']) + 1:04d}.rad").exists():
+        return None
+    else:
+        tails = [_ends(f"{found['root']}_{int(found['leg']):04d}.out")[1]]
+    said = (how for words, how in _ENDINGS.items() for tail in tails if words in tail and _STOPPED not in tail)
+    return next(said, None)
+
+
 def _ends(path: str) -> tuple[bytes, bytes]:
     """Give the beginning and the end of a file; nothing of one that cannot be read."""
     try:

@@ -21,6 +21,8 @@ from d2rpick.histories.samples import window
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from numpy.typing import NDArray
+
     from d2rpick.flight.window import Law
     from d2rpick.histories.history import Balance, History, Momenta, Precision, Samples
     from d2rpick.histories.names import Part
@@ -137,19 +139,14 @@ def _going_on(one: Quiet, reach: float, found: Sequence[Quiet]) -> Quiet:
     return one._replace(end=next(after, None))
 
 
-def can_tell(history: History) -> bool:
-    """Whether momenta or energies of contacts are written that show a force."""
-    return any(True for _ in _witnesses(history))
-
-
-def contact_after(history: History, start: float) -> float | None:
+def contact_after(history: History, start: float, least: int = FEWEST) -> float | None:
     """Give the first state after ``start`` at which a force acts that did not then; None where none does [time].
 
-    Nothing acts at ``start`` and in the `FEWEST` states from there on, as in a rigid leg that begins in flight.
+    Nothing acts at ``start``, as in a rigid leg that begins in flight; ``least`` states are asked for from there on.
     """
     for one in _witnesses(history):
         first = int(np.searchsorted(one.time, start))
-        if first + FEWEST <= one.time.size:
+        if first + least <= one.time.size:
             last = one.last_without(first)
             return None if last == one.time.size - 1 else float(one.time[last + 1])
     return None
@@ -258,11 +255,38 @@ def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:
 
     In the others a rigid body has taken some of them: then no quantity of a part is believed.
     """
+    return _stretches(_complete(momenta, whole))
+
+
+def rigid_times(history: History) -> tuple[tuple[float, float, float], ...]:
+    """Give the times in which a rigid body has taken momenta of parts: start, when that was seen, end [time].
+
+    Those that go on end with the record.
+    """
+    whole = next((one for one in history.momenta if one.parts is None), None)
+    return tuple(
+        (
+            float(one.time[at.start]),
+            float(one.time[at.start + FEWEST - 1]),
+            float(one.time[min(at.stop, one.time.size - 1)]),
+        )
+        for one in history.momenta
+        if one.parts is not None
+        for at in _stretches(~_complete(one, whole))
+    )
+
+
+def _complete(momenta: Momenta, whole: Momenta | None) -> NDArray[np.bool_]:
+    """Whether the momenta of parts (n,) are together those of the whole model."""
     if whole is None or whole.velocity or whole.time.size != momenta.time.size:
-        return (slice(0, momenta.time.size),)
+        return np.ones(momenta.time.size, np.bool_)
     everything = range(momenta.values.shape[1])
     largest = np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1))
     off = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
-    there = off <= _COMPLETE * largest + 2 * momenta.noise(everything)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(np.int8), [0]]))).reshape(-1, 2)
+    return np.asarray(off <= _COMPLETE * largest + 2 * momenta.noise(everything))
+
+
+def _stretches(states: NDArray[np.bool_]) -> tuple[slice, ...]:
+    """Stretches of some states (n,) that are long enough."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]]))).reshape(-1, 2)
     return tuple(slice(first, last) for first, last in edges.tolist() if last - first >= FEWEST)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
+from d2rpick.deck.inner_period import inner_period
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import window
 from d2rpick.running.evidence import believed
@@ -20,6 +21,7 @@ from d2rpick.running.evidence import believed
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Samples
 
 # A swing is one by this share of the range so far of a velocity.
@@ -173,6 +175,15 @@ class InnerMotion:
     @cached_property
     def _motions(self) -> tuple[_Motion, ...]:
         return tuple(_of_parts(self._history)) or tuple(_of_energy(self._history))
+
+
+def wait_of_deck(inventory: Inventory) -> Wait | None:
+    """Give half of what the longest period cannot be below, by a deck; None where its springs are not known.
+
+    The record shows what it is more than that; half of that was longer than any gap in the load of a car.
+    """
+    found = inner_period(inventory)
+    return found and Wait(found.least / 2, "deck", f"half of {found.least:.3g}, the least period of {found.reason}")
 
 
 def refuse_wait(given: float, known: Wait, name: str) -> None:

@@ -1,0 +1,73 @@
+"""The command ``follow``: lines, ndjson, exit codes, an end that is quiet."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import signal
+from typing import TYPE_CHECKING
+
+import pytest
+
+import d2rpick as d2
+from tests.command import BOX, GLSTAT, ROOT, run, started
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+CAR = str(ROOT / "tests/data/carT01.gz")
+
+
+def test_once_says_what_there_is_and_whether_it_flies() -> None:
+    result = run("follow", "--once", CAR)
+    assert result.exit_code == 1
+    lines = [line.split()[1] for line in result.stdout.splitlines()]
+    assert lines == ["begun", "flight", "switch", "contact", "flight", "later", "switch", "contact", "ended", "state"]
+    assert run("follow", "--once", "--exit-zero", CAR).exit_code == 0
+    assert run("follow", CAR).exit_code == 0  # it has ended
+
+
+def test_lines_of_json_are_those_of_python() -> None:
+    result = run("follow", "-f", "ndjson", "--part", "box", "--for", "0", BOX)
+    found = [json.loads(line) for line in result.stdout.splitlines()]
+    assert found == [one._asdict() for one in d2.follow(BOX, parts="box", lasting=0)]
+    assert {tuple(one) for one in found} == {("event", "time", "seen", "message", "wait", "left", "tr")}
+
+
+def test_a_run_that_flies_exits_with_0(tmp_path: Path) -> None:
+    data = gzip.decompress((ROOT / "tests/data/car_all_T01.gz").read_bytes())
+    (tmp_path / "carT01").write_bytes(data)
+    assert run("follow", "--once", "--wait", "0.005", str(tmp_path)).exit_code == 2  # half a period is longer
+    rigid = gzip.decompress((ROOT / "tests/data/drop2_w123_T01.gz").read_bytes())
+    (tmp_path / "carT01").write_bytes(rigid[: len(rigid) // 2])
+    assert run("follow", "--once", str(tmp_path)).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (("--once", "--wait", "0.002", CAR), "--wait 0.002 is below"),
+        (("--once", GLSTAT), "neither a momentum nor the energy of contacts"),
+        (("--once", "--for", "3", CAR), "--once and --for exclude each other"),
+        (("--once", "--wait", "0", CAR), "--wait"),
+        (("--once", "--part", "nobody", CAR), "nobody"),
+        (("--once", "--deck", "/nowhere.rad", CAR), "/nowhere.rad"),
+    ],
+)
+def test_what_cannot_be_followed_is_one_line(args: tuple[str, ...], said: str) -> None:
+    result = run("follow", *args)
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_an_interrupt_ends_it_quietly(tmp_path: Path) -> None:
+    data = gzip.decompress((ROOT / "tests/data/drop2_w123_T01.gz").read_bytes())
+    (tmp_path / "carT01").write_bytes(data)
+    with started("follow", "-f", "ndjson", str(tmp_path)) as process:
+        assert process.stdout
+        json.loads(process.stdout.readline())
+        os.kill(process.pid, signal.SIGINT)
+        _, errors = process.communicate()
+    assert (process.returncode, errors) == (0, b"")

@@ -1,0 +1,76 @@
+"""Events of a run so far: a made body that swings, is pushed, flies and lands, as long as one likes."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from d2rpick.histories.history import EXACT, Balance, History, Momenta
+from d2rpick.running.events import events_of
+from d2rpick.running.evidence import until
+from d2rpick.running.wait import InnerMotion
+from tests.records import table
+
+# Pushes [s] of half a sine, and the period of what swings inside from the first on [s].
+PUSHES = ((0.1, 0.13), (0.17, 0.2), (0.62, 0.66))
+PERIOD, STEP, END = 0.12, 1e-3, 0.8
+
+
+@cache
+def made(gravity: float = 9.81) -> History:
+    time = np.arange(0.0, END, STEP)
+    force = np.zeros(time.size)
+    for start, end in PUSHES:
+        inside = (time > start) & (time < end)
+        force[inside] += 400 * np.sin(np.pi * (time[inside] - start) / (end - start))
+    impulse = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2 * STEP)])
+    momentum = np.zeros((time.size, 1, 3))
+    momentum[:, 0, 2] = -20.0 - 2.0 * gravity * time + impulse
+    swing = np.where(time > PUSHES[0][0], np.sin(2 * np.pi * (time - PUSHES[0][0]) / PERIOD), 0.0)
+    energy = 50.0 * swing**2
+    kinetic = momentum[:, 0, 2] ** 2 / 4
+    whole = Momenta(time, momentum, None, EXACT, (0,), masses=np.array([2.0]))
+    balance = Balance(time, energy, kinetic, sliding=np.concatenate([[0.0], np.cumsum(force[1:] ** 2) * 1e-6]))
+    return table(time, energy, whole, balance=balance)
+
+
+def told(history: History, wait: float | None = None) -> list[tuple[str, float | None, float | None]]:
+    return [one[:3] for one in events_of(history, InnerMotion(history, wait))]
+
+
+def test_a_gap_between_two_pushes_is_no_flight() -> None:
+    """It lasts for 40 ms, half of the period for 60."""
+    found = events_of(made(), InnerMotion(made()))
+    events = [one.event for one in found if one.event in ("flight", "contact")]
+    assert events == ["flight", "contact", "flight", "contact", "flight"]
+    first, last, _ = [one for one in found if one.event == "flight"]
+    assert first.time == 0.0
+    assert last.time is not None
+    assert abs(last.time - PUSHES[1][1]) <= 3 * STEP
+    assert last.wait is not None
+    assert 0.05 <= last.wait <= 0.07
+    contacts = [one.time for one in found if one.event == "contact" and one.time is not None]
+    assert np.allclose(contacts, [PUSHES[0][0], PUSHES[2][0]], atol=3 * STEP)
+
+
+@given(st.integers(20, int(END / STEP) - 1), st.sampled_from([None, 0.06]))
+def test_the_events_of_a_run_so_far_are_the_first_of_all(state: int, wait: float | None) -> None:
+    whole, now = told(made(), wait), float(made().time[state])
+    assert told(until(made(), now), wait) == [one for one in whole if one[2] is not None and one[2] <= now]
+
+
+@given(st.integers(0, int(END / STEP) - 1))
+def test_a_switch_is_advised_where_the_energy_is_high_and_nothing_acts(state: int) -> None:
+    history = until(made(), float(made().time[state])) if state > 20 else made()
+    for one in events_of(history, InnerMotion(history)):
+        if one.event == "switch" and one.tr is not None and one.tr > PUSHES[1][1]:
+            assert not any(start <= one.tr <= end for start, end in PUSHES)
+            assert history.energy_at(one.tr) >= 0.7 * 50
+
+
+def test_a_constant_force_that_is_not_gravity_is_no_flight() -> None:
+    found = events_of(made(5.0), InnerMotion(made(5.0), 0.06))
+    assert "flight" not in {one.event for one in found}

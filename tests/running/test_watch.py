@@ -1,0 +1,134 @@
+"""A run that is watched: it has not begun, grows, is cut in a record, goes silent, starts again, ends."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from d2rpick.base.errors import D2RPickError
+from d2rpick.histories.names import Selection
+from d2rpick.running.watch import Watch, follow
+from tests.command import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from d2rpick.running.events import Event
+
+LEGS = [gzip.decompress((ROOT / f"tests/data/drop2_w123_T0{leg}.gz").read_bytes()) for leg in (1, 2, 3)]
+WHOLE = Selection()
+
+
+def told(watch: Watch) -> list[str]:
+    return [one.event for one in watch.news()]
+
+
+def lasting(folder: Path) -> list[Event]:
+    return list(follow([str(folder)], WHOLE, lasting=0.0))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "run").mkdir()
+    return tmp_path / "run"
+
+
+def test_a_run_that_has_not_begun_says_so(folder: Path) -> None:
+    for name in (str(folder), str(folder / "runT01"), str(folder / "*T01")):
+        (state,) = follow([name], WHOLE, lasting=0.0)
+        assert (state.event, state.time, state.message) == ("state", None, "has not begun")
+    (folder / "runT01").write_bytes(b"")
+    assert lasting(folder)[-1].message == "has not begun"
+    (folder / "runT01").write_bytes(LEGS[0][:200])
+    assert lasting(folder)[-1].message.startswith("cannot be read yet")
+
+
+def test_a_growing_family_is_told_once_and_as_a_whole(folder: Path) -> None:
+    watch, found = Watch([str(folder / "runT01")], WHOLE), list[str]()
+    for leg, data in enumerate(LEGS[:2], 1):
+        for share in (0.37, 0.371, 0.8, 1.0):  # in the middle of records
+            (folder / f"runT0{leg}").write_bytes(data[: int(share * len(data))])
+            found += told(watch)
+            assert told(watch) == []  # nothing new, nothing told
+    whole = [one.event for one in lasting(folder)[:-1]]
+    assert found == whole
+    assert found.count("flight") == 3
+    assert found.count("contact") == 2
+
+
+def test_a_restart_is_told_with_the_contact_that_it_takes_back(folder: Path) -> None:
+    watch = Watch([str(folder)], WHOLE)
+    (folder / "runT01").write_bytes(LEGS[0])
+    (folder / "runT02").write_bytes(LEGS[1])
+    before = list(watch.news())
+    (folder / "runT02").unlink()
+    (folder / "runT01").write_bytes(LEGS[0][: len(LEGS[0]) // 2])
+    after = list(watch.news())
+    assert [one.event for one in after] == ["restart", "expected"]
+    assert after[1].time == next(one.time for one in before if one.event == "contact")
+    (folder / "runT01").write_bytes(LEGS[0])
+    (folder / "runT02").write_bytes(LEGS[1])
+    again = list(watch.news())
+    assert again[0].event == "contact"
+    assert again == before[-len(again) :]
+
+
+def test_silence_is_told_after_a_minute_and_then_when_it_has_doubled(folder: Path) -> None:
+    watch = Watch([str(folder)], WHOLE)
+    (folder / "runT01").write_bytes(LEGS[0])
+    assert "silent" not in told(watch)
+    for age, expected in ((50, []), (70, ["silent"]), (100, []), (150, ["silent"])):
+        then = time.time() - age
+        os.utime(folder / "runT01", (then, then))
+        watch._files = [(name, os.stat(name)) for name, _ in watch._files]  # noqa: PTH116  written then
+        assert told(watch) == expected
+
+
+@pytest.mark.parametrize(
+    ("listing", "event"),
+    [
+        ("     NORMAL TERMINATION\n", "ended"),
+        ("     ERROR TERMINATION\n", "failed"),
+        ("NORMAL TERMINATION\n USER BREAK", None),
+    ],
+)
+def test_the_listing_says_how_a_run_has_ended(folder: Path, listing: str, event: str | None) -> None:
+    (folder / "runT01").write_bytes(LEGS[0])
+    (folder / "run_0001.out").write_text(listing)
+    events = [one.event for one in lasting(folder)]
+    assert [one for one in events if one in ("ended", "failed")] == [event] * (event is not None)
+    (folder / "run_0002.rad").write_text("/RUN/run/2\n1.0\n")  # a leg that is still to come
+    assert not {*(one.event for one in lasting(folder))} & {"ended"}
+
+
+def test_looks_cost_one_percent_of_a_core(folder: Path) -> None:
+    (folder / "runT01").write_bytes(LEGS[0])
+    rests, begun = list[float](), time.process_time()
+
+    def rest(seconds: float) -> None:
+        rests.append(seconds)
+        if len(rests) == 3:
+            (folder / "run_0001.out").write_text("NORMAL TERMINATION")
+            (folder / "runT01").write_bytes(LEGS[0][:-1])
+
+    assert [one.event for one in follow([str(folder)], WHOLE, rest=rest)][-2:] == ["ended", "state"]
+    assert sum(rests) >= 50 * (time.process_time() - begun) / 2
+    assert min(rests) >= 0.5
+
+
+def test_what_cannot_be_read_and_is_not_written_to_any_more_is_an_error(folder: Path) -> None:
+    (folder / "runT01").write_bytes(LEGS[0][:200])
+    os.utime(folder / "runT01", (1e9, 1e9))
+    with pytest.raises(D2RPickError, match="runT01"):
+        lasting(folder)
+
+
+def test_several_runs_in_a_folder_are_refused(folder: Path) -> None:
+    for name in ("aT01", "bT01"):
+        (folder / name).write_bytes(LEGS[0])
+    with pytest.raises(D2RPickError, match="several runs"):
+        lasting(folder)
