@@ -76,9 +76,9 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     >>> keep.tolist()
     [True, True, False, True, False, True]
     """
-    step = np.diff(time)
-    if step.min(initial=1.0) > 0:  # as nearly always
+    if np.all(time[1:] > time[:-1]):  # as nearly always
         return np.ones(time.size, dtype=bool), ()
+    step = np.diff(time)
     equal, back = int(np.count_nonzero(step == 0)), int(np.count_nonzero(step < 0))
     later = np.minimum.accumulate(time[::-1])[::-1]
     keep = np.append(time[:-1] < later[1:], np.ones(min(1, time.size), dtype=bool))

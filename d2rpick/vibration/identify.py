@@ -365,11 +365,12 @@ def _implausible(
 
 def _covariance(jacobian: Samples, rest: Samples) -> Samples:
     """s**2 (J J^T)^-1, by the pseudo-inverse of the matrix scaled to a unit diagonal."""
-    norm = np.linalg.norm(jacobian, axis=1)
+    products = jacobian @ jacobian.T
+    norm = np.sqrt(products.diagonal())
     norm[norm < _NO_EFFECT] = 1.0
-    unit = jacobian / norm[:, None]
+    scale = norm * norm[:, None]
     variance = float(rest @ rest) / (rest.size - norm.size)
-    covariance: Samples = variance * np.linalg.pinv(unit @ unit.T, hermitian=True) / (norm * norm[:, None])
+    covariance: Samples = variance * np.linalg.pinv(products / scale, hermitian=True) / scale
     return covariance
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
+
+    Cuts = tuple[NDArray[np.intp], NDArray[np.intp]]  # from where to where rows are looked at
 
 
 def labelled(layout: Layout, time: int) -> dict[str, int]:
@@ -253,45 +255,72 @@ def plain_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) ->
     """
     tables = []
     for piece in text.pieces(begin):
-        values = _plain_piece(piece, layout, used)
+        values = _plain_piece(text, piece, layout, used)
         if values is None:
             return None
         tables.append(values)
     return [np.concatenate([table[:, place] for table in tables]) for place in range(len(used))] if tables else None
 
 
-def _plain_piece(piece: bytes, layout: Layout, used: Sequence[int]) -> Samples | None:
+def _plain_piece(text: Text, piece: bytes, layout: Layout, used: Sequence[int]) -> Samples | None:
     if layout.decimal == ",":
         if b"." in piece:
             return None
         piece = piece.replace(b",", b".")
     if b'"' in piece:
         return None  # a separator in quotes is none
-    whole = piece.decode("latin-1")  # no other character than those of latin-1 belongs to a number
-    taken, chosen = [*range(layout.columns)], None
-    first = whole[: whole.index("\n")]
-    if layout.separator and not (sorted(used) == taken and not first.endswith(layout.separator)):
-        # otherwise numpy sees to it that each row has its cells
+    taken, chosen, cuts = [*range(layout.columns)], None, None
+    closed = piece[: piece.index(b"\n")].endswith((layout.separator or "\n").encode("latin-1"))
+    if layout.separator and (closed or sorted(used) != taken):
+        # otherwise the parser sees to it that each row has its cells
         rows = _separators(piece, layout)
         if rows is None:
             return None
         starts, marks = rows
-        closed = marks.shape[1] == layout.columns
         taken = sorted({0, *used})  # a comment would show in the first column
         chosen = taken if closed or len(taken) < layout.columns else None
-    if taken[-1] < layout.columns - 1:  # what follows is not taken apart
-        lines = [whole[start:cut] for start, cut in zip(starts.tolist(), marks[:, taken[-1]].tolist(), strict=True)]
+        if taken[-1] < layout.columns - 1:  # what follows is not taken apart
+            cuts = starts, marks[:, taken[-1]]
+    try:
+        # to import pandas pays in large texts alone
+        table = _by_pandas(piece, layout, chosen) if text.is_large else _by_numpy(piece, layout, chosen, cuts)
+    except ValueError:
+        return None
+    if table.shape != (piece.count(b"\n"), len(taken)):
+        return None  # blank lines were passed over
+    return table if taken == [*used] else table[:, np.searchsorted(taken, used)]
+
+
+def _by_numpy(piece: bytes, layout: Layout, columns: Sequence[int] | None, cuts: Cuts | None) -> Samples:
+    """Columns of rows of numbers, all unless some are chosen; ValueError where there is something else."""
+    whole = piece.decode("latin-1")  # no other character than those of latin-1 belongs to a number
+    if cuts:
+        lines = [whole[start:cut] for start, cut in zip(*(places.tolist() for places in cuts), strict=True)]
     else:
         lines = whole.split("\n")[:-1]
     if not lines[0].strip():
-        return None  # numpy passes over it, and warns where there is no other
-    try:
-        table = np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=chosen)
-    except ValueError:
-        return None
-    if table.shape != (len(lines), len(taken)):
-        return None  # it passes over blank lines
-    return table if taken == [*used] else table[:, np.searchsorted(taken, used)]
+        raise ValueError  # numpy passes over it, and warns where there is no other
+    return np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=columns)
+
+
+def _by_pandas(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> Samples:
+    """The same, five times as fast."""
+    from csv import QUOTE_NONE
+    from io import BytesIO
+
+    import pandas as pd
+
+    options: dict[str, Any] = {
+        "low_memory": False,
+        "quoting": QUOTE_NONE,
+        "skip_blank_lines": False,
+        "na_filter": False,
+    }
+    if [*map(int, pd.__version__.split(".")[:2])] < [3, 1]:  # from there on always exact, as `float` is
+        options["float_precision"] = "round_trip"
+    options |= {"header": None, "usecols": columns, "dtype": np.float64}
+    table: Samples = pd.read_csv(BytesIO(piece), sep=layout.separator or r"\s+", **options).to_numpy()
+    return table
 
 
 def _separators(piece: bytes, layout: Layout) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
@@ -333,7 +362,7 @@ def _tables(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Iter
     curve = _Curve(text.name, layout, used)
     number = layout.start + 1
     for piece in text.pieces(begin):
-        table = _plain_piece(piece, layout, used)
+        table = _plain_piece(text, piece, layout, used)
         if table is not None and np.isfinite(table).all() and not curve.stops_before(float(table[0, 0])):
             yield range(number, number + len(table)), table
             curve.before, curve.gap = float(table[-1, 0]), False

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.files import beyond, long_line
-from d2rpick.histories.content import Content
+from d2rpick.histories.content import Content, OnDisk
 from d2rpick.histories.names import is_time, is_unit, unit_of
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ class Portions(NamedTuple):
     piece: int = 1 << 17  # bytes: their cells stay in the processor's cache
     short: int = 1 << 16  # a text of no more bytes is looked at as a whole to judge the printed format
     sample: int = 100  # of others so many lines from the start, the end and between
+    large: int = 1 << 21  # bytes of a large text: each call of pandas takes a millisecond
 
 
 _PORTIONS: Final = Portions()
@@ -74,12 +75,17 @@ class Text:
         """Count the last line, which has no end, as whole."""
         self._end = len(self._data)
 
+    @property
+    def is_large(self) -> bool:
+        """Whether it stayed on its disk, and so is plain ASCII."""
+        return isinstance(self._data, OnDisk)
+
     def pieces(self, begin: int) -> Iterator[bytes]:
         """Whole lines from byte ``begin`` on, some at a time, each with its end.
 
         FormatError behind the last of them where the file was written anew meanwhile.
         """
-        size = self._portions.piece
+        size = self._portions.large if self.is_large else self._portions.piece
         while begin < self._end:
             piece = self._data[begin : min(begin + size, self._end)]
             end = piece.rfind(b"\n") + 1

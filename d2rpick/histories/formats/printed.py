@@ -145,7 +145,7 @@ def _not_a_restart(time: Samples) -> int | None:
     >>> _not_a_restart(np.array([0.0, 1.0, 2.0, 3.0, 1.5, 2.5])), _not_a_restart(np.array([0.0, 1.0, 0.0, 1.0]))
     (None, 2)
     """
-    back = np.flatnonzero(np.diff(time) < 0) + 1
+    back = np.flatnonzero(time[1:] < time[:-1]) + 1
     if back.size == 0:
         return None
     first = int(back[0])

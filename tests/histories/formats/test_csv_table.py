@@ -15,9 +15,12 @@ from d2rpick.histories.formats.layout import Portions, Text
 from d2rpick.histories.history import EXACT, Precision
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
-from tests.reading import history_of, states_of
+from tests.reading import history_of, on_disk, states_of
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from d2rpick.histories.content import OnDisk
     from d2rpick.histories.history import History
 
 TIMES = [0.0, 0.25, 0.625]
@@ -268,6 +271,11 @@ def test_one_bad_line_of_many_is_named(row: int, text: str, reason: str) -> None
         read("\n".join(["time,IE", *LONG[:row], text, *LONG[row + 1 :], ""]))
 
 
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("tables") / "table"
+
+
 ROWS = ["{},1.5", "{},-2", "{},2,", "1,7", "0,3", "{},nan", "{},1,2", "{};3", "{},x", " {} , 1.5", '{},"1.5"', "{}"]
 # With a comma and a point as they stand, whatever the table takes them for.
 CELLS = ["1_0", "0x10", "1e999", "1.5d0", "1~5", "1!5", "+.5", "5.", "1e", "1 2", "-inf", "#"]
@@ -275,10 +283,10 @@ CELLS += ["\xa01.5", "1.5\x85", "\xb2"]  # blanks and a digit beyond ASCII
 LINES = [*ROWS, *(f"{{}},{cell}" for cell in CELLS), "# comment", "# {},1", "", "  ", ",", "time,IE"]
 
 
-def in_pieces(data: bytes, size: int) -> object:
+def in_pieces(data: bytes | OnDisk, size: int) -> object:
     """States of a table that is read in pieces of so many bytes, or what is wrong with it."""
     try:
-        table = csv_table.Table(Text(Source("table", data), Portions(piece=size)), Selection())
+        table = csv_table.Table(Text(Source("table", data), Portions(piece=size, large=size)), Selection())
         return table.time.tolist(), table.channel(table.energy_channel).tolist()
     except FormatError as error:
         return str(error)
@@ -292,8 +300,9 @@ def in_pieces(data: bytes, size: int) -> object:
 )
 @example(["{},1!5"], (";", ","), "", "utf-8")
 @example(["", "0,3"], (",", "."), "", "utf-8")
-def test_rows_read_piece_by_piece_are_those_read_line_by_line(
-    lines: list[str], form: tuple[str, str], tail: str, encoding: str
+@example([" 2e-1\x0c,1", "{},1e+"], (",", "."), "", "utf-8")
+def test_rows_read_piece_by_piece_or_from_the_disk_are_those_read_line_by_line(
+    file: Path, lines: list[str], form: tuple[str, str], tail: str, encoding: str
 ) -> None:
     good = ["{0},{0}.5"] * 3  # before and behind: times that step back would hide what is wrong with a cell
     numbered = [line.format(number) for number, line in enumerate([*good, *lines, *good])]
@@ -303,6 +312,20 @@ def test_rows_read_piece_by_piece_are_those_read_line_by_line(
     one_by_one = data + '# "\n'.encode(encoding).removeprefix(b"\xff\xfe")  # a quote may hold a separator
     found = [in_pieces(*asked) for asked in ((data, 8), (data, 1 << 17), (one_by_one, 1 << 17))]
     assert found[0] == found[1] == found[2]
+    file.write_bytes(data)
+    assert [in_pieces(on_disk(file), size) for size in (8, 1 << 17)] == found[:2]
+
+
+HARD = st.floats(allow_nan=False, allow_infinity=False).map(repr) | st.from_regex(
+    r"-?[0-9]{1,25}(\.[0-9]{0,25})?([eE][+-]?[0-9]{1,2})?", fullmatch=True, alphabet=st.characters(codec="ascii")
+)
+
+
+@given(st.lists(HARD, min_size=1, max_size=40))
+def test_numbers_from_the_disk_are_those_of_python(file: Path, texts: list[str]) -> None:
+    file.write_text("time,IE\n" + "".join(f"{number}.5,{text}\n" for number, text in enumerate(texts)))
+    table = csv_table.Table(Text(Source("table", on_disk(file))), Selection())
+    assert table.channel("IE").tolist() == [float(text) for text in texts]
 
 
 @pytest.mark.parametrize("between", ["# switched\n", "\n", " \n"])
