@@ -29,13 +29,14 @@ ENERGY = str(ROOT / "sample_data" / "energy.csv")
 GLSTAT = str(ROOT / "sample_data" / "energy.glstat")
 ROLLOVER = str(ROOT / "sample_data" / "rollover.csv")
 DECK = str(ROOT / "sample_data" / "switching.k")
+MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
 BOX = str(ROOT / "sample_data" / "rolloverT01.gz")
 OSCILLATOR = tuple(shlex.split("--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6"))
 _INTERRUPTIBLE = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\nfrom d2rpick.__main__ import main; main()"
 )
 # No colour variables and no options that the tester's own environment may set.
-_ENVIRONMENT = {"NO_COLOR": None, "FORCE_COLOR": None, "D2RPICK_SUGGEST_TD": None}
+_ENVIRONMENT = {"NO_COLOR": None, "FORCE_COLOR": None, "COLUMNS": None, "D2RPICK_SUGGEST_TD": None}
 # Before 8.2, click's runner mixes the streams unless it is told not to.
 _APART: dict[str, Any] = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}
 

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 class Choosing(TypedDict, total=False):
     """How to choose and judge, as the options of ``d2rpick suggest``; times in the unit of the history.
 
-    ``after``: the load ends here (default: found from the record).  ``margin``: kept clear after the load and before
-    the next contact (0; where td is chosen, derived).
+    ``after``: the load ends here, ``landing``: the next contact comes here (default: found from the record).
+    ``margin``: kept clear after the load and before the next contact (0; where td is chosen or the landing is given,
+    derived).
     ``tolerance``: on the lock-in error, on the level error where no oscillator is known (0.2).
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: given instead of
     identified, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the oscillator
@@ -32,6 +33,7 @@ class Choosing(TypedDict, total=False):
     """
 
     after: float | None
+    landing: float | None
     margin: float | None
     tolerance: float
     max_kinetic_share: float | None

@@ -199,9 +199,9 @@ def suggest(
     weights : Weights or path, optional
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     **choosing
-        How to choose: ``after``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``, ``oscillator``
-        with ``v0``, ``fit_window``, ``replay``, ``strict``, ``cost_share``, ``step_ratio``; what they mean stands in
-        ``d2rpick.api.arguments.Choosing``.
+        How to choose: ``after``, ``landing``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``,
+        ``oscillator`` with ``v0``, ``fit_window``, ``replay``, ``strict``, ``cost_share``, ``step_ratio``; what they
+        mean stands in ``d2rpick.api.arguments.Choosing``.
 
     Returns
     -------

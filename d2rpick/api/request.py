@@ -65,10 +65,10 @@ def options_of(table: Any) -> dict[str, Option]:
 
 # Groups of options: how to read a history, how to judge by it, and how to judge a tr.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
-JUDGING: Final = ("input_format", "time", "energy", "flying", "channel", "after", "margin", "tolerance")
+JUDGING: Final = ("input_format", "time", "energy", "flying", "channel", "after", "landing", "margin", "tolerance")
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
 LIMITS: Final = (
-    *("after", "margin", "tolerance", "max_kinetic_share", "max_residual", *OSCILLATOR),
+    *("after", "landing", "margin", "tolerance", "max_kinetic_share", "max_residual", *OSCILLATOR),
     *("fit_window", "no_verify", "strict"),
 )
 CHOOSING: Final = (*LIMITS, "cost_share", "step_ratio")
@@ -110,8 +110,12 @@ class Request:
         *("names", "QUANTITY=NAME"), many=True,
     )  # fmt: skip
     after: float | None = option("End of the load.  [default: found from the record]", TIME, "T")
+    landing: float | None = option(
+        "Next contact after the flight; td keeps the margin before it.  [default: found from the record]", TIME, "T"
+    )
     margin: float | None = option(
-        "Time to keep clear after the load and before the next contact.  [default: 0; where td is chosen, derived]",
+        "Time to keep clear after the load and before the next contact.  [default: 0; where td is chosen, or before "
+        "--landing, derived]",
         *(NOT_NEGATIVE, "T"),
     )
     tolerance: float = option(
@@ -163,6 +167,8 @@ class Request:
         if self.weights is not None and self.deck is None:
             raise ArgumentError("`weights` needs `deck`, the deck whose elements are weighted")
         check_window("fit_window", self.fit_window)
+        if self.after is not None and self.landing is not None and not self.after < self.landing:
+            raise ArgumentError(f"`landing` {self.landing:g} is not after `after` {self.after:g}, the end of the load")
 
     @property
     def _oscillator_given(self) -> bool:
@@ -196,6 +202,7 @@ class Request:
             mode = to_mode(oscillator, self.v0)
         return Settings(
             after=self.after,
+            landing=self.landing,
             margin=self.margin,
             tolerance=self.tolerance,
             max_kinetic_share=self.max_kinetic_share,

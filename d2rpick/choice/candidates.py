@@ -303,9 +303,8 @@ def _distinct(situation: Situation, found: Moments) -> Moments:
 
 def _remarks(situation: Situation, reach: float, known: Measured | None, parts: Sequence[PartMatch]) -> Iterator[str]:
     """What to know of this tr beside its acceptance."""
-    if known is None and (situation.vibration.unknown or not situation.at_rest):
-        reason = situation.vibration.unknown or situation.vibration.undescribed
-        yield f"sign, lock-in error and residual unknown: {reason}"
+    if known is None and not (situation.vibration.unknown or situation.at_rest):
+        yield f"sign, lock-in error and residual unknown: {situation.vibration.undescribed}"
     if known and known.lock_in_error > measures.TOLERATED_GROWTH and parts:
         from d2rpick.vibration.part_signs import main_contributors  # not above: a table has no parts
 

@@ -60,11 +60,6 @@ class Expectation(NamedTuple):
     ratio_low: float | None
     ratio_at_level: float
 
-    @property
-    def above_the_reference(self) -> bool:
-        """Whether more would come back than the reference has, if E(td) were locked in."""
-        return self.ratio_at_level > MOST_KEPT
-
 
 _Energy = TypeVar("_Energy", float, "Samples")
 

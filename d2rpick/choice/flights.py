@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.situation import Settings, examine, landed
 from d2rpick.flight.flight import Flight, all_seen, witnesses
 from d2rpick.flight.window import moments
 from d2rpick.histories.digits import not_after, sum_as_read
@@ -16,6 +16,8 @@ from d2rpick.histories.samples import window
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from d2rpick.histories.history import History, Samples
 
 # Share of the flight that is always kept clear [-].  Landings of 36 computed runs (a car-like structure, a box with a
@@ -140,6 +142,8 @@ def longest_flight(
     ``otherwise`` is given where nothing shows a flight; without it that is a RangeError.
     """
     flights = flights_of(history, settings, fits)
+    if settings.landing is not None and (last := _last_before(settings.landing, flights)):
+        flights = (last,)
     if not flights and otherwise:
         return otherwise
     if not flights:
@@ -160,7 +164,28 @@ def last_td(end: float, margin: float) -> float:
 
 
 def flights_of(history: History, settings: Settings, fits: Fits | None = None) -> tuple[Flight, ...]:
-    """Find all flights; where the energy is all there is, one oscillator for the whole record, else none is sought."""
+    """Find all flights, that of the landing that is given up to there.
+
+    Where the energy is all there is, one oscillator for the whole record, else none is sought.
+    """
+    landing = settings.landing
+    if landing is None:
+        return _flights_of(history, settings, fits)
+    history.check(landing, argument="landing")
+    found = _flights_of(history, replace(settings, landing=None), fits)
+    last = _last_before(landing, found)
+    if last and landing <= bounds(history, last)[1]:
+        return tuple(landed(one, landing) if one is last else one for one in found)
+    before = examine(history, landing, settings, fits).flight
+    return tuple(sorted((*found, before))) if before.end == landing and not before.refusal else found
+
+
+def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
+    """Give the last flight that begins before a landing [time]."""
+    return max((one for one in flights if (one.start or 0.0) < landing), key=lambda one: one.start or 0.0, default=None)
+
+
+def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tuple[Flight, ...]:
     if any(True for _ in witnesses(history)) or not settings.replay:
         return find_flights(history, settings, fits)
     first = float(history.time[0]) if settings.after is None else settings.after

@@ -58,7 +58,7 @@ def objections(
         yield Objection(everywhere, situation.flight.refusal or "unknown: nothing shows when the load is over")
     else:
         yield Objection(tr < first_as_read(earliest), f"before {end_of_load(situation)}")
-    yield from (Objection(everywhere, reason) for reason in _against_td(situation))
+    yield from (Objection(everywhere, reason) for reason in against_td(situation))
     if situation.at_rest:
         return
     compared = known.astype(bool)
@@ -85,7 +85,7 @@ def _above_the_reference(situation: Situation, energy: Samples) -> Iterator[Obje
         yield Objection(energy > means.most, f"{found} {MOST_KEPT:g} times", kept, MOST_KEPT)
 
 
-def _against_td(situation: Situation) -> Iterator[str]:
+def against_td(situation: Situation) -> Iterator[str]:
     """Why no tr at all is acceptable at this td."""
     if situation.td > situation.latest_td:
         yield f"td after {end_of_flight(situation)}"

@@ -130,12 +130,18 @@ def _check(
 ) -> None:
     """RangeError where the run cannot be judged, or a time that was asked for looks to be in another unit."""
     refuse_unsound(history, choosing=choosing)
-    if settings.after is not None:
-        history.check_unit(settings.after, argument="after")
+    check_units(history, settings)
     if isinstance(td, tuple):
         history.check_unit(*td, argument="td_window")
     elif td is not None:
         history.check_unit(td, argument="td")
+
+
+def check_units(history: History, settings: Settings) -> None:
+    """RangeError where a time that was given looks to be in another unit than the history."""
+    for name in ("after", "landing"):
+        if (time := getattr(settings, name)) is not None:
+            history.check_unit(time, argument=name)
 
 
 def _with_health(answer: _Answer, run: Run) -> _Answer:

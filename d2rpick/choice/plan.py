@@ -18,7 +18,7 @@ import numpy as np
 
 from d2rpick.choice.flights import Margin, bounds, flights_of, last_td, margin_before_contact
 from d2rpick.choice.health import refuse_unsound
-from d2rpick.choice.of_run import Reference, suggest_of
+from d2rpick.choice.of_run import Reference, check_units, suggest_of
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
 from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
 from d2rpick.flight.internal_energy import round_off
@@ -191,8 +191,7 @@ def plan_of(
     refuse_unsound(history, choosing=True)
     span = float(history.time[-1] - history.time[0])
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
-    if settings.after is not None:
-        history.check_unit(settings.after, argument="after")
+    check_units(history, settings)
     history, found, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
     fits = Fits()
@@ -255,6 +254,8 @@ def _asked(
     """
     own = settings.after is not None and row.start <= settings.after <= row.end
     asked = settings if own else replace(settings, after=None)
+    if settings.landing is not None and not row.start < settings.landing <= row.end:
+        asked = replace(asked, landing=None)
     # the energy alone may show no end of the flight to the td in it: the margin is kept from the one that is listed
     window = row.start, last_td(row.end, row.margin.time)
     answer = suggest_of(reference, window, asked, since=landed, fits=fits)

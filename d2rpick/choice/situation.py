@@ -39,8 +39,9 @@ if TYPE_CHECKING:
 class Settings:
     """What the analyst asks for; times in the unit of the history.
 
-    ``after``: the load ends here (None: found from the record).  ``margin``: kept clear after the load and before
-    the next contact (None: nothing, but where td is chosen what `d2rpick.choice.flights` derives before the contact).
+    ``after``: the load ends here, ``landing``: the next contact comes here (None: found from the record).  ``margin``:
+    kept clear after the load and before the next contact (None: nothing, but where td is chosen or the landing given
+    what `d2rpick.choice.flights` derives before the contact).
     ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
     given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
@@ -55,6 +56,7 @@ class Settings:
     """
 
     after: float | None = None
+    landing: float | None = None
     margin: float | None = None
     tolerance: float = 0.2
     max_kinetic_share: float | None = None
@@ -158,7 +160,16 @@ class Situation:
     def latest_td(self) -> float:
         """End of the flight with the margin; infinite when no contact was seen [time]."""
         end = self.flight.end
-        return float("inf") if end is None else sum_as_read(end, -(self.settings.margin or 0.0))
+        return float("inf") if end is None else sum_as_read(end, -self.margin)
+
+    @cached_property
+    def margin(self) -> float:
+        """Time kept clear before the next contact [time]: none where td was given, unless it or the landing was."""
+        if self.settings.margin is None and self.settings.landing is not None:
+            from d2rpick.choice.flights import margin_before_contact  # flights are found in situations
+
+            return margin_before_contact(self.history, self.flight).time
+        return self.settings.margin or 0.0
 
     @cached_property
     def at_rest(self) -> bool:
@@ -228,6 +239,8 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
     history.energy_at(td, "td")
     if settings.after is not None:
         history.check(settings.after, argument="after")
+    if settings.landing is not None:
+        history.check(settings.landing, argument="landing")
     seen = seen_flight(history, td)
     flying = None if seen.refusal else seen.flight
     # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
@@ -235,7 +248,7 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
     fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits)
     flight = find_flight(history, td, settings.after, seen, _settled(history, fit, span))
-    flight = _between_supports(history, flight, td)
+    flight = landed(_between_supports(history, flight, td), settings.landing)
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
     if settings.replay:
@@ -249,6 +262,14 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
             within = Span(settled, flight.end or float(history.time[-1]))
             evidence = evidence._replace(swings=_swings(history, within, fits))
     return Situation(history, td, settings, flight, evidence, fits)
+
+
+def landed(flight: Flight, landing: float | None) -> Flight:
+    """Let a flight end at the ``landing`` that is given [time], unless more than the energy shows an earlier one."""
+    if landing is None or flight.start is None or landing <= flight.start:
+        return flight
+    known = flight.end is not None and flight.end < landing and flight.source not in ("energy", "given")
+    return flight if known else flight._replace(end=landing)
 
 
 def _between_supports(history: History, flight: Flight, td: float) -> Flight:
@@ -270,6 +291,8 @@ def _oscillator(
     bounds = Span(*seen.flight[:2]) if seen.flight else Span(float(history.time[0]), float(history.time[-1]))
     if settings.after is not None:
         bounds = bounds._replace(start=min(settings.after, td))
+    if settings.landing is not None:
+        bounds = bounds._replace(end=max(min(bounds.end, settings.landing), td))
     if settings.fit_window:
         history.check(*settings.fit_window, argument="fit_window")
         fit = identify(*history.between(*settings.fit_window))

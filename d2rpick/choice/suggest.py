@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.candidates import find_candidates
+from d2rpick.choice.objections import against_td
 from d2rpick.choice.ranking import EQUALLY_GOOD, over_limits, quality_of, rank
 from d2rpick.choice.situation import examine
 from d2rpick.choice.verify import verify_at
@@ -201,7 +202,8 @@ def _why_none(situation: Situation, ranked: Candidates) -> str:
     if not ranked:
         level = situation.energy_td
         return f"before td = {situation.td:.6g} the energy neither passes its level {level:.6g} nor peaks near it"
-    nearest, unknown = ranked[0], situation.vibration.unknown
-    notes = [note for note in nearest.notes if not unknown or unknown not in note]  # that is a warning of its own
-    reasons = "; ".join((*notes, *over_limits(situation, nearest)))
+    if situation.td > situation.latest_td:
+        return f"td = {situation.td:.6g}: {'; '.join(against_td(situation))}"
+    nearest = ranked[0]
+    reasons = "; ".join((*nearest.notes, *over_limits(situation, nearest)))
     return f"none of {len(ranked)} candidates is acceptable; the nearest, tr = {nearest.tr:.6g}: {reasons}"

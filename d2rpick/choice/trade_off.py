@@ -12,7 +12,7 @@ from d2rpick.choice.candidates import candidates_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import bounds, longest_flight
 from d2rpick.choice.health import refuse_unsound
-from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.of_run import check_units, suggest_of
 from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.suggest import suggest_at
 from d2rpick.choice.suggest_td import looking, within_flight
@@ -174,6 +174,7 @@ def explore_of(
     """
     history, fits = reference.history, Fits()
     refuse_unsound(history, choosing=True)
+    check_units(history, settings)
     if td is not None:
         history.check_unit(td, argument="td")
     record = float(history.time[0]), float(history.time[-1])

@@ -60,8 +60,6 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
     if situation.energy_td <= 0:
         found = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
         yield Caution("no-energy", f"{found}; a level to lock in needs a positive energy")
-    if unknown := situation.vibration.unknown:
-        yield Caution("energy-only", f"{unknown}; candidates are judged by their energy level alone")
     if share is not None and share > POOR_KINETIC_SHARE:
         lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g}"
         yield Caution("poor-td", f"{lost} and no tr can keep it")
@@ -154,16 +152,16 @@ def _not_predicted(told: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> s
 
 def end_of_load(situation: Situation) -> str:
     """Words for ``earliest_tr``: the start of the flight, and the margin where one is kept."""
-    return f"the end of the load at {situation.flight.start:.6g}{_margin(situation)}"
+    return f"the end of the load at {situation.flight.start:.6g}{_margin(situation.settings.margin)}"
 
 
 def end_of_flight(situation: Situation) -> str:
     """Words for ``latest_td``: the end of the flight, and the margin where one is kept."""
-    return f"the end of the flight at {situation.flight.end:.6g}{_margin(situation)}"
+    return f"the end of the flight at {situation.flight.end:.6g}{_margin(situation.margin)}"
 
 
-def _margin(situation: Situation) -> str:
-    return f" with the margin {situation.settings.margin:.6g}" if situation.settings.margin else ""
+def _margin(kept: float | None) -> str:
+    return f" with the margin {kept:.6g}" if kept else ""
 
 
 def _nearest_flight(situation: Situation) -> str:
@@ -173,6 +171,6 @@ def _nearest_flight(situation: Situation) -> str:
         return ""
     if flight.end is None:
         return f"; the next flight begins at {flight.start:.6g}"
-    margin = _margin(situation)
+    margin = _margin(situation.margin)
     last = f",{margin} its last td is {not_after(situation.latest_td):.6g}" if margin else "; td must lie in it"
     return f"; the nearest flight lasts from {window_as_read(flight.start, flight.end)}{last}"

@@ -10,7 +10,7 @@ from d2rpick.api.request import LIMITS, READING, check_window, time_or_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.cli import options
 from d2rpick.cli.options import ANSWER, DECK, DECK_OF_PARTS, HISTORY, ONE_RUN, RESULT, WINDOW
-from d2rpick.cli.output import opened, reading
+from d2rpick.cli.output import IN_WORDS, opened, reading
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -54,7 +54,8 @@ def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, c
     with opened(request, output) as (run, output):
         asked = ask(run, request, prints=prints, merge=cards.merge)
     answer = suggested(asked, wanted)
-    output.notes(asked.reference.history.notes, answer.cautions)
+    told = [one for one in answer.cautions if one.code != "no-candidate" or output.output_format not in IN_WORDS]
+    output.notes(asked.reference.history.notes, told)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
     if card:
         found = answer.card(cards)

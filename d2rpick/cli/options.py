@@ -236,7 +236,7 @@ def judging_run(request: Request) -> Run | None:
 
 
 LIMIT: Final = click.option(
-    "--limit", type=click.IntRange(min=1), default=10, show_default=True,
+    "--limit", type=click.IntRange(min=1), default=3, show_default=True,
     help="Number of rows in the table; json and csv have all.",
 )  # fmt: skip
 
@@ -246,7 +246,7 @@ def _flags(function: Decorated) -> Decorated:
     for name, text in (
         ("debug", "Show the traceback of an error."),
         ("show-settings", "Print every option with its value and its source, and do nothing else."),
-        ("verbose", "Say on stderr what was read and how long it took."),
+        ("verbose", "Say all that is known, and on stderr what was read and how long it took."),
     ):
         short = ["-v"] if name == "verbose" else []
         flag = click.option(*short, f"--{name}", is_flag=True, expose_value=False, callback=_remember, help=text)

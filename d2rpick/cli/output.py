@@ -8,13 +8,14 @@ import sys
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TextIO
 
 import click
 
 from d2rpick.api.request import OPTIONS, dashed, option
 from d2rpick.base.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
 from d2rpick.base.files import write_whole
+from d2rpick.report.tables import WIDEST, wrapped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
+# A terminal of fewer columns is none that tables are read on.
+_NARROWEST: Final = 40
 # Formats that names of files promise.
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
 # What a report is often expected to be, and is not.
@@ -40,6 +43,7 @@ _PRINTED: Final = (".pdf", ".doc", ".docx")
 ARGUMENTS: Final = (*OPTIONS, "td", "td_window", "tr", "min_rigid", "overwrite", "write_as", "done", "before", "wait")
 _OTHERS: Final = {"parts": "part", "channels": "channel", "replay": "no_verify"}
 _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
+IN_WORDS: Final = {"table", "markdown"}  # forms in which the answer says itself why nothing is recommended
 
 
 @dataclass(frozen=True)
@@ -98,7 +102,10 @@ class Output:
         """Give what a form may show beside the answer."""
         from d2rpick.report.formats import Shown
 
-        return Shown(click.get_current_context().meta["d2rpick.command"], **more)
+        meta = click.get_current_context().meta
+        width = None if self.file else columns_of(sys.stdout)
+        shown = Shown(meta["d2rpick.command"], verbose=meta.get("d2rpick.verbose", False), **more)
+        return shown if width is None else shown._replace(width=width)
 
     def answer(self, answer: Answer, below: str = "", **shown: Any) -> None:
         """Give out an answer in the form that is asked for."""
@@ -214,9 +221,22 @@ def _meant(name: str) -> str | None:
     return form if isinstance(choice, click.Choice) and form in choice.choices else None
 
 
+def columns_of(stream: TextIO) -> int | None:
+    """Columns of the terminal that a stream writes to, as many as are read at a glance; None where there is none."""
+    if not (stream.isatty() or os.environ.get("COLUMNS")):
+        return None
+    import shutil
+
+    return max(_NARROWEST, min(WIDEST, shutil.get_terminal_size().columns))
+
+
 def tell(message: str) -> None:
-    """Print a message of one line to stderr, with the options of the command line and without control codes."""
-    click.echo(printable(with_options(message)), err=True)
+    """Print a message to stderr, with the options of the command line and without control codes.
+
+    It is one line, on a terminal broken where that ends.
+    """
+    text, width = printable(with_options(message)), columns_of(sys.stderr)
+    click.echo(wrapped(text, width) if width else text, err=True)
 
 
 def explained(error: BaseException, inputs: Sequence[str] = ()) -> str:

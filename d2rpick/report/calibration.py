@@ -11,6 +11,7 @@ from d2rpick.report.fields import Document, Field, each, many, row
 
 if TYPE_CHECKING:
     from d2rpick.choice.calibration import Calibration
+    from d2rpick.report.formats import Shown
 
 _LEG: Final = row(
     Field("name", "text"),
@@ -34,15 +35,15 @@ COLUMNS = ("formulation", "weight", "measured", "told")
 LEG_HEAD = ("leg", "step", "elements", "rigid nodes")
 
 
-def as_table(found: Calibration) -> str:
+def as_table(found: Calibration, shown: Shown) -> str:
     """The weights beside those that were measured, and the legs they rest on."""
     weights = found.weights
     lines = [
-        tables.as_text(HEAD, _rows(found)), "",
+        tables.as_text(HEAD, _rows(found), shown.width), "",
         f"elements of a step  {weights.element_share:.3f}",
         f"node of a body      {weights.rigid_node:.3g} us",
         f"misfit              {found.misfit:.1%} of the time of a leg", "",
-        tables.as_text(LEG_HEAD, _legs(found)),
+        tables.as_text(LEG_HEAD, _legs(found), shown.width),
     ]  # fmt: skip
     return "\n".join(lines)
 

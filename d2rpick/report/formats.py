@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from d2rpick.report.tables import WIDEST, wrapped
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
@@ -17,17 +19,20 @@ if TYPE_CHECKING:
 class Shown(NamedTuple):
     """What a form may show beside the answer: the command that was given, how many rows, lines written before.
 
-    ``every``: all windows of a plan, not only the supported ones.
+    ``every``: all windows of a plan, not only the supported ones.  ``verbose``: all that is known; tables and text are
+    no wider than ``width`` columns.
     """
 
     command: Sequence[str] = ()
     limit: int = 10
     every: bool = False
     lines: Sequence[str] = ()
+    verbose: bool = False
+    width: int = WIDEST
 
 
 PLAIN: Final[Mapping[str, Writer]] = {
-    "table": lambda report, answer, _: report.as_table(answer),
+    "table": lambda report, answer, shown: wrapped(report.as_table(answer, shown), shown.width),
     "json": lambda report, answer, shown: report.DOCUMENT.as_json(answer, shown.command),
     "csv": lambda report, answer, _: report.as_csv(answer),
     "markdown": lambda report, answer, _: report.as_markdown(answer),
@@ -37,15 +42,13 @@ PLAIN: Final[Mapping[str, Writer]] = {
 FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
     "suggestion": {
         **PLAIN,
-        "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
-        "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
+        "markdown": lambda report, answer, shown: report.as_markdown(answer, shown),
         "ndjson": lambda report, answer, shown: report.DOCUMENT.as_line(answer, shown.command),
         "value": lambda report, answer, _: report.as_value(answer),
     },
     "plan": {**PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
     "trade_off": {
         **PLAIN,
-        "table": lambda report, answer, shown: report.as_table(answer, shown.limit),
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
     },
     "parts": {**PLAIN, "value": lambda report, answer, _: report.as_value(answer)},

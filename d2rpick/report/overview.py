@@ -12,6 +12,7 @@ from d2rpick.report.situation import head, measures_of, spoken
 if TYPE_CHECKING:
     from d2rpick.choice.overview import Overview
     from d2rpick.flight.window import FreeFlight
+    from d2rpick.report.formats import Shown
 
 _EVIDENCE: Final = one_of("momentum", "contact-energy", "energy-balance", "oscillator", "energy")
 _FLIGHT: Final = row(
@@ -53,13 +54,13 @@ _PARTS_HEAD = ("part", "title", "highest internal energy")
 _PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "time_unit", "complete")
 
 
-def as_table(overview: Overview) -> str:
+def as_table(overview: Overview, shown: Shown) -> str:
     """One line per fact, the channels, and a table of the parts."""
     lines = tables.in_line(_rows(overview))
     if overview.parts:
-        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview))]
+        lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview), shown.width)]
     if overview.health and (health := _health(overview)):
-        lines += ["", tables.as_text(head(overview.health), health)]
+        lines += ["", tables.as_text(head(overview.health), health, shown.width)]
     return "\n".join([*lines, *(f"note: {printable(note)}" for note in overview.notes)])
 
 

@@ -166,7 +166,7 @@ def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
 
 
 def _read(situation: Situation, run: Run) -> Markup:
-    listed = [*named(heading(situation)), *digests(run.files), *digests_of(situation.settings)]
+    listed = [*named(heading(situation, verbose=True)), *digests(run.files), *digests_of(situation.settings)]
     listed += [(f"{database.format} by", database.version) for database in run.databases if database.version]
     whole = "the files end after a complete state" if situation.history.complete else "only complete states were used"
     listed += [("complete", whole)]

@@ -193,7 +193,7 @@ def _of_plan(
 
     cards = [_window(row, found) for row in found.supported]
     cards = cards or [page.refused("No window of this run can be recommended.")]
-    yield page.front(cards, remarks(found.cautions), pairs(plan.outlook(found)))
+    yield page.front(cards, remarks(found.cautions), pairs([("plan", plan.sentence(found)), *plan.outlook(found)]))
     if explored:
         yield explorer(explored)
     caption = "Internal energy with the flights, and below it the rigid windows with their numbers"

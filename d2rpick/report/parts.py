@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.sets_of_parts import Parts, PartSet
     from d2rpick.choice.switchable_parts import PartRow
+    from d2rpick.report.formats import Shown
 
 # Columns of the sets, and of the parts in two tables: as many as a screen and a sheet hold side by side.
 SETS = ("set", "parts", "saved of a step", "tr", "td", "run time", "saved", "out of place", "turned [deg]")
@@ -21,7 +22,6 @@ TABLES = {
     "Parts": ("part", "title", "verdict", "flies", "deforms", "energy", "scatter", "why"),
     "Elements": ("part", "title", "elements", "formulation", "material", "mass", "cost", "step", "shares nodes with"),
 }
-_WIDTH = 110  # of a table, as screens hold side by side with other things
 
 _COUNTS: Final = maybe(each("integer"))
 _IN_FLIGHT: Final = row(
@@ -131,15 +131,15 @@ DOCUMENT: Final = Document(
 _MOST_SHOWN = 6
 
 
-def as_table(found: Parts) -> str:
+def as_table(found: Parts, shown: Shown) -> str:
     """What was read, a row per part in two tables, a row per set, and the set to take; markdown has all columns."""
     lines = heading(found)
     for names in TABLES.values():
         head, body = tables.known(*table(found, names))
         if body and {*head} - {"", "part", "title"}:
-            lines += ["", tables.as_text(head, body, _WIDTH)]
+            lines += ["", tables.as_text(head, body, shown.width)]
     if found.sets:
-        lines += ["", tables.as_text(*set_table(found, SETS), _WIDTH)]
+        lines += ["", tables.as_text(*set_table(found, SETS), shown.width)]
     return "\n".join([*lines, "", *tables.in_line(outlook(found), 11)])
 
 

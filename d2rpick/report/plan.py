@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.plan import Plan, Planned
     from d2rpick.choice.situation import Situation
+    from d2rpick.report.formats import Shown
 
 
 def _times(row: Planned, at: int) -> float | None:
@@ -75,16 +76,31 @@ DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in t
 ))  # fmt: skip
 
 
-def as_table(plan: Plan) -> str:
-    """What was read, a row per flight, what the supported windows save, and why others are not supported."""
-    shown = tables.as_text(*table(plan)) if plan.rows else "no flight"
-    named = [f"{name}  {printable(reason)}" for name, reason in reasons(plan)]
-    return "\n".join([heading(plan), "", shown, "", *tables.in_line(outlook(plan), 9), *named])
+# Columns that are left out first where the table would be too wide.
+_SPARE: Final = ("margin", "of record", "error", "run time", "out of place")
+
+
+def as_table(plan: Plan, shown: Shown) -> str:
+    """The plan in a sentence, what was read, a row per flight, what is saved, and why others are not supported."""
+    rows = tables.as_text(*table(plan), shown.width, _SPARE) if plan.rows else "no flight"
+    told = [(name, printable(text)) for name, text in (*outlook(plan), *reasons(plan))]
+    return "\n".join([sentence(plan), "", heading(plan), "", rows, "", *tables.in_line(told, 9)])
+
+
+def sentence(plan: Plan) -> str:
+    """What to do, in a sentence."""
+    new = plan.new_windows()
+    waiting = len(plan.new_windows(every=True)) - len(new)
+    more = f"{waiting} more windows" if waiting > 1 else "a second window" if len(new) == 1 else "another window"
+    spans = " and ".join(f"from {tr:.6g} to {td:.6g}" for tr, td in new)
+    found = f"make rigid {spans}, {plan.rigid_fraction:.0%} of the record" if new else "nothing to make rigid"
+    return f"{found}; {more} must wait" if waiting else found
 
 
 def as_markdown(plan: Plan) -> str:
     """The flights as a Markdown table, and below it what is saved, and why windows are not supported."""
-    return "\n\n".join([tables.as_markdown(*table(plan)), *tables.listed((*outlook(plan), *reasons(plan)))])
+    below = tables.listed((*outlook(plan), *reasons(plan)))
+    return "\n\n".join([tables.in_markdown(sentence(plan)), tables.as_markdown(*table(plan)), *below])
 
 
 def reasons(plan: Plan) -> list[tuple[str, str]]:
@@ -114,9 +130,8 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     """What the supported windows save, and what comes next; a name and a sentence each."""
     supported, waiting = plan.supported, [row for row in plan.rows if row.status == "re-plan"]
     if not supported:
-        return [("supported", "no window")]
-    count = "1 window" if len(supported) == 1 else f"{len(supported)} windows"
-    lines = [("supported", f"{count}, rigid for {plan.rigid_time:.6g}, {plan.rigid_fraction:.0%} of the record")]
+        return []
+    lines = []
     if plan.run_time_share is not None:
         lines.append(("run time", f"about {plan.run_time_share:.0%} of the reference's"))
     lines += [(f"flight {row.number}", given_up(row)) for row in supported if row.answer and row.answer.longer]

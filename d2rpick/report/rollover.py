@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.warnings import Caution
     from d2rpick.models.box_run import Outcome, Record
+    from d2rpick.report.formats import Shown
 
 # Of each run, in JSON and as columns.
 RUN: Final = row(*(Field(key, "number") for key in (
@@ -45,7 +46,7 @@ class Scan(NamedTuple):
     cautions: Sequence[Caution]
 
 
-def as_table(scan: Scan) -> str:
+def as_table(scan: Scan, shown: Shown) -> str:
     """What happened without switching, a row for each tr, and how good the tr is that the tool recommends."""
     reference, outcomes, answer, _ = scan
     td, recommended = answer.situation.td, _recommended(answer)
@@ -55,7 +56,7 @@ def as_table(scan: Scan) -> str:
         f"td     {td:.6g} s: energy of the box {_energy(reference, td):.6g} J",
         "units  s, J, m, rad/s; roll_error in degrees",
         "",
-        tables.as_text(("", *RUN.keys), rows),
+        tables.as_text(("", *RUN.keys), rows, shown.width),
     ]
     chosen = next((one for one in outcomes if one.tr == recommended), None)
     if not chosen:

@@ -38,14 +38,15 @@ def energy_name(history: History) -> str:
     return history.channel if len(parts) <= _NAMED else f"internal energy of {listing(parts, most=_NAMED)}"
 
 
-def heading(situation: Situation) -> list[str]:
-    """Lines above the table of a result: what was read, and what the choice rests on."""
-    flight = situation.flight
-    share = measure(situation.kinetic_share) + (" (estimate)" if situation.vibration.estimated else "")
+def heading(situation: Situation, *, verbose: bool = False) -> list[str]:
+    """Lines above the table of a result: what was read, and what the choice rests on, ``verbose``: why."""
+    flight, share, why = situation.flight, situation.kinetic_share, situation.vibration.unknown
+    known = "" if share is None else f", kinetic share {measure(share)}"
+    estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
         read_line(situation.history),
-        f"td       {situation.td:.6g}: energy {situation.energy_td:.6g}, kinetic share {share}",
-        f"basis    {_basis(situation)}",
+        f"td       {situation.td:.6g}: energy {situation.energy_td:.6g}{known}{estimate}",
+        f"basis    {_basis(situation)}{f': {why}' if verbose and why else ''}",
     ]
     if flight.start is None:
         lines.append("flight   unknown")
@@ -68,7 +69,7 @@ def _basis(situation: Situation) -> str:
     mode, parts = vibration.whole.mode, f"parts, signs of {', '.join(vibration.signed)}" if vibration.signed else ""
     parts = "swings of the energy, counted" if vibration.basis == "swings" else parts
     if not (mode and fit):
-        return f"{parts}; kinetic energy from the modes of each part" if parts else vibration.basis
+        return f"{parts}; kinetic energy from the modes of each part" if parts else _level_alone(situation)
     rates = ", ".join(f"{one.omega:.6g}" for one in mode.modes)
     facts = [f"omega {rates}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
@@ -79,6 +80,15 @@ def _basis(situation: Situation) -> str:
     oscillator = f"oscillator, {source}" if count == 1 else f"oscillator of {count} modes, {source}"
     front = f"{parts}; " if parts else ""
     return f"{front}{oscillator}: {', '.join(facts)}; tr and energies are refined on it"
+
+
+def _level_alone(situation: Situation) -> str:
+    """Say that no deformation is known, and where it is so, that several modes are why."""
+    if situation.at_rest:
+        return "energy: nothing vibrates"
+    fit = situation.evidence.fit
+    several = "several modes; " if fit and fit.mode and not fit.describes_record else ""
+    return f"energy level alone ({several}the sign is unknown)"
 
 
 def head(health: Health) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from d2rpick.choice.study import Study, StudyRow
+    from d2rpick.report.formats import Shown
 
 STATUS: Final = one_of("ok", "none", "unreadable", "out-of-range", "failed", "internal-error")
 _A_NUMBER, _NULL = {"type": "number"}, {"type": "null"}
@@ -88,9 +89,9 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Study) -> str:
+def as_table(answer: Study, shown: Shown) -> str:
     """One line per run, and below what they have in common."""
-    return "\n".join([tables.as_text(*table(answer)), "", *tables.in_line(outcome(answer))])
+    return "\n".join([tables.as_text(*table(answer), shown.width), "", *tables.in_line(outcome(answer))])
 
 
 def as_markdown(answer: Study) -> str:

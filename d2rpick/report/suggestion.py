@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.ranking import Quality
     from d2rpick.choice.suggest import AcceptableWindow, Pair, Suggestion
+    from d2rpick.report.formats import Shown
 
 # Windows of acceptable tr that a line names.
 _NAMED = 4
@@ -53,20 +54,39 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
 ))  # fmt: skip
 
 
-def as_table(answer: Suggestion, limit: int) -> str:
-    """The verdict, what it rests on, and the first ``limit`` candidates; the recommended row has a star."""
-    shown = tables.as_text(*table(answer, limit)) if answer.candidates else "no candidates"
-    lines = [*tables.in_line((*verdict(answer), *outlook(answer))), "", *heading(answer.situation), "", shown]
-    left = len(answer.candidates) - limit
-    if left > 0:
-        lines.append(f"... and {left} more (--limit)")
+# Columns that are left out first where a table would be too wide, and those that only a close look asks for.
+_SPARE: Final = ("tolerance", "+-", "kind", "E(tr)/E(td)", "rank")
+_IN_FULL: Final = ("kind", "L", "R")
+
+
+def as_table(answer: Suggestion, shown: Shown) -> str:
+    """The verdict, what it rests on, and the first candidates; the recommended row has a star.
+
+    Where nothing is recommended the candidates stand there only if all is asked for.
+    """
+    lines = [
+        *tables.in_line((*verdict(answer), *outlook(answer))),
+        "",
+        *heading(answer.situation, verbose=shown.verbose),
+    ]
+    if answer.candidates and (answer.recommended or shown.verbose):
+        lines += ["", tables.as_text(*_some(answer, shown), shown.width, _SPARE)]
+        left = len(answer.candidates) - shown.limit
+        lines += [f"... and {left} more (--limit)"] * (left > 0)
     return "\n".join(lines)
 
 
-def as_markdown(answer: Suggestion, limit: int) -> str:
+def as_markdown(answer: Suggestion, shown: Shown) -> str:
     """The candidates as a Markdown table, and the verdict below it."""
     said = tables.listed((*verdict(answer), *outlook(answer)))
-    return "\n\n".join([tables.as_markdown(*table(answer, limit)), *said])
+    return "\n\n".join([tables.as_markdown(*_some(answer, shown)), *said])
+
+
+def _some(answer: Suggestion, shown: Shown) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Give the first candidates, in the columns that hold something."""
+    head, rows = tables.known(*table(answer, shown.limit))
+    kept = [i for i, name in enumerate(head) if shown.verbose or name not in _IN_FULL]
+    return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
 
 
 def as_csv(answer: Suggestion) -> str:
@@ -77,15 +97,16 @@ def as_csv(answer: Suggestion) -> str:
 
 
 def headline(answer: Suggestion) -> str:
-    """What the pair is called: a poor one is not recommended, it is the best that its td has."""
-    return "best of a bad td" if answer.quality and answer.quality.grade == "poor" else "recommended"
+    """What the pair is called: a poor one of a td that was asked for is not recommended, it is the best it has."""
+    bad = answer.td_window is None and answer.quality and answer.quality.grade == "poor"
+    return "best of a bad td" if bad else "recommended"
 
 
 def verdict(answer: Suggestion) -> list[tuple[str, str]]:
     """What to paste, what it saves, what it costs, and how sure that is; a name and a sentence each."""
     best, quality, better = answer.chosen, answer.quality, answer.clearly_better
     if best is None or quality is None:
-        found = [("recommended", "none")]
+        found = [("recommended", f"none: {answer.why_none}")]
     else:
         found = [
             (headline(answer), _pair(answer.recommended)),
@@ -145,9 +166,6 @@ def outlook(answer: Suggestion) -> list[tuple[str, str]]:
         lines.append(("position", position(best, deck=answer.situation.settings.bodies is not None)))
     if answer.longer and answer.recommended:
         lines.append(("longer", given_up(answer.longer, answer.recommended)))
-    expected = answer.expected
-    if expected and expected.ratio is None and not expected.above_the_reference:
-        lines.append(("mean after", f"about {expected.ratio_at_level:.0%} of the reference's with the energy of td"))
     return lines
 
 

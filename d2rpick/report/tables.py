@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
+# Columns of text that are read at a glance; a terminal may have fewer.
+WIDEST: Final = 100
 # A longer word, as a title without blanks or a list of parts, is broken where a table would be too wide.
 _WORD: Final = 32
 
@@ -95,10 +97,11 @@ def listed(said: Iterable[tuple[str, str]]) -> list[str]:
     return [f"{name}: {in_markdown(text)}" for name, text in said]
 
 
-def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]], width: int | None = None) -> str:
+def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]], width: int = WIDEST, spare: Iterable[str] = ()) -> str:
     """Columns in line, numbers to the right of their column, two blanks between.
 
-    Where it would be wider than ``width``, words of the widest columns go on in further lines.
+    Where it would be wider than ``width``, columns of ``spare`` are left out, the first of them first, and then words
+    of the widest columns go on in further lines.
 
     Examples
     --------
@@ -113,16 +116,42 @@ def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]], width: int | No
           energy
     """
     body = list(rows)
-    texts = [[short(name) for name in head], *([short(cell) for cell in row] for row in body)]
-    widths = [max(len(row[i]) for row in texts) for i in range(len(head))]
-    right = [all(row[i] is None or isinstance(row[i], (int, float)) for row in body) for i in range(len(head))]
-    if width is not None:
-        widths = _narrowed(texts, widths, width)
-        texts = [line for row in texts for line in _broken(row, widths)]
+    columns = {name: [row[i] for row in body] for i, name in enumerate(head)}
+    texts = {name: [short(name), *map(short, cells)] for name, cells in columns.items()}
+    widths = {name: max(map(len, column)) for name, column in texts.items()}
+    for name in spare:
+        if name in widths and sum(min(_WORD, w) + 2 for w in widths.values()) - 2 > width:
+            del widths[name], texts[name]
+    right = [all(cell is None or isinstance(cell, (int, float)) for cell in columns[name]) for name in texts]
+    narrow = _narrowed([*zip(*texts.values(), strict=True)], [*widths.values()], width)
     lines = (
-        "  ".join(t.rjust(w) if r else t.ljust(w) for t, w, r in zip(row, widths, right, strict=True)) for row in texts
+        "  ".join(t.rjust(w) if r else t.ljust(w) for t, w, r in zip(line, narrow, right, strict=True))
+        for row in zip(*texts.values(), strict=True)
+        for line in _broken(row, narrow)
     )
     return "\n".join(line.rstrip() for line in lines)
+
+
+def wrapped(text: str, width: int) -> str:
+    r"""Break the lines of a text that are longer than ``width``; they go on below what follows a name.
+
+    Examples
+    --------
+    >>> print(wrapped("quality  fair: the sign is unknown\nbasis    energy", 24))
+    quality  fair: the sign
+             is unknown
+    basis    energy
+    """
+    return "\n".join(line if len(line) <= width else _below(line, width) for line in text.split("\n"))
+
+
+def _below(line: str, width: int) -> str:
+    """Break a line behind the blanks that follow its name, or those that it begins with."""
+    from textwrap import fill
+
+    name = re.match(r"\s*(?:\S+ )*?\S+  +(?=\S)|\s*", line)
+    indent = len(name[0]) if name and len(name[0]) <= width // 2 else 2
+    return fill(line, width, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False)
 
 
 def _narrowed(texts: Sequence[Sequence[str]], widths: Sequence[int], width: int) -> list[int]:

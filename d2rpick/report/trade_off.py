@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from d2rpick.choice.trade_off import Offer, TradeOff
+    from d2rpick.report.formats import Shown
 
 OFFER: Final = row(
     Field("td", "number"),
@@ -68,20 +69,25 @@ _NO_CHANGE: Final = 5e-4
 _HALF: Final = (0.45, 0.5)
 
 
-def as_table(found: TradeOff, limit: int) -> str:
-    """What was read, some ``limit`` of the offers that nothing beats, and the answer in a sentence."""
-    shown = some_of(found, limit)
-    offered = tables.as_text(*table(shown)) if shown else "nothing to offer"
+# Columns that are left out first where the table would be too wide.
+_SPARE: Final = ("tolerance", "level error", "of record", "peak", "K")
+
+
+def as_table(found: TradeOff, shown: Shown) -> str:
+    """What was read, some of the offers that nothing beats, and the answer in a sentence."""
+    some = some_of(found, shown.limit)
+    offered = tables.as_text(*tables.known(*table(some)), shown.width, _SPARE) if some else "nothing to offer"
     lines = [read_line(found.situation.history), *_heading(found), "", offered]
-    left = len(found.offers) - len(shown)
+    left = len(found.offers) - len(some)
     if left:
         lines.append(f"... and {left} more td (--limit; csv and json have all)")
     return "\n".join([*lines, "", printable(answer(found))])
 
 
-def as_markdown(found: TradeOff, limit: int) -> str:
+def as_markdown(found: TradeOff, shown: Shown) -> str:
     """The same offers as a Markdown table, and the answer below it."""
-    return "\n\n".join([tables.as_markdown(*table(some_of(found, limit))), tables.in_markdown(answer(found))])
+    some = tables.known(*table(some_of(found, shown.limit)))
+    return "\n\n".join([tables.as_markdown(*some), tables.in_markdown(answer(found))])
 
 
 def as_csv(found: TradeOff) -> str:

@@ -12,6 +12,7 @@ from d2rpick.report.situation import heading
 if TYPE_CHECKING:
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.verify import Verdict
+    from d2rpick.report.formats import Shown
 
 # The pair that was judged, its measures and what they come to.
 MEASURES: Final = row(
@@ -53,14 +54,14 @@ DOCUMENT: Final = Document("d2rpick/verify/1", "Answer of d2rpick verify; times 
 COMPARED = ("", "switched", "reference")
 
 
-def as_table(answer: Verdict) -> str:
+def as_table(answer: Verdict, shown: Shown) -> str:
     """The verdict and its reasons, what it rests on, and the measures of the pair."""
-    lines = tables.in_line(MEASURES.plain(answer).items())
+    lines = tables.in_line((name, value) for name, value in MEASURES.plain(answer).items() if value is not None)
     reasons = [f"  {printable(reason)}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
     told = [f"verdict  {_told(answer)}", *([f"quality  {answer.quality.told}"] if answer.quality else [])]
-    return "\n".join([*told, *reasons, "", *heading(answer.situation), "", *lines])
+    return "\n".join([*told, *reasons, "", *heading(answer.situation, verbose=shown.verbose), "", *lines])
 
 
 def as_markdown(answer: Verdict) -> str:

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 # What verify warns of and no rule reports.
 _KEPT: Final = (
     "truncated-input",
-    "energy-only",
     "no-free-flight",
     "flight-from-energy",
     "flight-sources-disagree",

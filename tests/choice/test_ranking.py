@@ -27,6 +27,7 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
+from d2rpick.report.formats import Shown
 from d2rpick.report.suggestion import as_table
 from d2rpick.vibration.span import Fits
 from tests import paper
@@ -280,8 +281,8 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
         assert (sure(best.tr_high) - best.tr > 4 * sure(best.timing_tolerance)) is (wanted == "fair")
         verdict = verify(history, best.tr, answer.situation.td, Settings()).quality
         assert verdict == quality
-    assert "further mode" not in as_table(early, 1)
-    assert "up to 46% if the record hides a further mode" in as_table(late, 1)
+    assert "further mode" not in as_table(early, Shown())
+    assert "up to 46% if the record hides a further mode" in as_table(late, Shown())
 
 
 def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:

@@ -17,7 +17,7 @@ from d2rpick.histories.opening import Selection
 from d2rpick.vibration.oscillator import to_mode
 from d2rpick.vibration.span import Fits
 from tests import chain, paper
-from tests.energies import codes, of, rollover
+from tests.energies import of, rollover, sure
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History
@@ -74,7 +74,8 @@ def test_a_given_oscillator_that_does_not_fit_is_not_believed() -> None:
     wrong = to_mode(replace(paper.OSCILLATOR, stiffness=500e3), 6.0)
     answer = suggest(paper.history(), paper.TD, Settings(oscillator=wrong))
     assert answer.situation.basis == "energy"
-    assert "energy-only" in codes(answer)
+    assert "the given oscillator does not describe the record" in sure(answer.situation.vibration.unknown)
+    assert "the oscillator that was asked for does not describe the record at td" in answer.why_none
 
 
 def test_two_states_are_too_few_and_td_must_lie_in_the_record() -> None:

@@ -45,7 +45,7 @@ def test_the_rollover_is_switched_after_the_trip() -> None:
     answer = suggest(rollover(), 0.37, PLAIN)
     assert answer.situation.basis == "energy"
     assert 0.0908 <= sure(answer.recommended).tr <= 0.185
-    assert {"energy-only", "flight-from-energy"} <= codes(answer)
+    assert "flight-from-energy" in codes(answer)
     for c in answer.candidates:
         assert (c.sign_match, c.lock_in_error, c.residual, c.timing_tolerance) == (None, None, None, None)
         assert any("no single oscillator" in note for note in c.notes)

@@ -140,6 +140,6 @@ def test_the_basis_is_that_of_the_recommended_pair() -> None:
     """The first td of the flight has a single state before it, which is no reason why a basis is refused."""
     reference = read(["sample_data/rollover_box.matsum"], Selection(parts=("box",)))
     found = explore_of(reference, Settings(), steps=20)
-    refused = [[one for one in of.cautions if one.code == "energy-only"] for of in (found, found.suggestion)]
+    refused = [of.situation.vibration.unknown for of in (found, found.suggestion)]
     assert refused[0] == refused[1]
-    assert len(refused[0]) == 1
+    assert refused[0]

@@ -193,7 +193,6 @@ def test_suggest_prints_the_card_of_its_pair() -> None:
     assert td == 0.37
     assert f"--part {part} " not in result.stdout
     assert "verified" in comments(result.stdout)
-    assert result.stderr.count("energy-only") == 1
 
 
 def test_the_card_is_that_of_the_solver_that_wrote_the_history() -> None:

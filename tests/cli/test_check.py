@@ -14,7 +14,7 @@ import pytest
 
 from d2rpick.rules import RULES
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
-from tests.command import BOX, DECK, ENERGY, GLSTAT, answer, run
+from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, answer, run
 from tests.json_schemas import check_by_schema
 from tests.report.test_findings import junit_is_valid, sarif_is_valid
 
@@ -420,9 +420,10 @@ def test_parts_with_windows_of_their_own_are_judged_apart() -> None:
 
 def test_what_verify_warns_of_is_told_for_each_part() -> None:
     box = next(part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box")
-    found = answer("check", place("main.k", deck_of(0.15, 0.37, box)), "--history", BOX)
-    (told,) = (w["message"] for w in found["warnings"] if w["code"] == "energy-only")
-    assert told.startswith(f"part {box}: no single oscillator")
+    cut = place("cut.matsum", Path(MATSUM).read_text()[:-40])
+    found = answer("check", place("main.k", deck_of(0.15, 0.37, box)), "--history", cut)
+    (told,) = (w["message"] for w in found["warnings"] if w["code"] == "truncated-input")
+    assert told.startswith(f"part {box}: the input ends within a state")
 
 
 def test_a_part_that_the_history_does_not_have_is_not_passed() -> None:

@@ -25,7 +25,7 @@ from hypothesis import strategies as st
 
 from d2rpick import __version__
 from d2rpick.cli import output
-from tests.command import DECK, ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, run, started
+from tests.command import DECK, ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, ROOT, answer, run, started
 from tests.json_schemas import check_by_schema
 
 if TYPE_CHECKING:
@@ -115,14 +115,15 @@ def test_markdown_begins_with_a_table(args: tuple[str, ...]) -> None:
 
 def test_the_table_names_what_it_rests_on_and_marks_the_recommended_row() -> None:
     lines = run(*SUGGEST, ENERGY).stdout.splitlines()
-    assert lines[:5] == [
+    assert lines[:6] == [
         "best of a bad td  tr = 0.0128853, td = 0.064, residual 0.957",
         "saves             rigid for 34% of the record, 0.0511147",
         "keeps             8% of the vibration energy; the vibration after td is off by 95.7%",
-        "quality           poor: the vibration after td is off by 96%; tr is known to ±1e-07 and may be off by 5e-05",
+        "quality           poor: the vibration after td is off by 96%; tr is known to ±1e-07 and may be off",
+        "                  by 5e-05",
         "better pair       tr = 0.0135867, td = 0.0687534: residual 0.000 instead of 0.957",
     ]
-    assert lines[6].startswith(f"history  {ENERGY}: csv, internal_energy, 1501 states")
+    assert lines[7].startswith(f"history  {ENERGY}: csv, internal_energy, 1501 states")
     assert [line.split()[2] for line in lines if line.startswith("*")] == ["0.0128853"]
     assert next(line for line in lines if line.startswith("*")).endswith("best of a bad td")
 
@@ -463,3 +464,55 @@ def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyP
     count.tell(3)
     count.tell(5)
     assert count.told(60) == "5 of 9 runs, 2:00 left"
+
+
+# Widths.
+
+
+@pytest.mark.parametrize("columns", [80, 100, 500])
+@pytest.mark.parametrize(
+    "args",
+    [
+        (*SUGGEST, ENERGY),
+        ("suggest", "-v", "--td", "0.37", "--energy", "boxIE_J", "--no-verify", ROLLOVER),
+        ("explore", "--td-window", "0.06", "0.07", "--steps", "5", "--no-verify", ENERGY),
+        ("plan", "--no-verify", "--energy", "boxIE_J", ROLLOVER),
+        (*VERIFY, "--no-verify", ENERGY),
+        ("info", ENERGY),
+    ],
+)
+def test_nothing_on_stdout_is_wider_than_the_terminal(args: tuple[str, ...], columns: int) -> None:
+    result = run(*args, env={"COLUMNS": str(columns)})
+    assert max(map(len, result.stdout.replace(str(ROOT), "").splitlines())) <= min(columns, 100)
+    if columns == 80:
+        assert max(map(len, result.stderr.splitlines()), default=0) <= 80
+
+
+def test_columns_without_a_value_are_left_out_and_three_rows_are_shown() -> None:
+    args = ("suggest", "--td", "0.37", "--energy", "boxIE_J", "--no-verify", ROLLOVER)
+    brief, full = run(*args, "-q").stdout, run(*args, "-q", "-v").stdout
+    assert sum(line[6:7].isdigit() for line in brief.splitlines()) == 3
+    assert not re.search(r"  -( |$)", brief)
+    assert "crossing" not in brief
+    assert "crossing" in full
+    assert "basis    energy level alone (the sign is unknown)\n" in brief
+    assert "(the sign is unknown): identification was switched off" in full
+
+
+def test_a_td_at_the_landing_is_answered_by_its_reason_and_the_pair_before_it() -> None:
+    result = run("suggest", "--td", "0.38", "--part", "box", MATSUM)
+    assert result.exit_code == 1
+    first, second, *_ = result.stdout.split("\n")
+    assert first == "recommended  none: td = 0.38: td after the end of the flight at 0.379"
+    assert second.startswith("better pair  tr = 0.0970304, td = 0.37")
+    assert "verdict" not in result.stdout
+    assert "no-candidate" not in result.stderr
+    assert "no-candidate" in run("suggest", "--td", "0.38", "--part", "box", MATSUM, "-f", "value").stderr
+
+
+def test_the_best_of_a_bad_td_is_said_of_a_td_that_was_asked_for() -> None:
+    poor = ("--max-residual", "2", ENERGY)
+    assert run(*SUGGEST, *poor).stdout.startswith("best of a bad td")
+    chosen = run("suggest", "--td-window", "0.063", "0.065", *poor).stdout
+    assert chosen.startswith("recommended  tr")
+    assert "quality      poor" in chosen

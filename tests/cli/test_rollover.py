@@ -129,7 +129,7 @@ def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
     result = run(*asked, "-f", "markdown")
     assert result.stdout.startswith("| tr |")
     told = {line.split(": ")[1] for line in result.stderr.splitlines()}
-    assert told >= {"energy-only", "no-free-flight"}
+    assert "no-free-flight" in told
     assert codes(answer(*asked)) == told
 
 

@@ -1,11 +1,11 @@
-"""A table that is narrowed loses no word, and is as wide as asked for wherever its words allow that."""
+"""What is narrowed loses no word but columns that may be left out, and is as wide as asked for where words allow it."""
 
 from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.report.tables import as_text
+from d2rpick.report.tables import Cell, as_text, wrapped
 
 WORDS = st.lists(st.text("abc-1", min_size=1, max_size=9), max_size=6).map(" ".join)
 
@@ -22,3 +22,19 @@ def test_a_narrow_table_keeps_every_word_below_its_name(rows: list[list[str]]) -
     for column, start, end in zip(zip(head, *rows, strict=True), starts, starts[1:], strict=False):
         shown = " ".join(line[start:end] for line in narrow).split()
         assert shown == " ".join(column).split()
+
+
+@given(st.integers(20, 60), st.lists(WORDS, min_size=1, max_size=4).map("  ".join))
+def test_wrapped_text_loses_no_word_and_no_line_is_longer_than_it_may_be(width: int, text: str) -> None:
+    lines = wrapped(text, width).split("\n")
+    assert " ".join(lines).split() == text.split()
+    assert max(map(len, lines)) <= width
+    assert text.count("\n") or len(text) > width or lines == [text]
+
+
+@given(st.integers(1, 80))
+def test_spare_columns_are_left_out_in_their_order_and_only_where_room_is_short(width: int) -> None:
+    head = ["tr", "tolerance", "verdict", "+-"]
+    row: list[Cell] = [0.123456, "1.0e-04", "acceptable", "2.0e-05"]
+    names = as_text(head, [row], width, ("+-", "tolerance")).split("\n")[0].split()
+    assert names == (head if width >= 40 else head[:3] if width >= 31 else ["tr", "verdict"])
