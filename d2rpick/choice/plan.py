@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice.flights import Margin, bounds, flights_of, last_td, margin_before_contact
+from d2rpick.choice.flights import bounds, flights_of, last_td
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import Reference, check_units, suggest_of
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
 from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
 from d2rpick.flight.internal_energy import round_off
+from d2rpick.flight.margin import Margin, margin_before_contact
 from d2rpick.vibration.measures import run_time_share
 from d2rpick.vibration.span import Fits
 

@@ -15,6 +15,7 @@ import numpy as np
 from d2rpick.base.errors import RangeError
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.internal_energy import round_off
+from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.histories.samples import window
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, identify_several, judge_given
@@ -41,7 +42,7 @@ class Settings:
 
     ``after``: the load ends here, ``landing``: the next contact comes here (None: found from the record).  ``margin``:
     kept clear after the load and before the next contact (None: nothing, but where td is chosen or the landing given
-    what `d2rpick.choice.flights` derives before the contact).
+    what `d2rpick.flight.margin` derives before the contact).
     ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
     given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
@@ -166,8 +167,6 @@ class Situation:
     def margin(self) -> float:
         """Time kept clear before the next contact [time]: none where td was given, unless it or the landing was."""
         if self.settings.margin is None and self.settings.landing is not None:
-            from d2rpick.choice.flights import margin_before_contact  # flights are found in situations
-
             return margin_before_contact(self.history, self.flight).time
         return self.settings.margin or 0.0
 

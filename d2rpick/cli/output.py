@@ -223,11 +223,13 @@ def _meant(name: str) -> str | None:
 
 def columns_of(stream: TextIO) -> int | None:
     """Columns of the terminal that a stream writes to, as many as are read at a glance; None where there is none."""
-    if not (stream.isatty() or os.environ.get("COLUMNS")):
+    given = os.environ.get("COLUMNS", "")
+    if given.isdecimal():
+        return max(_NARROWEST, min(WIDEST, int(given)))
+    try:
+        return max(_NARROWEST, min(WIDEST, os.get_terminal_size(stream.fileno()).columns))
+    except OSError:
         return None
-    import shutil
-
-    return max(_NARROWEST, min(WIDEST, shutil.get_terminal_size().columns))
 
 
 def tell(message: str) -> None:
