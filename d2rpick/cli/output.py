@@ -15,7 +15,6 @@ import click
 from d2rpick.api.request import OPTIONS, dashed, option
 from d2rpick.base.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
 from d2rpick.base.files import write_whole
-from d2rpick.report.tables import WIDEST, wrapped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -224,12 +223,13 @@ def _meant(name: str) -> str | None:
 def columns_of(stream: TextIO) -> int | None:
     """Columns of the terminal that a stream writes to, as many as are read at a glance; None where there is none."""
     given = os.environ.get("COLUMNS", "")
-    if given.isdecimal():
-        return max(_NARROWEST, min(WIDEST, int(given)))
     try:
-        return max(_NARROWEST, min(WIDEST, os.get_terminal_size(stream.fileno()).columns))
+        columns = int(given) if given.isdecimal() else os.get_terminal_size(stream.fileno()).columns
     except OSError:
         return None
+    from d2rpick.report.tables import WIDEST  # not above: --help does without it
+
+    return max(_NARROWEST, min(WIDEST, columns))
 
 
 def tell(message: str) -> None:
@@ -238,7 +238,11 @@ def tell(message: str) -> None:
     It is one line, on a terminal broken where that ends.
     """
     text, width = printable(with_options(message)), columns_of(sys.stderr)
-    click.echo(wrapped(text, width) if width else text, err=True)
+    if width:
+        from d2rpick.report.tables import wrapped  # not above: --help does without it
+
+        text = wrapped(text, width)
+    click.echo(text, err=True)
 
 
 def explained(error: BaseException, inputs: Sequence[str] = ()) -> str:
