@@ -108,7 +108,11 @@ class Output:
 
     def answer(self, answer: Answer, below: str = "", **shown: Any) -> None:
         """Give out an answer in the form that is asked for."""
-        text = in_words(answer.text(self.output_format, self.shown(**shown)), self.output_format)
+        text = in_words(answer.text(self.output_format, now := self.shown(**shown)), self.output_format)
+        if self.output_format == "table":
+            from d2rpick.report.tables import wrapped  # not above: --help does without it
+
+            text = wrapped(text, now.width)
         self.result(f"{text}\n\n{below}" if below else text)
 
     def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
@@ -227,7 +231,7 @@ def columns_of(stream: TextIO) -> int | None:
         columns = int(given) if given.isdecimal() else os.get_terminal_size(stream.fileno()).columns
     except OSError:
         return None
-    from d2rpick.report.tables import WIDEST  # not above: --help does without it
+    from d2rpick.report.formats import WIDEST
 
     return max(_NARROWEST, min(WIDEST, columns))
 

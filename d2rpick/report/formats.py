@@ -8,12 +8,14 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from d2rpick.report.tables import WIDEST, wrapped
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     Writer = Callable[[Any, Any, "Shown"], str]
+
+
+# Columns of text that are read at a glance; a terminal may have fewer.
+WIDEST: Final = 100
 
 
 class Shown(NamedTuple):
@@ -32,7 +34,7 @@ class Shown(NamedTuple):
 
 
 PLAIN: Final[Mapping[str, Writer]] = {
-    "table": lambda report, answer, shown: wrapped(report.as_table(answer, shown), shown.width),
+    "table": lambda report, answer, shown: report.as_table(answer, shown),
     "json": lambda report, answer, shown: report.DOCUMENT.as_json(answer, shown.command),
     "csv": lambda report, answer, _: report.as_csv(answer),
     "markdown": lambda report, answer, _: report.as_markdown(answer),

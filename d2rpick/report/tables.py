@@ -8,6 +8,7 @@ from operator import gt
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import UNSEEN, printable
+from d2rpick.report.formats import WIDEST
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
-# Columns of text that are read at a glance; a terminal may have fewer.
-WIDEST: Final = 100
 # A longer word, as a title without blanks or a list of parts, is broken where a table would be too wide.
 _WORD: Final = 32
 
