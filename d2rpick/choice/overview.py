@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, RangeError, if_written
+from d2rpick.base.errors import FormatError, RangeError, if_written, listing
 from d2rpick.choice.flights import bounds, flights_of
 from d2rpick.choice.health import Health, assess, cautions_of_health, refuse_unsound, unsound
+from d2rpick.choice.of_run import Reference
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.warnings import cautions_of_engine
+from d2rpick.choice.switched_run import by_the_model, rigid_times
+from d2rpick.choice.warnings import Caution, cautions_of_engine
 from d2rpick.flight.momentum import with_parts_by_number
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance import balance_of
 from d2rpick.histories.companions import doubts
+from d2rpick.histories.history import rows_of
 from d2rpick.histories.names import select_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.choice.warnings import Caution
+    from d2rpick.choice.switched_run import Times
     from d2rpick.histories.database import Legs
     from d2rpick.histories.history import History
     from d2rpick.histories.names import Part, Selection
@@ -107,7 +110,8 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         notes.append(str(error))
     steps = np.diff(time)
     history = _history(run, selection)
-    flights = _flights(history) if history else ()
+    rigid = rigid_times(Reference(run, history)) if history else ()
+    flights = _flights(by_the_model(history) if rigid else history) if history else ()
     return Overview(
         source=run.sources,
         format=" + ".join(database.format for database in run.databases),
@@ -123,9 +127,9 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         parts=tuple(_overviews(run)),
         flights=flights,
         should_write=None if any(one.parts for one in run.momenta(None, None)) else _missing(run),
-        health=_health(run, [flight for _, flight in flights]),
+        health=_health(run, [flight for _, flight in flights], rigid),
         notes=tuple(dict.fromkeys(notes)),
-        alarms=(*(unsound(history) if history else ()), *told),
+        alarms=(*(unsound(history) if history else ()), *_of_rigid_legs(rigid), *told),
     )
 
 
@@ -172,10 +176,22 @@ def _highest(run: Run, part: Part) -> float | None:
     return if_written(lambda: float(run.part_energies([part]).max()))
 
 
-def _health(run: Run, flights: Sequence[FreeFlight]) -> Health | None:
+def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
+    if rigid:
+        when = listing([f"{start:.6g} to {end:.6g}" for start, end in rigid])
+        told = "what is written of parts, and the internal energy, means nothing there and was left out of the health"
+        yield Caution("rigid-legs", f"parts are rigid from {when}: {told}")
+
+
+def _health(run: Run, flights: Sequence[FreeFlight], rigid: Sequence[Times]) -> Health | None:
     balance = balance_of(run.databases, run.parts)
     if balance is None:
         return None
+    if rigid:
+        states = ~np.any([(balance.time >= start) & (balance.time <= end) for start, end in rigid], axis=0)
+        if not states.any():
+            return Health(reason="its legs are rigid: energies mean nothing there", until=float(balance.time[-1]))
+        return assess(replace(rows_of(balance, states), hourglass_of_parts=()), until=float(balance.time[-1]))
     longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)
     return assess(balance, (longest.start, longest.end) if longest else None, until=float(balance.time[-1]))
 

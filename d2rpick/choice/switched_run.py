@@ -11,6 +11,7 @@ from d2rpick.base.errors import RangeError, if_written, listing
 from d2rpick.choice.comparison import FEWEST, rigid_parts, with_energy
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.internal_energy import round_off
+from d2rpick.flight.momentum import believed
 from d2rpick.histories.history import Given
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 # Evidence that tells the start of a flight to some states; the energy alone gives time away there.
 _SHARP: Final = ("momentum", "contact-energy", "energy-balance")
+# Parts that have no more of the momentum of a model than this share are not what moves in it.
+_HARDLY: Final = 0.1
 # A flight that begins so many output intervals after tr has begun with the window: its start is known no better.
 _SAME_STATES: Final = 3
 
@@ -120,11 +123,34 @@ def switched_history(
     new = [one for one in absent if not any(tr < one.end and one.start < td for tr, td in done)]
     cautions += [one.caution for one in new]
     more = tuple((one.start, one.end) for one in new if one.whole)
-    if absent:
-        # energies of solids are garbage while they are rigid: nothing but the momentum is asked whether the model flies
-        whole = tuple(replace(one, flying=one.chosen) for one in history.momenta if one.parts is None)
-        history = replace(history, evidence=Given(whole, history.balance))
-    return history, tuple(sorted((*done, *more))), tuple(cautions)
+    return by_the_model(history) if absent else history, tuple(sorted((*done, *more))), tuple(cautions)
+
+
+def by_the_model(history: History) -> History:
+    """Give a history without momenta of parts, of which rigid bodies have taken some.
+
+    Energies of solids are garbage while they are rigid: nothing but the momentum is asked whether the model flies.
+    """
+    whole = tuple(replace(one, flying=one.chosen) for one in history.momenta if one.parts is None)
+    return replace(history, evidence=Given(whole, history.balance))
+
+
+def rigid_times(reference: Reference) -> tuple[Times, ...]:
+    """Give the times in which parts are rigid, as far as their own quantities show it [time].
+
+    In a record of a rigid leg alone the parts that have energy have no mass, or none moves although the model does.
+    """
+    found = tuple((one.start, one.end) for one in _absent_times(reference))
+    history, run = reference.history, reference.run
+    of_parts = next((one for one in history.momenta if one.parts is not None), None)
+    whole = next((one for one in history.momenta if one.parts is None and not one.velocity), None)
+    if found or of_parts is None or whole is None or of_parts.masses is None or believed(of_parts, whole):
+        return found
+    energies = if_written(lambda: np.abs(run.part_energies(run.parts)).max(axis=0))
+    void = energies is not None and bool(((of_parts.masses == 0) & (energies > 0)).any())
+    moved = float(np.abs(of_parts.values.sum(axis=1)).max())
+    rigid = void or moved < _HARDLY * float(np.abs(whole.values).max())
+    return ((float(history.time[0]), float(history.time[-1])),) if rigid else ()
 
 
 def done_windows(

@@ -44,8 +44,8 @@ Examples:
 )  # fmt: skip
 @options.file(
     "--done",
-    "Windows in which HISTORY was switched, a line 'tr td' for each: plan those after.  -f value, -f card and "
-    "--write-deck hold both, as the next run needs them.",
+    "Windows in which HISTORY was switched, a line 'tr td' for each, or a journal: plan those after.  -f value, "
+    "-f card and --write-deck hold both, as the next run needs them.",
 )
 @options.files(
     "--before",

@@ -162,7 +162,7 @@ def check_ids(ids: Sequence[int], digits: int = WIDTH) -> list[int]:
 
 
 def read_windows(text: str, source: str) -> tuple[Times, ...]:
-    """Read windows as ``d2rpick plan -f value`` prints them: a line ``tr td`` for each.
+    """Read windows as ``d2rpick plan -f value`` prints them: a line ``tr td`` for each; or the journal of a driven run.
 
     Empty lines and those that begin with ``#`` are passed over.
 
@@ -171,7 +171,10 @@ def read_windows(text: str, source: str) -> tuple[Times, ...]:
     DeckError
         For any other line, with its number, and when there is no window at all.
     """
-    windows = []
+    windows: list[Times] = []
+    if text.lstrip().startswith("{"):
+        windows = _of_journal(text)
+        text = ""
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.split()
         if not words or words[0].startswith("#"):
@@ -184,3 +187,23 @@ def read_windows(text: str, source: str) -> tuple[Times, ...]:
     if not windows:
         raise DeckError(f"{source}: no window was found, a line 'tr td' for each was expected")
     return tuple(windows)
+
+
+def _of_journal(text: str) -> list[Times]:
+    """Windows of the rigid legs that ended; one that goes on from a restart belongs to the leg before it."""
+    import json  # not above: start-up
+
+    windows: list[Times] = []
+    for line in text.splitlines():
+        try:
+            record = json.loads(line)
+            if record["event"] != "ended" or record["order"][0] != "rigid":
+                continue
+            start, until, reached = (float(one) for one in (*record["order"][2:4], record["seen"][0]))
+        except (ValueError, KeyError, TypeError, IndexError):
+            continue  # cut, or of another kind
+        again = bool(windows) and start <= windows[-1][1]
+        windows[-1 if again else len(windows) :] = [
+            (windows[-1][0] if again else start, reached if record["cut"] else until)
+        ]
+    return windows

@@ -19,6 +19,8 @@ from d2rpick.histories.samples import bent, window
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from numpy.typing import NDArray
+
     from d2rpick.histories.history import Balance, Momenta, Samples
     from d2rpick.histories.names import Part, Selection
     from d2rpick.histories.run import Run
@@ -36,6 +38,8 @@ _LONGER = 1.1
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
 # What moves no faster than at this share of its largest momentum stands, or is held, unless it goes on as it does.
 _HELD = 0.01
+# Momenta of parts are those of the model within this share of it, or a rigid body has taken some of them.
+_ALL_OF_IT: Final = 1e-2
 # A body of its own flies by itself for this share of the record, at a velocity that differs by this from that of all.
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
@@ -345,3 +349,27 @@ def asks_for_recommended(parts: Sequence[str], run: Run) -> bool:
     """Whether the parts hold the word "recommended", and no part of the run has it for its title."""
     titles = {part.title.strip().casefold() for part in run.parts}
     return RECOMMENDED in {text.strip().casefold() for text in parts} - titles
+
+
+def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:
+    """Give the states in which the momenta of parts are those of the ``whole`` model, by stretches.
+
+    In the others a rigid body has taken some of them: then no quantity of a part is believed.
+    """
+    return stretches(complete(momenta, whole))
+
+
+def complete(momenta: Momenta, whole: Momenta | None) -> NDArray[np.bool_]:
+    """Whether the momenta of parts (n,) are together those of the whole model."""
+    if whole is None or whole.velocity or whole.time.size != momenta.time.size:
+        return np.ones(momenta.time.size, np.bool_)
+    everything = range(momenta.values.shape[1])
+    largest = np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1))
+    off = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
+    return np.asarray(off <= _ALL_OF_IT * largest + 2 * momenta.noise(everything))
+
+
+def stretches(states: NDArray[np.bool_]) -> tuple[slice, ...]:
+    """Stretches of some states (n,) that are long enough."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]]))).reshape(-1, 2)
+    return tuple(slice(first, last) for first, last in edges.tolist() if last - first >= FEWEST)

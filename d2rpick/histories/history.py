@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias, TypeVar
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 # in quotes: numpy.typing costs start-up
 Samples: TypeAlias = "NDArray[np.float64]"
 _Found = TypeVar("_Found")
+Record = TypeVar("Record", bound="History | Balance | Momenta")
 
 # Parts slower than this share of the fastest stand still: single precision leaves them a speed.
 _STILL: Final = 1e-6
@@ -375,6 +376,13 @@ class History:
         """Times and energies of the states from ``start`` to ``end``, both included [time], [energy]."""
         inside = window(self.time, start, end)
         return self.time[inside], self.energy[inside]
+
+
+def rows_of(record: Record, states: slice | NDArray[np.bool_]) -> Record:
+    """Give some states of a record alone: of all its arrays of as many rows as it has times."""
+    values, size = {one.name: getattr(record, one.name) for one in fields(record) if one.init}, record.time.size
+    rows = {name: one[states] for name, one in values.items() if isinstance(one, np.ndarray) and len(one) == size}
+    return replace(record, **rows)  # type: ignore[arg-type]
 
 
 def frozen(values: ArrayLike) -> Samples:

@@ -7,34 +7,28 @@ hit a block twice, nothing acted for 14 ms between the two (docs/first-run.md, "
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, TypeVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
 
 from d2rpick.flight.free_fall import FreeFall
-from d2rpick.flight.momentum import laws_of
+from d2rpick.flight.momentum import believed, complete, laws_of, stretches
 from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, farthest
-from d2rpick.histories.history import Given
+from d2rpick.histories.history import Given, rows_of
 from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
     from d2rpick.flight.window import Law
-    from d2rpick.histories.history import Balance, History, Momenta, Precision, Samples
+    from d2rpick.histories.history import Balance, History, Momenta, Precision, Record, Samples
     from d2rpick.histories.names import Part
-
-_Record = TypeVar("_Record", bound="History | Balance | Momenta")
 
 # Of the largest momentum, or contact energy, so far: single precision adds up to a tenth of it.
 CONSTANT: Final = 1e-4
 # A state at which a force was taken for another one than gravity is tried again after so much of the time before it.
 _AGAIN: Final = 0.25
-# Momenta of parts are those of the model within this share of it, or a rigid body has taken some of them.
-_COMPLETE: Final = 1e-2
 
 
 class Waiting(Protocol):
@@ -90,7 +84,7 @@ class _Witness:
         """Gravity between two states, as of `Laws.gravity`, by what was written up to then."""
         if self.momenta is None:
             return 0.0
-        so_far = _of_states(self.momenta, slice(0, last + 1))
+        so_far = rows_of(self.momenta, slice(0, last + 1))
         if so_far.change(self.members) <= so_far.noise(self.members):
             return 0.0
         return laws_of(so_far, self.members, balance).gravity(first, last)
@@ -103,16 +97,8 @@ def until(history: History, time: float) -> History:
     return replace(_cut(history, time), evidence=Given(momenta, balance, history.masses))
 
 
-def _cut(record: _Record, time: float) -> _Record:
-    return _of_states(record, window(record.time, -np.inf, time))
-
-
-def _of_states(record: _Record, states: slice) -> _Record:
-    """Give some states of a record alone: all its arrays of as many rows as it has times."""
-    values = {one.name: getattr(record, one.name) for one in fields(record) if one.init}
-    size = record.time.size
-    rows = {name: one[states] for name, one in values.items() if isinstance(one, np.ndarray) and len(one) == size}
-    return replace(record, **rows)  # type: ignore[arg-type]
+def _cut(record: Record, time: float) -> Record:
+    return rows_of(record, window(record.time, -np.inf, time))
 
 
 def quiet_times(history: History, waiting: Waiting) -> tuple[Quiet, ...]:
@@ -236,7 +222,7 @@ def _flying(history: History) -> Iterator[tuple[Momenta, tuple[int, ...]]]:
             continue
         sets = dict.fromkeys(_sets(one))
         for stretch in believed(one, whole):
-            yield from ((_of_states(one, stretch), members) for members in sets)
+            yield from ((rows_of(one, stretch), members) for members in sets)
 
 
 def _sets(momenta: Momenta) -> Iterator[tuple[int, ...]]:
@@ -248,14 +234,6 @@ def _sets(momenta: Momenta) -> Iterator[tuple[int, ...]]:
     hung = {part for body in momenta.surroundings.bodies() if own & {*body} for part in body}
     yield tuple(sorted({*chosen, *(number[part] for part in hung if part in number)}))
     yield tuple(range(momenta.values.shape[1]))
-
-
-def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:
-    """Give the states in which the momenta of parts are those of the ``whole`` model, by stretches.
-
-    In the others a rigid body has taken some of them: then no quantity of a part is believed.
-    """
-    return _stretches(_complete(momenta, whole))
 
 
 def rigid_times(history: History) -> tuple[tuple[float, float, float], ...]:
@@ -272,21 +250,5 @@ def rigid_times(history: History) -> tuple[tuple[float, float, float], ...]:
         )
         for one in history.momenta
         if one.parts is not None
-        for at in _stretches(~_complete(one, whole))
+        for at in stretches(~complete(one, whole))
     )
-
-
-def _complete(momenta: Momenta, whole: Momenta | None) -> NDArray[np.bool_]:
-    """Whether the momenta of parts (n,) are together those of the whole model."""
-    if whole is None or whole.velocity or whole.time.size != momenta.time.size:
-        return np.ones(momenta.time.size, np.bool_)
-    everything = range(momenta.values.shape[1])
-    largest = np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1))
-    off = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
-    return np.asarray(off <= _COMPLETE * largest + 2 * momenta.noise(everything))
-
-
-def _stretches(states: NDArray[np.bool_]) -> tuple[slice, ...]:
-    """Stretches of some states (n,) that are long enough."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]]))).reshape(-1, 2)
-    return tuple(slice(first, last) for first, last in edges.tolist() if last - first >= FEWEST)

@@ -14,9 +14,9 @@ import numpy as np
 
 from d2rpick.base.errors import RangeError
 from d2rpick.deck.inner_period import inner_period
+from d2rpick.flight.momentum import believed
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import window
-from d2rpick.running.evidence import believed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

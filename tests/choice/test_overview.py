@@ -254,3 +254,28 @@ def test_a_table_that_cannot_be_read_is_an_error(tmp_path: Path) -> None:
     result = run("info", str(file))
     assert result.exit_code == 2
     assert "broken.csv:4: 'time' is 'x', a number was expected" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("names", "when", "ratio"),
+    [
+        (("car_all_T02.gz",), "from 0.0496021 to 0.146302", None),
+        (("car_heavy_T02.gz",), "from 0.0496021 to 0.146306", None),
+        (("drop2_w123_T01.gz",), "from 0 to 0.2836", None),
+        (("car_all_T01.gz", "car_all_T02.gz", "car_all_T03.gz"), "from 0.0496021 to 0.146302", 1.1),
+    ],
+)
+def test_rigid_legs_are_called_so_and_raise_no_alarm(names: tuple[str, ...], when: str, ratio: float | None) -> None:
+    """While its parts are rigid Radioss writes masses and momenta of 0, and any energy of solids."""
+    found = info(*(str(ROOT / "tests/data" / name) for name in names))
+    (warning,) = found["warnings"]
+    assert warning["code"] == "rigid-legs"
+    assert when in warning["message"]
+    highest = found["health"]["energy_ratio_max"]
+    assert highest is None if ratio is None else highest <= ratio
+    assert {flight["source"] for flight in found["flights"]} == {"momentum"}
+
+
+@pytest.mark.parametrize("name", ["tests/data/carT01.gz", "sample_data/rolloverT01.gz", "tests/data/drop2T01.gz"])
+def test_deformable_legs_are_not_called_rigid(name: str) -> None:
+    assert "rigid-legs" not in {one["code"] for one in info(str(ROOT / name))["warnings"]}

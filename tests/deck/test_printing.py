@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from functools import partial
@@ -99,6 +100,20 @@ def test_the_command_line_offers_the_solvers_there_are() -> None:
 def test_a_file_of_windows() -> None:
     assert read_windows("# tr td\n0.02 0.09\n\n .2  3e-1\n", "w.txt") == ((0.02, 0.09), (0.2, 0.3))
     assert check_windows([(-0.0, 1.0)])[0][0].hex() == "0x0.0p+0"
+
+
+def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:
+    """A rigid leg that was ended from outside goes on from its last restart; a probe is no window."""
+    legs = [("load", 0.0, 0.06, 0.06, False), ("probe", 0.06, 0.2, 0.15, False), ("rigid", 0.06, 0.145, 0.1, True),
+            ("rigid", 0.09, 0.145, 0.1449, False), ("rigid", 0.2, 0.3, 0.2998, False)]  # fmt: skip
+    lines = [
+        json.dumps({"event": "ended", "order": [kind, 2, start, until, 0.0, None], "seen": [seen, None], "cut": cut})
+        for kind, start, until, seen, cut in legs
+    ]
+    text = "\n".join(['{"event": "prepared"}', *lines, lines[-1][:40]])
+    assert read_windows(text, "drive.ndjson") == ((0.06, 0.145), (0.2, 0.3))
+    with pytest.raises(DeckError, match="no window was found"):
+        read_windows('{"event": "prepared"}\n', "drive.ndjson")
 
 
 @pytest.mark.parametrize(
