@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import RangeError
+from d2rpick.choice.flights import bounds, flights_of
+from d2rpick.choice.situation import Settings
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.running.evidence import contact_after, highest_energy, quiet_times, until
 from d2rpick.running.wait import InnerMotion
@@ -94,3 +96,11 @@ def test_the_highest_energy_is_that_of_a_state_in_the_span() -> None:
     tr = highest_energy(history, 0.0605, 0.0825)
     assert 0.0605 <= tr <= 0.0825
     assert history.energy_at(tr) == np.max(history.between(0.0605, 0.0825)[1])
+
+
+def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
+    history = record(BOX)
+    listed = np.array([bounds(history, one) for one in flights_of(history, Settings())])
+    for one in quiet_times(history, InnerMotion(history)):
+        found = one.start, history.time[-1] if one.end is None else one.end
+        assert np.abs(listed - found).max(axis=1).min() <= 3 * history.step
