@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from d2rpick.api.costs import PartTable as PartTable
     from d2rpick.api.costs import calibrate as calibrate
     from d2rpick.api.costs import parts as parts
+    from d2rpick.api.first_run import FirstRun as FirstRun
+    from d2rpick.api.first_run import first as first
     from d2rpick.api.flights import Exploration as Exploration
     from d2rpick.api.flights import Plan as Plan
     from d2rpick.api.flights import explore as explore
@@ -65,6 +67,7 @@ _HOME = {
     **dict.fromkeys(("Calibration", "PartTable", "calibrate", "parts"), "api.costs"),
     **dict.fromkeys(("Findings", "check"), "api.checking"),
     **dict.fromkeys(("Exploration", "Plan", "explore", "plan"), "api.flights"),
+    **dict.fromkeys(("FirstRun", "first"), "api.first_run"),
     **dict.fromkeys(("Run", "from_frame", "read"), "api.runs"),
     **dict.fromkeys(("Study", "study"), "api.studies"),
     "Event": "running.events",

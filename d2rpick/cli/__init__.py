@@ -31,6 +31,7 @@ _WORK: Final = {
     "follow": "Watch a run while it is computed: when it flies, when to switch.",
     "extract": "Write the chosen energy as csv or hdf5.",
     "card": "Print solver input for switching windows.",
+    "first": "Write a deck whose first run switches itself.",
     "check": "Check the switches of decks, also against a run.",
     "rule": "Explain a rule of check, or list all.",
     "calibrate": "Fit the cost of elements to runs of a site.",

@@ -341,6 +341,7 @@ def _joints(card: Card) -> Iterator[Constraint]:
 
 
 _NO_CONTACTS: Final = {"ADD", "AUTO", "COUPLING", "EXCLUDE", "GEBOD", "GUIDED"}  # first words of their names
+_ABLE: Final = ("SURFACE_TO_SURFACE", "NODES_TO_SURFACE", "NODE_TO_SURFACE")  # in the names of contacts that trigger
 _MOST_ROWS = 8  # of one definition without an id; more rows may hold another one
 
 
@@ -351,6 +352,11 @@ class Entity(NamedTuple):
     id: int
     title: str
     number: int
+
+    @property
+    def triggers(self) -> bool:
+        """Whether the force of a contact can switch parts."""
+        return any(name in self.keyword for name in _ABLE)
 
 
 class Entities(NamedTuple):

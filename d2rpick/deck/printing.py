@@ -72,15 +72,24 @@ def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
 
 
 def _window(texts: tuple[str, str], sets: tuple[int, int], ids: Sequence[int], printing: Printing) -> Iterator[str]:
+    yield from header(sets[0], texts[0], shortest(printing.step_cap or 0.0), (len(ids), 0))
+    yield from to_rigid(ids, printing)
+    yield from header(sets[1], texts[1], "0.0", (0, len(ids)))
+    yield from to_deformable(ids)
+
+
+def to_rigid(ids: Sequence[int], printing: Printing) -> Iterator[str]:
+    """Write the parts that become rigid, those that lead first."""
     leads = _leads(ids, printing)
-    yield from _header(sets[0], texts[0], shortest(printing.step_cap or 0.0), (len(ids), 0))
     yield "$#     pid       lrb     ptype"
-    for part in sorted(ids, key=lambda part: part in leads):  # those that lead first
+    for part in sorted(ids, key=lambda part: part in leads):
         yield f"{part:10d}{leads.get(part, 0):10d}      PART"
-    yield from _header(sets[1], texts[1], "0.0", (0, len(ids)))
+
+
+def to_deformable(ids: Sequence[int]) -> Iterator[str]:
+    """Write the parts that become deformable."""
     yield "$#     pid     ptype"
-    for part in ids:
-        yield f"{part:10d}      PART"
+    yield from (f"{part:10d}      PART" for part in ids)
 
 
 def _leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
@@ -91,10 +100,27 @@ def _leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
     return {part: body[0] for body in bodies for part in body[1:]}
 
 
-def _header(swset: int, time: str, step_cap: str, counts: tuple[int, int]) -> Iterator[str]:
+class Waiting(NamedTuple):
+    """What a switch waits for: its CODE, the contact, the delay after it [time], the set of its pair, and its place."""
+
+    code: int = 0
+    contact: int = 0
+    delay: float = 0.0
+    other: int = 0
+    paired: int = 0
+
+
+def header(
+    swset: int, time: str, step_cap: str, counts: tuple[int, int], waits: Waiting | None = None
+) -> Iterator[str]:
+    """Write the lines of a switch set down to its parts: at a ``time``, or from then on where it waits."""
+    on = waits or Waiting()
     yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"
     yield _SET_HEAD
-    yield f"{swset:10d}{0:10d}{time:>10s}{'0.0':>10s}{'0.0':>10s}{0:10d}{0:10d}{0:10d}"
+    yield (
+        f"{swset:10d}{on.code:10d}{time:>10s}{'0.0':>10s}{shortest(on.delay):>10s}"
+        f"{on.contact:10d}{on.other:10d}{on.paired:10d}"
+    )
     yield _COUNT_HEAD
     yield f"{0:10d}{0:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{'0.0':>10s}"
 
@@ -203,7 +229,7 @@ def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequ
     windows, ids, end = _of_run(windows, printing)
     sensors, last = sensor_cards(windows, printing.sensor)
     cap = min(leg.cap for leg in legs(windows, end, printing.step_cap) if leg.cap is not None)
-    lines = (f"/RUN/{printing.name}/1", f"{end!r:>20}", *off(printing.off), *_capped(cap))
+    lines = (f"/RUN/{printing.name}/1", f"{end!r:>20}", *off(printing.off), *capped(cap))
     files = {f"{printing.name}_0001.rad": "\n".join(lines) + "\n"}
     nodes = ", ".join(map(str, ids))
     how = (
@@ -266,10 +292,11 @@ def _engine(leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int
         yield from ("/RBODY/ON", *listed(ids))
     yield from off(others if leg.cap is not None else (*ids, *others))
     if leg.cap is not None:
-        yield from _capped(leg.cap)
+        yield from capped(leg.cap)
 
 
-def _capped(cap: float) -> Iterator[str]:
+def capped(cap: float) -> Iterator[str]:
+    """Hold the step of a leg with rigid bodies below a limit."""
     yield from ("# with nothing deformable left the step would grow without limit", "/DTIX", f"{cap!r} {cap!r}")
 
 

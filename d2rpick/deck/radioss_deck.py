@@ -106,6 +106,7 @@ class Leg:
     cap: Value[float] | None = None
     version: str = ""
     starts: list[Start] = field(default_factory=list)
+    sensor: int = 0  # which ends it, at a time that nobody knows before
 
 
 def read_legs(source: SourceFile) -> list[Leg]:
@@ -138,6 +139,8 @@ def _take(leg: Leg, card: Card) -> None:
     words = card.words
     if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
         leg.switched.append((card, words[1] == "ON", tuple(_integer(value) for value in _numbers(card))))
+    elif words[:2] == ("STOP", "LSENSOR"):
+        leg.sensor = next((int(value.value) for value in _numbers(card)), 0)
     elif words == ("DTIX",):
         leg.cap = next(reversed(list(_numbers(card))), None)
     elif words[0] == "INIV":

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Value
 from d2rpick.deck.radioss_deck import Leg, Starter, blocks, card_of, keyword, read_legs
-from d2rpick.deck.radioss_sensors import active_spans, inactive
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows, follow
@@ -198,7 +197,9 @@ class RunWindows:
 
 
 def in_order(legs: list[Leg]) -> bool:
-    """Whether the legs are all there, from the first on, and each ends no earlier than the one before."""
+    """Whether the legs are all there, from the first on, and each ends at a known time, not before the one before."""
+    if any(leg.sensor for leg in legs[:-1]):
+        return False
     numbers = [leg.number for leg in legs]
     stops = [leg.stop for leg in legs]
     sorted_stops = all(one.value <= other.value for one, other in pairwise(stops))
@@ -261,6 +262,8 @@ def _follow(unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg) -> l
 
 def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]]) -> Iterator[Window]:
     """Windows of a body with a sensor of times: it is rigid while the sensor is not active."""
+    from d2rpick.deck.radioss_sensors import active_spans, inactive  # not above: few decks have any
+
     active = active_spans(run.starter, body.sensor) if run.starter else ""
     if isinstance(active, str):
         return

@@ -11,6 +11,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
+from d2rpick.deck.printed_card import shortest
 from d2rpick.deck.radioss_deck import below_title, blocks, card_of, keyword, reals
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def sensor_cards(windows: Sequence[Times], first: int) -> tuple[str, int]:
     texts, last = list[str](), first
     for number, (start, stop) in enumerate(spans, start=first):
         until = min(stop, _NEVER)
-        texts.append(f"/SENSOR/TIME/{number}\ndeformable\n{start!r:>20}\n{until!r:>20}\n")
+        texts.append(f"/SENSOR/TIME/{number}\ndeformable\n{shortest(start, 20):>20}\n{shortest(until, 20):>20}\n")
     for number, other in enumerate(range(first + 1, first + len(spans)), start=first + len(spans)):
         texts.append(f"/SENSOR/OR/{number}\ndeformable\n{0:20d}\n{last:10d}{other:10d}\n")
         last = number

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 from d2rpick.deck import Deck, Parts, SwitchSet, Window, Windows, find_windows, read_parts, read_switching
 from d2rpick.deck.parts import read_sections
 from d2rpick.deck.radioss_run import find_run_windows
-from d2rpick.deck.radioss_sensors import active_spans
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -230,12 +229,14 @@ class RunCase(Case):
         """Bodies that a sensor switches whose time is not known."""
         starter = self.run.starter
         bodies = [body for body in starter.bodies if body.sensor] if starter else []
+        from d2rpick.deck.radioss_sensors import active_spans  # not above: few decks have any
+
         found = [(body, active_spans(starter, body.sensor)) for body in bodies if starter]
-        return tuple(
-            (body.node.field, f"rigid body {body.id} is switched by {why}")
-            for body, why in found
-            if isinstance(why, str)
-        )
+        told = [(body.node.field, f"rigid body {body.id} is switched by {why}") for body, why in found
+                if isinstance(why, str)]  # fmt: skip
+        legs = [leg for leg in self.run.legs[:-1] if leg.sensor]
+        told += [(leg.run.here, f"leg {leg.number} ends when sensor {leg.sensor} is active") for leg in legs]
+        return tuple(told)
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:

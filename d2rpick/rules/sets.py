@@ -14,7 +14,7 @@ from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.parts import Entities, Entity
+    from d2rpick.deck.parts import Entities
     from d2rpick.deck.switching import Header, SwitchSet, Unit
     from d2rpick.rules.base import Case, Objection
 
@@ -34,7 +34,6 @@ _ENTITIES: Final[tuple[tuple[set[int], str, Literal["CONTACT", "RIGIDWALL"]], ..
     (_OF_CONTACT, "contact", "CONTACT"), (_OF_WALL, "rigid wall", "RIGIDWALL"),
 )  # fmt: skip
 _NEEDS_FORCE: Final = {3, 4}
-_ABLE: Final = ("SURFACE_TO_SURFACE", "NODES_TO_SURFACE", "NODE_TO_SURFACE")  # in the names of contacts that trigger
 _MOST_LISTED = 8
 
 
@@ -210,15 +209,11 @@ def _able(case: Case) -> Iterator[Objection]:
     entities = read_entities(case.deck, "CONTACT") if headers else None
     for header in headers:
         named = entities.named(header.entno.value) if entities else None
-        if named and entities and not _triggers(named):
-            others = [one for one in entities.found if _triggers(one)]
+        if named and entities and not named.triggers:
+            others = [one for one in entities.found if one.triggers]
             able = f" (here: {_listed(entities._replace(found=tuple(others)))})" if others else ""
             found = f"ENTNO {header.entno.value} is *{named.keyword}, whose force triggers no switch"
             yield header.entno.field, f"{found}; choose a surface-to-surface or nodes-to-surface contact{able}"
-
-
-def _triggers(contact: Entity) -> bool:
-    return any(name in contact.keyword for name in _ABLE)
 
 
 def _listed(entities: Entities) -> str:

@@ -1,0 +1,93 @@
+"""A deck whose first run switches itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from d2rpick.api import arguments
+from d2rpick.api.cards import numbers
+
+if TYPE_CHECKING:
+    from d2rpick.api.arguments import Parts
+
+
+@dataclass(frozen=True)
+class FirstRun:
+    """What `first` wrote: the names of the ``files``, the main deck first, and ``notes`` on what the run cannot know.
+
+    ``wait`` is the time without force that counts as flight [time of the deck], ``reason`` where it comes from.
+    """
+
+    files: tuple[str, ...]
+    wait: float
+    reason: str
+    notes: tuple[str, ...]
+
+
+def first(
+    deck: arguments.Path,
+    output_dir: arguments.Path,
+    *,
+    parts: Parts | None = None,
+    wait: float | None = None,
+    after: float | None = None,
+    overwrite: bool = False,
+) -> FirstRun:
+    """Write a copy of a deck whose first run switches itself, as ``d2rpick first`` does.
+
+    Parameters
+    ----------
+    deck : path
+        Main deck of LS-DYNA, or a file of a Radioss run with one engine file.
+    output_dir : path
+        Another folder than that of the deck; made where it does not exist.
+    parts : int, str or sequence of these, optional
+        Numbers and ranges of the parts to switch.  Default: Radioss, those of the bodies that the engine file puts off.
+    wait : float, optional
+        Time without force that counts as flight [time].  Default: half of the longest inner period, by masses and
+        springs of the deck.
+    after : float, optional
+        Nothing becomes rigid before [time].
+    overwrite : bool
+        Replace files that exist.
+
+    Returns
+    -------
+    FirstRun
+
+    Raises
+    ------
+    DeckError
+        If the deck shows no flight by contacts, or something else acts on the parts; if a file exists.
+    RangeError
+        If the wait is below half of a period that is known.
+    TypeError, ValueError
+        If an argument is not of its kind, or neither it nor the deck tells the parts or the wait.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> d2.first("sample_data/rollover_box.k", "first", parts=1)
+    Traceback (most recent call last):
+    ...
+    ValueError: `wait` is not given, and sample_data/rollover_box.k does not tell it: ...
+    """
+    names = arguments.part_names("parts", parts)
+    least = None if wait is None else arguments.number("wait", wait, 0.0)
+    later = None if after is None else arguments.number("after", after, 0.0)
+    return prepared(
+        arguments.one_path("deck", deck), arguments.one_path("output_dir", output_dir), names, least, later, overwrite
+    )
+
+
+def prepared(
+    deck: str, folder: str, parts: tuple[str, ...], wait: float | None, after: float | None, overwrite: bool
+) -> FirstRun:
+    """Write the copy of the deck."""
+    from d2rpick.deck.writing import write_deck
+    from d2rpick.running.first import first_card
+
+    found = first_card(deck, numbers("parts", parts), wait, after)
+    files = write_deck(deck, found.card, folder, overwrite=overwrite)
+    return FirstRun(tuple(files), found.wait.time, found.wait.reason, found.notes)
