@@ -75,7 +75,7 @@ def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tupl
     if any(True for _ in witnesses(history)) or not settings.replay:
         return find_flights(history, settings, fits)
     first = float(history.time[0]) if settings.after is None else settings.after
-    middle = examine(history, (first + float(history.time[-1])) / 2, settings, fits)
+    middle = examine(history, (first + float(history.time[-1])) / 2, settings, fits, quick=True)
     start, end = bounds(history, middle.flight)
     if middle.evidence.span and start < end and not middle.flight.refusal:
         # it ends with the oscillator, also where its start is given
@@ -125,7 +125,7 @@ def find_flights(history: History, settings: Settings = _PLAIN, fits: Fits | Non
     for td in sorted(moments(history.time), reverse=True):  # the last quiet time before td tells most of the flight
         if found and found[-1].start is not None and td > found[-1].start:
             continue
-        situation = examine(history, td, settings, fits)
+        situation = examine(history, td, settings, fits, quick=True)
         flight = situation.flight
         if situation.in_flight and not flight.refusal and not (found and _overlap(flight, found[-1])):
             found.append(flight)

@@ -81,6 +81,8 @@ _SOLVER_ERROR: Final = 1e-5
 _FAINT: Final = 1e-4
 # An energy that is rounded to and fro between two numbers: their distance, and half of one to either side.
 _QUANTA: Final = 2
+# Share of where an oscillator is looked for: one that describes so much leaves no room for a longer one beside it.
+_MOST_OF_RECORD: Final = 0.5
 # Share of a flight before the contact that ends it: the margin that td keeps, in which the contact may have begun.
 _BEFORE_CONTACT: Final = 0.03
 
@@ -225,10 +227,14 @@ class Situation:
         return self if td == self.td else replace(self, td=td)
 
 
-def examine(history: History, td: float, settings: Settings, fits: Fits | None = None) -> Situation:
+def examine(
+    history: History, td: float, settings: Settings, fits: Fits | None = None, *, quick: bool = False
+) -> Situation:
     """Find the flight around ``td`` and the oscillator in it.
 
-    ``fits`` are those of an earlier look at the same record with the same settings, but for ``after``.
+    ``fits`` are those of an earlier look at the same record with the same settings, but for ``after``.  ``quick``, for
+    a choice among many td: an oscillator that describes most of the record, td with it, is not sought again, and of one
+    that is refused the misfit is left out.
 
     RangeError when td, ``after`` or the fit window lie outside the record, or it has fewer than 3 states.
     """
@@ -245,7 +251,7 @@ def examine(history: History, td: float, settings: Settings, fits: Fits | None =
     # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
     at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
     fits = Fits() if fits is None else fits
-    fit, span = _oscillator(history, at, settings, seen, fits)
+    fit, span = _oscillator(history, at, settings, seen, fits, quick=quick)
     flight = find_flight(history, td, settings.after, seen, _settled(history, fit, span))
     flight = landed(_between_supports(history, flight, td), settings.landing)
     given = settings.oscillator is not None
@@ -281,7 +287,7 @@ def _between_supports(history: History, flight: Flight, td: float) -> Flight:
 
 
 def _oscillator(
-    history: History, td: float, settings: Settings, seen: Seen, fits: Fits
+    history: History, td: float, settings: Settings, seen: Seen, fits: Fits, *, quick: bool
 ) -> tuple[Identification | None, Span | None]:
     """Find the oscillator, given or identified, and the window around td that it describes."""
     if not settings.replay:
@@ -300,12 +306,20 @@ def _oscillator(
         given = fits.remembered("given", partial(judge_given, settings.oscillator))
         span, fit = described_span(history, td, bounds, given, whole=whole)
         return fit, span
-    span, fit = described_span(history, td, bounds, fits.remembered("one", identify), whole=whole)
+    known = fits.once(("described", bounds), list[tuple[Identification, Span]])
+    around = [one for one in known if one[1].start <= td <= one[1].end]
+    if quick and around:
+        return around[0]
+    one = fits.remembered("one", identify)
+    span, fit = described_span(history, td, bounds, partial(one, quick=True) if quick else one, whole=whole)
     if span is None:
         fitter = partial(fits.remembered("several", identify_several), quick=True)  # nobody asks why it is refused
         span, several = described_span(history, td, bounds, fitter, whole=whole)
         fit = several if span else fit
-    return _resolved(history, fit, fits), span
+    fit = _resolved(history, fit, fits)
+    if span and span.end - span.start >= _MOST_OF_RECORD * (bounds.end - bounds.start):
+        known.append((fit, span))
+    return fit, span
 
 
 def _resolved(history: History, fit: Identification, fits: Fits) -> Identification:

@@ -111,16 +111,18 @@ def suggest_in_window(
     if look(td).at_rest:
         last = _last_at_rest(situation, inside)
         td = last if last > inside[0] and look(last).at_rest else td
-    found = suggest_at(look(td))
+    found = suggest_at(looking(history, settings, fits, since, quick=False)(td))
     return replace(found, td_window=window, longer=_given_up(longest, found.recommended, inside, look))
 
 
-def looking(history: History, settings: Settings, fits: Fits | None = None, since: float | None = None) -> Look:
+def looking(
+    history: History, settings: Settings, fits: Fits | None = None, since: float | None = None, *, quick: bool = True
+) -> Look:
     """Give what examines a record once for each td, by ``fits`` of an earlier look with the same settings.
 
-    No flight is taken to begin before ``since`` [time].
+    No flight is taken to begin before ``since`` [time].  ``quick`` as for `examine`.
     """
-    look = partial(examine, history, settings=settings, fits=fits or Fits())
+    look = partial(examine, history, settings=settings, fits=fits or Fits(), quick=quick)
     return cache(look if since is None else lambda td: _beginning(look(td), since))
 
 

@@ -180,17 +180,20 @@ def explore_of(
     record = float(history.time[0]), float(history.time[-1])
     window = td_window or longest_flight(history, settings, fits, otherwise=None if td is None else record)
     look = looking(history, settings, fits, since)
-    situation, inside = within_flight(look, history, window)
+    known_best, inside = within_flight(look, history, window)
     suggestion = suggest_of(reference, window, settings, fits=fits, since=since)
     chosen = suggestion.recommended.td if suggestion.recommended else None
-    times, peaks = _times(situation, inside, steps)
+    times, peaks = _times(known_best, inside, steps)
     named = [time for time in (td, chosen) if time is not None]
-    situations = [look(time) for time in np.unique([*times, *named]).tolist()]
+    fully = looking(history, settings, fits, since, quick=False)
+    asked_at = map(look, np.unique([*times, *named]).tolist())
+    situations = [one if one.evidence.span else fully(one.td) for one in asked_at]  # why none is seen is told of each
     offers = [replace(one, recommended=one.td == chosen) for one in _marked([*offers_of(situations, peaks)])]
     asked = next((one for one in offers if one.td == td), None)
+    situation = fully(known_best.td)
     told = suggestion.situation  # the first td of the flight has too little before it to tell of a vibration
     if td is not None and look(td).in_flight:
-        situation = told = look(td)  # the energy alone shows another flight to each td: that of suggest is shown
+        situation = told = fully(td)  # the energy alone shows another flight to each td: that of suggest is shown
     start = asked or max(filter(_found, offers), key=lambda one: one.rigid_time or 0.0, default=None)
     return TradeOff(
         situation=situation,

@@ -331,7 +331,7 @@ class Modes:
         """Find the times in (start, end), ascending, where the energy turns [time]."""
         step = 2 * np.pi / self.fastest / _POINTS_PER_PERIOD
         edges = np.linspace(start, end, max(2, int(np.ceil((end - start) / step)) + 1))
-        times = _roots(lambda t: self.energy_slopes(t)[0], edges)
+        times = _roots(lambda t: self.energy_slopes(t)[0], lambda t: self.energy_slopes(t)[1], edges)
         return tuple(t for t in times if min(t - start, end - t) > _ROUNDING / self.fastest)
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
@@ -343,7 +343,7 @@ class Modes:
         """Find the times in (start, td), ascending, where the energy passes its level at ``td`` [time]."""
         level = self.energy(td)
         edges = np.array([start, *self.extrema(start, td), td])  # in between the energy is monotone
-        return _roots(lambda t: self.energy(t) - level, edges, but=td)
+        return _roots(lambda t: self.energy(t) - level, lambda t: self.energy_slopes(t)[0], edges, but=td)
 
 
 def sum_and_jacobian(parameters: Samples, s: Samples) -> tuple[Samples, Samples]:
@@ -359,10 +359,12 @@ def sum_and_jacobian(parameters: Samples, s: Samples) -> tuple[Samples, Samples]
     return energy, jacobian
 
 
-def _roots(function: Callable[[Samples], Samples], edges: Samples, but: float = np.inf) -> tuple[float, ...]:
-    """Find where ``function`` changes its sign between neighbouring ``edges``, by halving; not at ``but`` itself."""
+def _roots(
+    function: Callable[[Samples], Samples], slope: Callable[[Samples], Samples], edges: Samples, but: float = np.inf
+) -> tuple[float, ...]:
+    """Find where ``function`` changes its sign between neighbouring ``edges``; not at ``but`` itself."""
     values = np.where(edges == but, 0.0, function(edges))
     cells = np.flatnonzero(values[:-1] * values[1:] < 0)
     side = np.sign(values[cells])
-    found = narrow(lambda t: side * function(t), edges[cells], edges[cells + 1])
+    found = narrow(lambda t: side * function(t), edges[cells], edges[cells + 1], slope=lambda t: side * slope(t))
     return tuple(found.at.tolist())

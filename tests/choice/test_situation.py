@@ -17,6 +17,7 @@ from d2rpick.histories.opening import Selection
 from d2rpick.vibration.oscillator import to_mode
 from d2rpick.vibration.span import Fits
 from tests import chain, paper
+from tests.counted_fits import CountedFits
 from tests.energies import of, rollover, sure
 
 if TYPE_CHECKING:
@@ -93,3 +94,32 @@ def test_what_was_found_with_another_end_of_the_load_changes_nothing(history: Hi
         other = suggest_at(examine(history, td, Settings(after=share * td), fits)).candidates[:]
         assert other != fresh
     assert suggest_at(examine(history, td, PLAIN, fits)).candidates[:] == fresh
+
+
+def three_modes() -> History:
+    """A load until 0.1, then three modes of one damping with white noise."""
+    time = np.linspace(0.0, 1.0, 601)
+    energy = sum(share * np.sin(2 * np.pi * f * time) ** 2 for f, share in ((6.3, 1.0), (9.7, 0.6), (15.1, 0.4)))
+    energy = np.where(time < 0.1, 3 * np.sin(np.pi * time / 0.1) ** 2, 0.0) + np.exp(-time) * energy
+    return of(energy + 0.003 * np.random.default_rng(3).standard_normal(time.size), time)
+
+
+def test_an_oscillator_that_describes_most_of_a_record_is_not_sought_again_at_another_td() -> None:
+    history, fits = three_modes(), CountedFits()
+    first = examine(history, 0.6, PLAIN, fits, quick=True)
+    before = fits.made
+    quick = examine(history, 0.8, PLAIN, fits, quick=True)
+    assert fits.made == before
+    assert quick.sees_as(first)
+    anew = examine(history, 0.8, PLAIN)
+    assert (quick.basis, quick.flight) == (anew.basis, anew.flight)
+    assert quick.kinetic_share == pytest.approx(anew.kinetic_share, rel=1e-9)
+    assert examine(history, 0.05, PLAIN, fits, quick=True).evidence.span != first.evidence.span
+
+
+def test_a_quick_look_refuses_what_a_full_one_does_without_its_misfit() -> None:
+    noise = of(np.random.default_rng(3).random(200), np.linspace(0.0, 1.0, 200))
+    quick, full = (examine(noise, 0.9, Settings(after=0.5), quick=quick) for quick in (True, False))
+    assert (quick.basis, quick.flight) == (full.basis, full.flight)
+    assert sure(full.evidence.fit).misfit
+    assert sure(quick.evidence.fit).misfit is None
