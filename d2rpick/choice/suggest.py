@@ -187,7 +187,8 @@ def _saving(situation: Situation) -> Candidate | None:
 
 def _anew(situation: Situation, td: float) -> Situation:
     """Look at the same record for another td, as if that had been asked for."""
-    return examine(situation.history, td, situation.settings, situation.fits)
+    quick = situation.evidence.span is None  # an oscillator is sought again, why there is none is not
+    return examine(situation.history, td, situation.settings, situation.fits, quick=quick)
 
 
 def _holds_as_printed(situation: Situation, tr: float, td: float) -> bool:
