@@ -263,10 +263,12 @@ def planned(asked: Asked, min_rigid: float | None, done: Sequence[Times], before
     """Plan the rigid windows of a run, or those after the windows that are ``done``."""
     if before is not None and not done:
         raise ArgumentError("`before` compares the landings of a switched run; name its windows with `done`")
-    from d2rpick.deck.printed_card import check_windows
+    windows: Sequence[Times] = ()
+    if done:
+        from d2rpick.deck.printed_card import check_windows  # a plan alone does without decks
 
+        windows = check_windows(done)
     earlier = asked.reference.like(before.files, asked.selection) if before else None
-    windows = check_windows(done) if done else ()
     found = planning.plan_of(asked.reference, asked.settings, min_rigid=min_rigid, done=windows, before=earlier)
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
     times += ["--done", "-"] if windows else []  # on its standard input, a line for each

@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
@@ -128,6 +127,8 @@ def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
     """Cards that look like switching cards but are none, and the keyword that was probably meant."""
     for card in deck.cards:
         if card.name not in _KINDS and SWITCHING.match(card.block.head):
+            from difflib import get_close_matches  # start-up
+
             name = re.sub(r"\W+", "_", card.block.head.upper()).strip("_")
             yield card, f"*{get_close_matches(name, _KINDS, n=1, cutoff=0)[0]}"
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
-from xml.etree import ElementTree as ET
 
 from d2rpick.base.errors import name_units, printable
 from d2rpick.base.version import __version__
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 SARIF_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
 _GITHUB: Final = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
 _SARIF: Final = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}
-_NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled where it is needed
 
 
 @dataclass(frozen=True)
@@ -108,6 +107,8 @@ def as_github(checks: Checks) -> str:
 
 def as_junit(checks: Checks) -> str:
     """One suite per deck, one case per finding; those lighter than ``fail_on`` pass and only say their message."""
+    from xml.etree import ElementTree as ET  # start-up
+
     root, fail_on = checks.root, checks.fail_on
     suites = ET.Element("testsuites", name="d2rpick check")
     for one in checks.failed:
@@ -281,7 +282,7 @@ def _escaped(text: str, more: str = "") -> str:
 
 def _xml(text: str) -> str:
     """Return the text in characters that XML 1.0 can write and a terminal shows."""
-    return _NOT_XML.sub("?", printable(text))
+    return re.sub(_NOT_XML, "?", printable(text))
 
 
 _WIDTH = 100

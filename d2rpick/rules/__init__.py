@@ -5,7 +5,6 @@ They are configured by ``d2rpick.toml`` or ``[tool.d2rpick]`` of pyproject.toml;
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
@@ -94,6 +93,8 @@ class Configuration:
 
 def _expected_instead(name: str, known: Collection[str]) -> str:
     """What would have been a rule; the nearest one is named."""
+    import difflib
+
     near = difflib.get_close_matches(name.upper(), known, n=1)
     return "an id like D2R101 or its beginning was expected" + (f"; did you mean {near[0]}?" if near else "")
 
