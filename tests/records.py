@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from hypothesis import strategies as st
 
-from d2rpick.histories.history import Given, History
+from d2rpick.histories.history import Given, History, rows_of
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import from_mode, lacking_energy
 from tests import paper
 
 if TYPE_CHECKING:
-    from d2rpick.histories.history import Balance, Momenta, Samples
+    from d2rpick.histories.history import Balance, Momenta, Record, Samples
     from d2rpick.vibration.modes import Modes
 
 # y - z = -V0 exp(-alpha t/2) sin(omega t)/omega, eq. (7), with V0 = 6 m/s and k = 660e3 N/m
@@ -47,6 +48,16 @@ def known(found: Found | None) -> Found:
 def table(time: Samples, energy: Samples, *momenta: Momenta, balance: Balance | None = None) -> History:
     """A record of an energy, with momenta and energies of the model where there are any."""
     return History(time, energy, ("made.csv",), "csv", "E", evidence=Given(momenta, balance))
+
+
+def until(history: History, time: float) -> History:
+    """Give what a record was when the run had come to a time."""
+
+    def cut(record: Record) -> Record:
+        return rows_of(record, record.time <= time)
+
+    momenta, balance = tuple(cut(one) for one in history.momenta), history.balance and cut(history.balance)
+    return replace(cut(history), evidence=Given(momenta, balance, history.masses))
 
 
 def printed(values: Samples, digits: int = 6) -> Samples:

@@ -7,7 +7,6 @@ hit a block twice, nothing acted for 14 ms between the two (docs/first-run.md, "
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
@@ -15,14 +14,13 @@ import numpy as np
 from d2rpick.flight.free_fall import FreeFall
 from d2rpick.flight.momentum import believed, complete, laws_of, stretches
 from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, farthest
-from d2rpick.histories.history import Given, rows_of
-from d2rpick.histories.samples import window
+from d2rpick.histories.history import rows_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.flight.window import Law
-    from d2rpick.histories.history import Balance, History, Momenta, Precision, Record, Samples
+    from d2rpick.histories.history import Balance, History, Momenta, Precision, Samples
     from d2rpick.histories.names import Part
 
 # Of the largest momentum, or contact energy, so far: single precision adds up to a tenth of it.
@@ -88,17 +86,6 @@ class _Witness:
         if so_far.change(self.members) <= so_far.noise(self.members):
             return 0.0
         return laws_of(so_far, self.members, balance).gravity(first, last)
-
-
-def until(history: History, time: float) -> History:
-    """Give what a record was when the run had come to a time."""
-    momenta = tuple(_cut(one, time) for one in history.momenta)
-    balance = _cut(history.balance, time) if history.balance else None
-    return replace(_cut(history, time), evidence=Given(momenta, balance, history.masses))
-
-
-def _cut(record: Record, time: float) -> Record:
-    return rows_of(record, window(record.time, -np.inf, time))
 
 
 def quiet_times(history: History, waiting: Waiting) -> tuple[Quiet, ...]:

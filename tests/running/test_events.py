@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from d2rpick.histories.history import EXACT, Balance, History, Momenta
 from d2rpick.running.events import events_of
-from d2rpick.running.evidence import until
 from d2rpick.running.wait import InnerMotion
-from tests.records import table
+from tests.records import table, until
 
 # Pushes [s] of half a sine, and the period of what swings inside from the first on [s].
 PUSHES = ((0.1, 0.13), (0.17, 0.2), (0.62, 0.66))

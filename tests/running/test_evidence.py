@@ -12,9 +12,10 @@ from d2rpick.base.errors import RangeError
 from d2rpick.choice.flights import bounds, flights_of
 from d2rpick.choice.situation import Settings
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.running.evidence import contact_after, highest_energy, quiet_times, until
+from d2rpick.running.evidence import contact_after, highest_energy, quiet_times
 from d2rpick.running.wait import InnerMotion
 from tests.command import ROOT
+from tests.records import until
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
