@@ -105,6 +105,11 @@ class Row(NamedTuple):
     least: float | None = None
 
 
+SEARCHES = (
+    ("no window", ("suggest",), 3.0),
+    ("wide window", ("suggest", "--td-window", "0.3", "0.9"), 3.0),
+    ("explore", ("explore", "--steps", "200"), 10.0),
+)
 ROWS = (
     Row("suggest / import numpy, click: processes", lambda: process_ratio("numpy, click", *SUGGEST)),
     Row("  both with one thread", lambda: process_ratio("numpy, click", *SUGGEST, env=ONE_THREAD), most=1.4),
@@ -132,7 +137,19 @@ ROWS = (
     Row("suggest, clean oscillator, 1e6 / 1e5 states", choosing("clean_growth", "suggest"), most=11.0),
     Row("verify, clean oscillator, 1e6 / 1e5 states", choosing("clean_growth", "verify"), most=11.0),
     Row("wide window, clean oscillator, 1e6 / 1e5 states", choosing("clean_growth", "--td-window"), most=11.0),
-    Row("suggest of 500 parts, 2000 states / reading matsum", choosing("parts_to_matsum"), most=4.0),
+    *(
+        Row(f"plan, {trouble}, 1e5 states / pandas.read_csv", choosing("plan_to_pandas", trouble), most=6.0)
+        for trouble in ("noise 1 %", "noise 10 %", "200 modes", "chaotic contact")
+    ),
+    Row("plan, several flights, 1e5 states / pandas.read_csv", choosing("plan_to_pandas", "several flights")),
+    *(
+        Row(f"{what} / --td, three modes, {kind}, {states:.0e}", choosing("search_to_td", kind, states, *command), most)
+        for kind in ("clean", "noise 1 %")
+        for states in (10_000, 100_000)
+        for what, command, most in SEARCHES
+    ),
+    Row("suggest of 50 parts, 2000 states / reading matsum", choosing("parts_to_matsum", 50)),
+    Row("suggest of 500 parts, 2000 states / reading matsum", choosing("parts_to_matsum", 500), most=4.0),
     Row("study, 1e4 noisy states / suggest, per run", choosing("study_to_loop"), most=1.15),
     Row("study: speed-up with 2 processes", choosing("study_speed_up"), least=1.8),
     Row("rollover --scan: speed-up with 2 processes", choosing("scan_speed_up"), least=1.6),

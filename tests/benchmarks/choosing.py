@@ -28,10 +28,11 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 _ROUNDS = 3
-_PARTS, _PART_STATES = 500, 2000
+_PART_STATES = 2000
 _RUNS, _RUN_STATES, _RUN_TD = 1000, 10_000, 0.0687534
 # Cycles in the record, shares of the energy and phases of the five modes.
 _MODES = ((15.5, 1.0, 0.0), (28.5, 0.7, 1.0), (46.5, 0.5, 2.0), (69.5, 0.4, 3.0), (106.0, 0.3, 4.0))
+_THREE = ((12.5, 1.0, 0.0), (19.3, 0.6, 1.0), (31.7, 0.4, 2.0))
 # Of the largest energy: with 1e5 states some 15,000 candidates.
 _NOISE = 0.003
 # Of a record of unit length: where td is asked for, and windows for it.
@@ -97,10 +98,22 @@ def clean_growth(command: str) -> float:
     return _ratio(build(str(_clean(1_000_000))), build(str(_clean(100_000))))
 
 
-def parts_to_matsum() -> float:
-    """`suggest --part` of 500 parts and 2000 states over reading that matsum: processes."""
-    file = str(_matsum())
-    choosing = ("-m", "d2rpick", "suggest", "--td", "0.16", "--part", "2001-2500", "--exit-zero", file)
+def plan_to_pandas(trouble: str) -> float:
+    """`plan` of 1e5 states of some `_trouble` over pandas, which reads that csv and does nothing else."""
+    file = str(_trouble(trouble, 100_000))
+    return _ratio(("-m", "d2rpick", "plan", "--exit-zero", file), ("-c", PANDAS, file), rounds=1)
+
+
+def search_to_td(trouble: str, states: int, *command: str) -> float:
+    """A command that looks for td over `suggest --td` where nobody says when the load ends."""
+    rest = ("--exit-zero", "-q", str(_trouble(trouble, states)))
+    return _ratio(("-m", "d2rpick", *command, *rest), ("-m", "d2rpick", "suggest", "--td", str(_TD), *rest), rounds=1)
+
+
+def parts_to_matsum(parts: int) -> float:
+    """`suggest --part` of so many parts and 2000 states over reading that matsum: processes."""
+    file = str(_matsum(parts))
+    choosing = ("-m", "d2rpick", "suggest", "--td", "0.16", "--part", f"2001-{2000 + parts}", "--exit-zero", file)
     return _ratio(choosing, ("-c", MATSUM, file))
 
 
@@ -140,11 +153,41 @@ def _study(names: Sequence[str], jobs: str) -> tuple[str, ...]:
 
 def _noisy(states: int) -> Path:
     """Energy of five modes of one damping, with white noise."""
+    return _ringing(f"noisy{states}.csv", states, _MODES, _NOISE)
+
+
+def _trouble(name: str, states: int) -> Path:
+    """A record of a kind that is hard to choose in: many modes, noise, impacts."""
+    rng = np.random.default_rng(14)
+    many = zip(rng.uniform(8, 40, 200), rng.uniform(0.3, 1, 200), rng.uniform(0, np.pi, 200), strict=True)
+    impacts = {"several flights": [(0.05, 6.0), (0.35, 4.0), (0.7, 3.0)], "chaotic contact": _chaotic(40)}
+    modes = {"200 modes": tuple(many), "chaotic contact": _MODES}.get(name, _THREE)
+    noise = {"noise 1 %": 0.01, "noise 10 %": 0.1}.get(name, 0.0)
+    return _ringing(f"{name}{states}.csv", states, modes, noise, impacts.get(name, ()))
+
+
+def _chaotic(count: int) -> list[tuple[float, float]]:
+    """Times and heights of impacts in the first half of a record, by the logistic map."""
+    heights = [0.3]
+    while len(heights) < count:
+        heights.append(3.9 * heights[-1] * (1 - heights[-1]))
+    return [(0.45 * (place + height) / count, 3 * height) for place, height in enumerate(heights)]
+
+
+def _ringing(
+    name: str,
+    states: int,
+    modes: Sequence[tuple[float, float, float]],
+    noise: float,
+    impacts: Sequence[tuple[float, float]] = (),
+) -> Path:
+    """Energy of modes of one damping, with white noise [of its largest] and impacts at (time, height)."""
     time = np.linspace(0.0, 1.0, states)
-    energy = sum(share * np.sin(2 * np.pi * cycles * time + phase) ** 2 for cycles, share, phase in _MODES)
+    energy = sum(share * np.sin(2 * np.pi * cycles * time + phase) ** 2 for cycles, share, phase in modes)
     energy = energy * np.exp(-0.8 * time)
-    noise = np.random.default_rng(14).standard_normal(states)
-    return _written(f"noisy{states}.csv", time, energy + _NOISE * energy.max() * noise)
+    energy += sum((height * np.exp(-(((time - at) / 0.004) ** 2)) for at, height in impacts), np.zeros(states))
+    white = np.random.default_rng(14).standard_normal(states)
+    return _written(name, time, energy + noise * energy.max() * white)
 
 
 def _clean(states: int) -> Path:
@@ -170,18 +213,18 @@ def _written(name: str, time: Samples, *energies: Samples, names: Sequence[str] 
     return file
 
 
-def _matsum() -> Path:
+def _matsum(parts: int) -> Path:
     """Parts that vibrate in the modes of a chain, noise beside."""
-    file = Path(_folder.name) / "matsum"
+    file = Path(_folder.name) / f"matsum{parts}"
     if not file.exists():
         rng = np.random.default_rng(14)
         time = np.linspace(0.0, 0.2, _PART_STATES)
-        cycles = rng.choice([4.0, 7.0, 11.0], size=_PARTS)
-        phases, sizes = rng.uniform(0, np.pi, _PARTS), rng.uniform(1, 100, _PARTS)
+        cycles = rng.choice([4.0, 7.0, 11.0], size=parts)
+        phases, sizes = rng.uniform(0, np.pi, parts), rng.uniform(1, 100, parts)
         swing = np.sin(2 * np.pi * 5 * cycles * time[:, np.newaxis] + phases) ** 2
         energies = sizes * np.exp(-5 * time)[:, np.newaxis] * swing
         energies += 1e-3 * sizes * np.abs(rng.standard_normal(energies.shape))
-        file.write_bytes(matsum_text(time, range(2001, 2001 + _PARTS), energies))
+        file.write_bytes(matsum_text(time, range(2001, 2001 + parts), energies))
     return file
 
 
