@@ -20,6 +20,7 @@ from d2rpick.api.answer import Paged, frame_of
 from d2rpick.api.asked import request_of
 from d2rpick.api.request import needed_time, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
+from d2rpick.base.files import record_of, signed
 from d2rpick.base.workers import answers, on_cores
 from d2rpick.choice import study as core
 from d2rpick.choice.study import FAILED, UNREADABLE, Stamp, StudyRow, stamps
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
 
 _FIRST: Final = b'{"source": '
 _LAST: Final = b'{"schema": '  # of the summary behind the rows
-_CHECKSUM: Final = ', "checksum": "'
 
 
 def fingerprint(question: Question) -> str:
@@ -63,25 +63,7 @@ def line(row: StudyRow, asked: str) -> str:
     }
     if row.curve is not None:
         record["curve"] = row.curve.tolist()
-    return _signed(json.dumps(record, allow_nan=False))
-
-
-def _signed(text: str) -> str:
-    """Add a checksum to a JSON object, its last key, so that a damaged line is never taken for another answer."""
-    return f'{text[:-1]}{_CHECKSUM}{_checksum(text[:-1].encode())}"}}'
-
-
-def _checksum(text: bytes) -> str:
-    return hashlib.sha256(text).hexdigest()[:16]
-
-
-def _record(text: bytes) -> dict[str, Any] | None:
-    """Record of a line as it was written; None for a damaged one."""
-    body, _, checksum = text.rpartition(_CHECKSUM.encode())
-    if checksum != f'{_checksum(body)}"}}'.encode():
-        return None
-    record: dict[str, Any] = json.loads(text)
-    return record
+    return signed(json.dumps(record, allow_nan=False))
 
 
 class Ledger:
@@ -115,7 +97,7 @@ class Ledger:
         if content[: len(_FIRST)] != _FIRST[: len(content)]:
             raise FormatError(f'{name}:1: not a run of a study, which begins with {{"source": ; give another file')
         for text in content.split(b"\n"):
-            if record := _record(text):
+            if record := record_of(text):
                 self._remember(record)
             else:
                 cut = text.startswith(_FIRST) and not text.endswith(b"}")  # by the end of a killed study

@@ -1,4 +1,7 @@
-"""Files of anyone: how much one may hold, whether it changes while it is read, and a new one put in its place."""
+"""Files of anyone: how much one may hold, whether it changes while it is read, and a new one put in its place.
+
+Lines of JSON have a checksum where a program goes on from them, so that a damaged one is never taken for another.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import os
 import stat
 import time
 from errno import ELOOP
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 from d2rpick.base.errors import D2RPickError
 
@@ -189,3 +192,34 @@ def write_whole(path: Path, content: bytes) -> None:
     except BaseException:
         scratch.unlink(missing_ok=True)
         raise
+
+
+_CHECKSUM: Final = ', "checksum": "'
+
+
+def signed(text: str) -> str:
+    """Add a checksum to a JSON object, its last key.
+
+    Examples
+    --------
+    >>> record_of(signed('{"leg": 1}').encode())["leg"], record_of(b'{"leg": 1}')
+    (1, None)
+    """
+    return f'{text[:-1]}{_CHECKSUM}{_checksum(text[:-1].encode())}"}}'
+
+
+def record_of(line: bytes) -> dict[str, Any] | None:
+    """Record of a line as it was written; None for a damaged one."""
+    body, _, checksum = line.rpartition(_CHECKSUM.encode())
+    if checksum != f'{_checksum(body)}"}}'.encode():
+        return None
+    import json  # not above: start-up
+
+    record: dict[str, Any] = json.loads(line)
+    return record
+
+
+def _checksum(text: bytes) -> str:
+    import hashlib
+
+    return hashlib.sha256(text).hexdigest()[:16]

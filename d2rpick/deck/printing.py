@@ -208,7 +208,7 @@ def _radioss(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
     """
     windows, ids, end = _of_run(windows, printing)
     files = {
-        f"{printing.name}_{leg.number:04d}.rad": "\n".join(_engine(leg, printing.name, ids, printing.off)) + "\n"
+        f"{printing.name}_{leg.number:04d}.rad": "\n".join(engine_lines(leg, printing.name, ids, printing.off)) + "\n"
         for leg in legs(windows, end, printing.step_cap)
     }
     return _told(windows, printing, (*_OF_RADIOSS, *remarks), files)
@@ -285,7 +285,8 @@ def listed(ids: Sequence[int]) -> Iterator[str]:
     yield from (" ".join(map(str, ids[i : i + _NODES_PER_LINE])) for i in range(0, len(ids), _NODES_PER_LINE))
 
 
-def _engine(leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int]) -> Iterator[str]:
+def engine_lines(leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int]) -> Iterator[str]:
+    """Write what an engine file says of a leg: its run, and which main nodes are rigid; ``others`` stay off."""
     yield f"/RUN/{name}/{leg.number}"
     yield f"{leg.stop!r:>20}"
     if leg.cap is not None:

@@ -132,17 +132,17 @@ def kept_off(legs: Sequence[Leg]) -> tuple[int, ...]:
 def _leg(card: Card) -> Leg:
     missing = Value(0.0, card.here, "the end of the run is missing below /RUN")
     name = card.block.head.split("/")[2].strip() if card.words[1:] else ""
-    return Leg(card, name, number_of(card, 2), next(_numbers(card), missing))
+    return Leg(card, name, number_of(card, 2), next(numbers(card), missing))
 
 
 def _take(leg: Leg, card: Card) -> None:
     words = card.words
     if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
-        leg.switched.append((card, words[1] == "ON", tuple(_integer(value) for value in _numbers(card))))
+        leg.switched.append((card, words[1] == "ON", tuple(_integer(value) for value in numbers(card))))
     elif words[:2] == ("STOP", "LSENSOR"):
-        leg.sensor = next((int(value.value) for value in _numbers(card)), 0)
+        leg.sensor = next((int(value.value) for value in numbers(card)), 0)
     elif words == ("DTIX",):
-        leg.cap = next(reversed(list(_numbers(card))), None)
+        leg.cap = next(reversed(list(numbers(card))), None)
     elif words[0] == "INIV":
         leg.starts.append(_start(card))
     elif words[0] == "VERS":
@@ -156,14 +156,14 @@ def _start(card: Card) -> Start:
     """
     type_ = number_of(card, 3)
     before = 5 if card.words[1:2] == ("AXIS",) else 1  # numbers of the velocity
-    ids = [_integer(value).value for value in _numbers(card)][before:]
+    ids = [_integer(value).value for value in numbers(card)][before:]
     if type_ == 2:
         return Start(card, (), ids[0] if ids else 0)
     pairs = zip(ids[::2], ids[1::2], strict=False) if type_ == 1 else zip(ids, ids, strict=True)
     return Start(card, tuple(pairs), 0)
 
 
-def _numbers(card: Card) -> Iterator[Value[float]]:
+def numbers(card: Card) -> Iterator[Value[float]]:
     """All numbers below a keyword, in free format."""
     for distance, line in card.block.lines():
         column = 0

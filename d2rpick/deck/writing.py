@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.deck.printed_card import PrintedCard
+    from d2rpick.deck.printing import EngineFile
     from d2rpick.deck.radioss_deck import Leg
     from d2rpick.deck.reader import Deck
     from d2rpick.deck.source import Block
@@ -88,7 +89,7 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         text = text.replace("_AUTOMATIC\n", "_AUTOMATIC-\n")  # the minus keeps its fields 10 columns wide
     yield Path(main).name, with_cards(deck.sources[0], f"*INCLUDE\n{name}\n", deck.sources[0].blocks())
     yield name, text.encode()
-    yield from _copies(deck.sources[1:], main, {name, Path(main).name})
+    yield from copies(deck.sources[1:], main, {name, Path(main).name})
 
 
 def _refuse_cut(deck: Deck) -> None:
@@ -124,7 +125,7 @@ def with_cards(main: SourceFile, text: str, found: Iterable[Block]) -> bytes:
     return content[:at] + text.encode().replace(b"\n", newline) + content[at:]
 
 
-def _copies(files: Sequence[SourceFile], main: str, taken: set[str]) -> Iterator[tuple[str, bytes]]:
+def copies(files: Sequence[SourceFile], main: str, taken: set[str]) -> Iterator[tuple[str, bytes]]:
     """Files below the folder of the deck, by their relative names; others must be named by an absolute path."""
     base = os.path.abspath(Path(main).parent)  # noqa: PTH100 - resolve() would follow links to elsewhere
     for file, source in {source.name: source for source in files}.items():
@@ -153,12 +154,12 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     yield Path(starter).name, _sensed(starter, main_text, card)
     further = list(blocks(leg.run.block.source))
     for (name, text), mine in zip(card.files.items(), printed, strict=True):
-        kept = (_text(block) for block in further if _repeated(keyword(block), mine))
+        kept = (text_of(block) for block in further if repeated(keyword(block), mine))
         named = {node.value for _, _, ids in mine.switched for node in ids} | card.sensors.keys()
         others = [node for node in kept_off(run.legs) if node not in named]  # else they would be rigid from time 0
         lines = listed(others) if mine.cap is None else off(others)  # its text ends with the bodies that it puts off
         yield name, (text + "".join(f"{line}\n" for line in lines)).encode() + b"".join(kept)
-    for name, content in _copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files}):
+    for name, content in copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files}):
         yield name, _sensed(name, content, card)
 
 
@@ -188,7 +189,7 @@ def _refuse_other_run(leg: Leg, printed: Sequence[Leg]) -> None:
             raise DeckError(f"{found}; remove it from this /RBODY/ON first")
 
 
-def _repeated(words: tuple[str, ...], leg: Leg) -> bool:
+def repeated(words: tuple[str, ...], leg: Leg | EngineFile) -> bool:
     """Whether a leg repeats a keyword of the run's engine file."""
     if not words or words[0] == "RUN" or words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
         return False
@@ -197,6 +198,7 @@ def _repeated(words: tuple[str, ...], leg: Leg) -> bool:
     return leg.number == 1 or words[0] not in _ONCE
 
 
-def _text(block: Block) -> bytes:
+def text_of(block: Block) -> bytes:
+    """Give the lines of a block, each with its end."""
     content = block.source.read(block.start, block.end)
     return content if content.endswith(b"\n") else content + b"\n"

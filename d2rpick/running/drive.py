@@ -1,0 +1,237 @@
+"""Drive a Radioss run that switches itself: start a leg, watch it, say which comes next, until the run is over."""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from d2rpick.base.errors import D2RPickError
+from d2rpick.base.files import write_whole
+from d2rpick.deck.driven import RESTARTS
+from d2rpick.running import engine
+from d2rpick.running.sequence import LOAD, SEARCH, Leg, Order, Seen, control, next_order
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from d2rpick.deck.driven import DrivenDeck
+    from d2rpick.running.engine import Left, Solver
+    from d2rpick.running.journal import Journal
+    from d2rpick.running.sequence import Limits
+
+JOURNAL: Final = "drive.ndjson"
+# Largest step while rigid over the mean one before: a rigid leg costs a few percent of a deformable one then, and the
+# state of a run is written often enough to show a contact.
+_STEP_RATIO: Final = 5.0
+# Restarts that a search keeps: it goes back by an eighth of the wait at most.
+_IN_SEARCH: Final = 9
+# Looks at a leg: so many seconds apart, so many times as long as a look takes, and by this share of the leg.
+_SHORTEST, _LOOKS, _SHARE = 0.2, 5.0, 0.005
+
+
+class Cost(NamedTuple):
+    """What a leg took: its kind, how long it was [time], its cycles and processor time [s], None where unknown."""
+
+    kind: str
+    length: float
+    cycles: int | None
+    cpu: float | None
+
+
+class Commands(NamedTuple):
+    """How starter and engine are started, None for those of the installation, on so many threads."""
+
+    starter: str | None = None
+    engine: str | None = None
+    threads: int = 1
+
+    def words(self, program: str, deck: str) -> list[str]:
+        """Words of the command that starts one of the two."""
+        return engine.words(program, getattr(self, program), deck, self.threads)
+
+
+class Driver:
+    """One run in its folder, as far as its journal says.
+
+    ``told`` gets each thing that happens, in a line; ``at`` is the leg that is computed and its time.
+    """
+
+    def __init__(
+        self,
+        deck: DrivenDeck,
+        solver: Solver,
+        journal: Journal,
+        commands: Commands,
+        limits: Limits,
+        look: Callable[[Order, Sequence[Path], float], Seen | None],
+        told: Callable[[str], None],
+    ) -> None:
+        self.deck, self.solver, self.journal, self.commands = deck, solver, journal, commands
+        self.limits, self.look, self.told = limits, look, told
+        self.at: tuple[Order, float] | None = None
+
+    @property
+    def legs(self) -> list[Leg]:
+        """Legs that are over, those that were thrown away too."""
+        return [
+            Leg(Order(*one["order"]), Seen(*one["seen"]), one["cut"], tuple(map(tuple, one["restarts"])))
+            for one in self.journal.all("ended")
+        ]
+
+    @property
+    def costs(self) -> list[Cost]:
+        """What they took, in their order."""
+        return [
+            Cost(one["order"][0], one["seen"][0] - one["order"][2], one["cycles"], one["cpu"])
+            for one in self.journal.all("ended")
+        ]
+
+    def prepare(self) -> None:
+        """Copy the deck into the folder and run the starter, unless that is done."""
+        if self.journal.all("prepared"):
+            return
+        for name, content in self.deck.files.items():
+            (self.solver.folder / name).parent.mkdir(parents=True, exist_ok=True)
+            write_whole(self.solver.folder / name, content)
+        first = self.solver.file(1, ".rad")
+        write_whole(first, self.deck.leg(1, self.deck.end, "", None))  # the starter looks for /RBODY/OFF there
+        self.solver.start(self.commands.words("starter", self.solver.file(0, ".rad").name), 0)
+        while self.solver.alive:
+            time.sleep(_SHORTEST)
+        if not self.solver.started_well():
+            raise D2RPickError(f"{self.solver.file(0, '.out')}: the starter failed: {self.solver.last_lines(0)}")
+        self.journal.add("prepared")
+
+    def run(self) -> None:
+        """Compute leg after leg to the end of the run.
+
+        Raises
+        ------
+        D2RPickError
+            If the solver fails, or the disk has no room; the run goes on from there when it is driven again.
+        """
+        while order := next_order(self.legs, self.limits):
+            self._compute(order)
+        self.at = None
+
+    def _compute(self, order: Order) -> None:
+        resumed = self._under_way(order)
+        if not resumed:
+            self._start(order)
+        elif self.solver.alive:
+            self.told(f"leg {order.number}: the solver is still at work on it")
+        alive = self.solver.alive
+        with self._stopping(order):
+            self._watch(order)
+        left = self.solver.left(order.number)
+        if not left.normal and (alive or not resumed):
+            words = self.solver.last_lines(order.number)
+            raise D2RPickError(f"{self.solver.file(order.number, '.out')}: the solver failed: {words}")
+        self._end(order, left)
+
+    def _under_way(self, order: Order) -> bool:
+        """Whether an earlier driver has begun this leg, and nobody has said how it ended."""
+        last = self.journal.records[-1]
+        return last["event"] == "started" and Order(*last["order"]) == order
+
+    def _start(self, order: Order) -> None:
+        number, legs = order.number, self.journal.all("ended")
+        self.solver.check_room(number, 1 - order.start / self.limits.end)
+        before = next((one for one in reversed(legs) if one["order"][1] == number - 1), {"restart": ""})
+        restart = before["restart"] if order.restart is None else order.restart
+        cap = _STEP_RATIO * self._step() if order.rigid else None
+        self.solver.clear(number)
+        text = self.deck.leg(number, order.until, restart, cap and min(self.deck.interval, cap), self._ring(order))
+        write_whole(self.solver.file(number, ".rad"), text)
+        self.journal.add("started", order=order)
+        self.solver.start(self.commands.words("engine", self.solver.file(number, ".rad").name), number)
+        self.solver.keep_two(number)
+        self.told(f"leg {number}: {order.kind} from {order.start:.6g}")
+
+    def _step(self) -> float:
+        """Smallest mean step of a deformable leg, or the interval of the history where none is known yet [time]."""
+        known = [one.length / one.cycles for one in self.costs if one.kind == LOAD and one.cycles]
+        return float(f"{min([self.deck.interval, *known]):.3g}")
+
+    def _ring(self, order: Order) -> tuple[int, int]:
+        """How many restarts a leg keeps, and cycles between them: those of a search lie close, to go back to tr."""
+        if order.kind != SEARCH:
+            return RESTARTS
+        return _IN_SEARCH, max(1, round((order.until - order.start) / self._step() / (_IN_SEARCH - 1)))
+
+    def _written(self, order: Order, left: Left) -> list[tuple[float, str]]:
+        """Times and letters of the restarts that a search wrote on its way, by their cycles."""
+        if order.kind != SEARCH or left.timing is None or not left.timing.cycles:
+            return []
+        many, every = self._ring(order)
+        seen = self._seen(order)
+        step = (seen.time - order.start) / left.timing.cycles if seen else 0.0
+        count = min(
+            (left.timing.cycles - 1) // every, many - 1
+        )  # the last one, at its end, may have taken the next letter
+        return [(order.start + n * every * step, chr(ord("I") + n - 1)) for n in range(1, count + 1)]
+
+    def _watch(self, order: Order) -> None:
+        """Look at a leg until it is over, and tell the engine when to stop."""
+        began, said, size = time.monotonic(), "", -1
+        history = self.solver.history(order.number)
+        while self.solver.alive:
+            looked = time.monotonic()
+            grown = history.stat().st_size if history.exists() else -1
+            if grown != size and (seen := self._seen(order)):
+                size, self.at = grown, (order, seen.time)
+                text = control(order, seen, self.limits)
+                if text and text != said:
+                    self.solver.tell(order.number, text)
+                    said = text
+            now = time.monotonic()
+            time.sleep(max(_SHORTEST, _LOOKS * (now - looked), _SHARE * (now - began)))
+
+    def _seen(self, order: Order) -> Seen | None:
+        legs = self.legs
+        known = max((leg.seen.wait for leg in legs if not leg.seen.idle), default=0.0)
+        return self.look(order, [self.solver.history(number) for number in _segment(order, legs)], known)
+
+    @contextmanager
+    def _stopping(self, order: Order) -> Iterator[None]:
+        """Let the engine end its leg, with a restart where one is needed, when the driver is interrupted."""
+        try:
+            yield
+        except (KeyboardInterrupt, D2RPickError):
+            self.solver.tell(order.number, "/KILL\n" if order.rigid else "/STOP\n")
+            self.told("stopping: the solver writes its restart")
+            while self.solver.alive:
+                time.sleep(_SHORTEST)
+            left = self.solver.left(order.number)
+            if left.normal:
+                self._end(order, left)
+            raise
+
+    def _end(self, order: Order, left: Left) -> None:
+        """Write down how a leg has ended; one that left nothing to go on from is begun again."""
+        seen = self._seen(order)
+        if seen is None or (left.restart is None and not order.rigid) or (order.rigid and not left.normal):
+            if left.normal:
+                raise D2RPickError(f"{self.solver.file(order.number, '.out')}: the leg left no state, or no restart")
+            self.journal.add("lost", order=order)
+            return
+        took = left.timing
+        self.journal.add(
+            "ended", order=order, seen=seen, cut=not left.normal, restart=left.restart or "",
+            restarts=self._written(order, left), cycles=took.cycles if took else None, cpu=took.total if took else None,
+        )  # fmt: skip
+        self.solver.file(order.number, ".ctl").unlink(missing_ok=True)
+
+
+def _segment(order: Order, legs: Sequence[Leg]) -> Sequence[int]:
+    """Numbers of the legs whose record counts: this one, and before a deformable one those since the last rigid one.
+
+    In rigid legs no quantity of a part is believed, and over them no inner motion goes on.
+    """
+    orders = {leg.order.number: leg.order for leg in legs}
+    first = order.number
+    while not order.rigid and (before := orders.get(first - 1)) and not before.rigid:
+        first -= 1
+    return range(first, order.number + 1)
