@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 # decks; and what computes runs of its own.
 _WORK: Final = {
     "info": "Show what is in the files of a run.",
+    "drive": "Compute a Radioss run that switches itself.",
     "plan": "Plan the rigid windows of all flights of a run.",
     "suggest": "Choose tr for a td, or both times.",
     "explore": "Show what each td costs.",

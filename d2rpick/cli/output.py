@@ -309,7 +309,7 @@ def reading(names: Sequence[str], *, quiet: bool, period: float = _PERIOD) -> It
     what = "standard input" if names[0] == "-" else printable(names[0])
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     start = perf_counter()
-    with _telling(lambda seconds: f"reading {what}{more} ... {seconds:.0f} s", quiet=quiet, period=period):
+    with telling(lambda seconds: f"reading {what}{more} ... {seconds:.0f} s", quiet=quiet, period=period):
         yield
     context = click.get_current_context(silent=True)
     if context and context.meta.get("d2rpick.verbose"):
@@ -351,7 +351,7 @@ class Count:
 def counting(total: int, *, quiet: bool, period: float = _PERIOD) -> Iterator[Count]:
     """Tell on stderr how many runs are done and how long the rest will take; the caller counts."""
     count = Count(total)
-    with _telling(count.told, quiet=quiet, period=period):
+    with telling(count.told, quiet=quiet, period=period):
         yield count
 
 
@@ -369,7 +369,7 @@ def _clock(seconds: float) -> str:
 
 
 @contextmanager
-def _telling(say: Callable[[float], str], *, quiet: bool, period: float) -> Iterator[None]:
+def telling(say: Callable[[float], str], *, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
     """Show what ``say`` gives for the seconds that have gone by, unless ``quiet`` or where no terminal is."""
     if quiet or sys.stderr is None or not sys.stderr.isatty():
         yield

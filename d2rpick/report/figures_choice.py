@@ -42,8 +42,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.suggest import Pair, Suggestion
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.choice.verify import Verdict
-    from d2rpick.histories.history import Samples
+    from d2rpick.histories.history import History, Samples
     from d2rpick.report.view import Motion, View
+    from d2rpick.running.sequence import Window
 
 
 # Height of a file's figure of the energy alone, and with the motion; on a page, that of a panel [inch].
@@ -191,6 +192,21 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
     else:
         known = entries([axes])
         figure.legend(known.values(), known, loc="outside lower left", ncols=4, fontsize="small", frameon=False)
+    return figure
+
+
+def draw_driven(history: History, windows: Sequence[Window]) -> Figure:
+    """Draw the energy of a run that was driven, as far as it is believed, and its rigid windows."""
+    figure = Figure()
+    axes = figure.subplots()
+    rigid = np.any([(history.time > one.tr) & (history.time < one.td) for one in windows], axis=0)
+    axes.plot(history.time, np.where(rigid, np.nan, history.energy), color=REFERENCE, linewidth=1, label="energy")
+    for one in windows:
+        axes.axvspan(one.free, one.contact or one.td, color=FLIGHT, alpha=0.15, linewidth=0, label="flight")
+        axes.axvspan(one.tr, one.td, ymax=_STRIP, color=GOOD, linewidth=0, label="rigid")
+    axes.set(xlabel=with_unit("time", history.time_unit), ylabel="internal energy")
+    finish(axes, legend=False)
+    arrange(figure, [axes], _PLAN_PANEL)
     return figure
 
 

@@ -55,6 +55,7 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
     },
     "parts": {**PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
     "calibration": {**PLAIN, "toml": lambda report, answer, _: report.as_toml(answer)},
+    "drive": {form: PLAIN[form] for form in ("table", "json")},
     "verdict": PLAIN,
     "overview": PLAIN,
     "study": {

@@ -10,7 +10,7 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.base.files import write_whole
 from d2rpick.deck.driven import RESTARTS
 from d2rpick.running import engine
-from d2rpick.running.sequence import LOAD, SEARCH, Leg, Order, Seen, control, next_order
+from d2rpick.running.sequence import LOAD, RIGID_KINDS, SEARCH, Leg, Order, Seen, control, next_order
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -38,6 +38,11 @@ class Cost(NamedTuple):
     length: float
     cycles: int | None
     cpu: float | None
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the parts were rigid in it."""
+        return self.kind in RIGID_KINDS
 
 
 class Commands(NamedTuple):

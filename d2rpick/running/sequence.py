@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 LOAD, SEARCH, APPROACH, PROBE, RIGID = "load", "search", "approach", "probe", "rigid"
-KINDS: Final = (LOAD, SEARCH, APPROACH, PROBE, RIGID)
+RIGID_KINDS: Final = (PROBE, RIGID)
 # Without a margin that is given: this share of the flight held in eight windows of two structures.
 _MARGIN_SHARE: Final = 0.03
 # A search ends when nothing higher came for this share of it: the rest would be computed twice.
@@ -68,7 +68,7 @@ class Order(NamedTuple):
     @property
     def rigid(self) -> bool:
         """Whether the parts are rigid in it."""
-        return self.kind in (PROBE, RIGID)
+        return self.kind in RIGID_KINDS
 
 
 class Seen(NamedTuple):

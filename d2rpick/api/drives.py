@@ -1,0 +1,153 @@
+"""A Radioss run that switches itself while it is computed, in its first run."""
+
+from __future__ import annotations
+
+import hashlib
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from d2rpick.api.answer import Paged
+from d2rpick.api.cards import numbers
+from d2rpick.base.errors import D2RPickError
+from d2rpick.choice.cost import CostModel
+from d2rpick.choice.deck_of_run import doubts_of_solver
+from d2rpick.deck import read_inventory
+from d2rpick.deck.driven import driven_deck
+from d2rpick.deck.inner_period import inner_period
+from d2rpick.histories.opening import open_run
+from d2rpick.running.drive import JOURNAL, Commands, Cost, Driver
+from d2rpick.running.engine import Solver, alone
+from d2rpick.running.journal import Journal
+from d2rpick.running.look import Looks
+from d2rpick.running.sequence import Limits, Window, windows
+from d2rpick.running.wait import Wait, refuse_wait
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from d2rpick.api.cards import Cards
+    from d2rpick.choice.warnings import Caution
+    from d2rpick.deck.driven import DrivenDeck
+    from d2rpick.histories.run import Run
+
+# Of a second: where nothing vibrates so long without a force is flight, and so long before a contact td lies at least.
+_SHORTEST = 2e-3
+_EXACT = 0.9  # a period is known no better
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """How a run is to be driven: all that ``d2rpick drive`` is told.  Times are in the unit of the deck."""
+
+    deck: str
+    folder: Path
+    part: tuple[str, ...] = ()
+    wait: float | None = None
+    margin: float | None = None
+    commands: Commands = field(default_factory=Commands)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Drive(Paged):
+    """Answer of `drive`, of the run as far as it is; nothing of it changes.
+
+    ``windows`` are those of all flights, ``costs`` what each leg took, ``saved`` the share of the cost of a deformable
+    run that is saved by the cost model and by the processor time of this run, None where it is not known.
+    """
+
+    run: Run
+    deck: DrivenDeck
+    windows: tuple[Window, ...]
+    costs: tuple[Cost, ...]
+    why: str
+    saved: tuple[float | None, float | None]
+    command: tuple[str, ...]
+    kind = "drive"
+    said = ("windows", "saved")
+
+    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
+        """Write the page."""
+        from d2rpick.report.drive import drive_page
+
+        return drive_page(self, command)
+
+
+class Driving:
+    """A run that is about to be driven, or to go on.
+
+    Raises
+    ------
+    D2RPickError
+        If the deck cannot be driven, or the wait contradicts what it says of its springs.
+    """
+
+    def __init__(self, asked: Asked, told: Callable[[str], None]) -> None:
+        self.asked = asked
+        self.deck = driven_deck(asked.deck, numbers("--part", asked.part) if asked.part else ())
+        self.inventory = read_inventory(asked.deck)
+        period = inner_period(self.inventory)
+        known = period and Wait(period.least / 2, "deck", period.reason)
+        if known and asked.wait is not None and asked.wait < _EXACT * known.time:
+            refuse_wait(asked.wait, known, asked.deck)
+        shortest = _SHORTEST * self.deck.second if self.deck.second else 0.0
+        self.limits = Limits(self.deck.end, self.deck.interval, shortest, asked.margin)
+        self.looks = Looks(self.deck.parts, self.inventory, asked.wait, known)
+        self.solver = Solver(asked.folder, self.deck.name, asked.commands.threads)
+        self.cautions: tuple[Caution, ...] = tuple(doubts_of_solver(self.deck.parts, self.inventory))
+        self._told = told
+
+    @contextmanager
+    def driver(self, *, resume: bool) -> Iterator[Driver]:
+        """Give the driver of the run in its folder, and keep others out.
+
+        D2RPickError where one is at work there, the folder holds something else, or the run has begun and is not to
+        be resumed.
+        """
+        folder = self.asked.folder
+        folder.mkdir(parents=True, exist_ok=True)
+        with alone(folder):
+            journal = Journal(folder / JOURNAL)
+            digest = hashlib.sha256(b"\0".join(self.deck.files.values())).hexdigest()
+            begun = journal.all("begun")
+            if begun and not resume:
+                raise D2RPickError(f"{folder}: this run has begun; --resume goes on with it, or choose another folder")
+            if begun and begun[0]["deck"] != digest:
+                raise D2RPickError(f"{folder}: begun with another deck than {self.asked.deck} is now; name that one")
+            if not begun:
+                if any(not one.name.startswith(".") for one in folder.iterdir()):
+                    raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
+                journal.add("begun", deck=digest)
+            yield Driver(self.deck, self.solver, journal, self.asked.commands, self.limits, self.looks, self._told)
+
+    def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
+        """Say what has come of the run so far."""
+        legs, costs = driver.legs, driver.costs
+        last = max((leg.order.number for leg in legs), default=0)
+        names = [str(self.solver.history(number)) for number in range(1, last + 1)]
+        return Drive(
+            run=open_run(names), deck=self.deck, windows=tuple(windows(legs, self.limits)), costs=tuple(costs),
+            why=self.looks.why, saved=(self._by_model(costs), _by_time(costs, self.deck.end)), cautions=self.cautions,
+            command=tuple(command),
+        )  # fmt: skip
+
+    def _by_model(self, costs: Sequence[Cost]) -> float | None:
+        share = CostModel(self.inventory).saved(self.deck.parts).value
+        steps = [
+            [one.length / one.cycles for one in costs if one.cycles and one.rigid is rigid] for rigid in (False, True)
+        ]
+        if share is None or not all(steps):
+            return None
+        ratio = max(steps[1]) / min(steps[0])
+        took = sum(one.length * ((1 - share) / ratio if one.rigid else 1.0) for one in costs)
+        return 1 - took / self.deck.end
+
+
+def _by_time(costs: Sequence[Cost], end: float) -> float | None:
+    """Share that is saved where a deformable run takes as long as the deformable legs do on the whole."""
+    if any(one.cpu is None for one in costs):
+        return None
+    deformable = [one for one in costs if not one.rigid]
+    whole = sum(one.cpu or 0.0 for one in deformable) / sum(one.length for one in deformable) * end
+    return 1 - sum(one.cpu or 0.0 for one in costs) / whole if whole else None

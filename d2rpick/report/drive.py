@@ -1,0 +1,99 @@
+"""The answer of ``drive`` as table, JSON and page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.report import keys, page, tables
+from d2rpick.report.fields import Document, Field, many, row
+from d2rpick.report.html import document, drawings, pairs, remarks, section, table, tag
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.api.drives import Drive
+    from d2rpick.report.html import Markup
+
+_WINDOW: Final = row(
+    Field("free", "number", "since when no force has acted"),
+    Field("wait", "number", "time without force that was asked for"),
+    Field("tr", "number"), Field("td", "number"),
+    Field("contact", "number?", "first contact of the rigid body; null where the run ended before"),
+    Field("reason", "text?", "why the flight was left out; null where it was switched"),
+)  # fmt: skip
+_LEG: Final = row(
+    Field("kind", "text", "load, search, approach, probe or rigid"),
+    Field("length", "number"),
+    Field("cycles", "integer?"),
+    Field("cpu", "number?", "processor time [s]"),
+)
+DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in the unit of the deck.", row(
+    keys.WARNINGS,
+    Field("windows", many(_WINDOW)),
+    Field("legs", many(_LEG), "in the order they were computed; probes are thrown away", lambda one: one.costs),
+    Field("saved_by_model", "number?", "share of a deformable run, by the cost model", lambda one: one.saved[0]),
+    Field("saved_by_time", "number?", "the same, by the processor time of the legs", lambda one: one.saved[1]),
+))  # fmt: skip
+_NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps of the vibration is an expectation"
+
+
+def as_table(found: Drive) -> str:
+    """The windows, what the legs took, and what was saved."""
+    parts = [tables.as_text(*_windows(found)) if found.windows else "no window", tables.as_text(*_legs(found))]
+    return "\n\n".join([*parts, "\n".join(tables.in_line(_outlook(found), 9))])
+
+
+def _windows(found: Drive) -> tuple[list[str], list[list[tables.Cell]]]:
+    columns = {
+        "flight": lambda one: one.free, "wait": lambda one: f"{one.wait:.4g}",
+        "tr": lambda one: one.tr, "td": lambda one: one.td,
+        "contact": lambda one: one.contact,
+        "margin": lambda one: None if one.contact is None else f"{one.contact - one.td:.3g}",
+        "lost by waiting": lambda one: f"{one.tr - one.free:.3g}",
+        "status": lambda one: f"left out: {one.reason}" if one.reason else "switched",
+    }  # fmt: skip
+    return tables.filled(columns, found.windows)
+
+
+def _legs(found: Drive) -> tuple[list[str], list[list[tables.Cell]]]:
+    rows: list[list[tables.Cell]] = []
+    for kind in dict.fromkeys(one.kind for one in found.costs):
+        own = [one for one in found.costs if one.kind == kind]
+        cpu = None if any(one.cpu is None for one in own) else f"{sum(one.cpu or 0.0 for one in own):.4g}"
+        rows.append([kind, len(own), f"{sum(one.length for one in own):.4g}", sum(one.cycles or 0 for one in own), cpu])
+    return ["kind", "legs", "time", "cycles", "CPU s"], rows
+
+
+def _outlook(found: Drive) -> list[tuple[str, str]]:
+    words = zip(found.saved, ("by the cost model", "by the processor time of its legs"), strict=True)
+    saved = [f"{value:.0%} {by}" for value, by in words if value is not None]
+    lines = [("saves", f"{', '.join(saved)}, against a deformable run")] if saved else []
+    return [*lines, *([("wait", found.why)] if found.why else []), ("keeps", _NOT_KNOWN)]
+
+
+def drive_page(found: Drive, command: Sequence[str]) -> str:
+    """Write the page; ``command`` are the arguments that repeat the run."""
+    return document(f"First run: {found.deck.name}", *_sections(found, command), signed=page.CHECKED)
+
+
+def _sections(found: Drive, command: Sequence[str]) -> Iterator[Markup]:
+    from d2rpick.histories.names import Selection
+    from d2rpick.report.figures import svg_element
+    from d2rpick.report.figures_choice import draw_driven
+
+    history = found.run.history(Selection(parts=tuple(map(str, found.deck.parts))))
+    switched = [one for one in found.windows if not one.reason]
+    told = [
+        pairs([("contact", "none to the end" if one.contact is None else f"{one.contact:.6g}")]) for one in switched
+    ]
+    cards = [
+        page.pair(f"Window {number}", (one.tr, one.td), text, history, "card chosen")
+        for number, (one, text) in enumerate(zip(switched, told, strict=True), start=1)
+    ]
+    yield page.front(cards or [tag("p", "No flight was switched.")], remarks(found.cautions), pairs(_outlook(found)))
+    caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
+    yield drawings({caption: svg_element(draw_driven(history, switched), "driven-")})
+    yield section("Evidence", table("Windows", *_windows(found)))
+    yield section("Cost", table("Legs", *_legs(found)))
+    yield section("What was read", pairs(page.digests(found.run.files)))
+    yield page.repeated(command)
