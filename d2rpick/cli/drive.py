@@ -91,8 +91,8 @@ def drive(
     """Compute a Radioss run that switches itself: no reference is needed.
 
     DECK, a starter deck with one engine file, is copied into RUNDIR.  Each flight begins when no force has acted for
-    the wait; tr is the highest energy within one more.  A rigid probe finds the next contact and is thrown away; the run is
-    rigid to the margin before it, and deformable from there on.  Interrupted, it goes on with --resume.
+    the wait; tr is the highest energy within one more.  A rigid probe finds the next contact and is thrown away.  Then
+    the run is rigid to the margin before it, and goes on deformable.  What is interrupted goes on with --resume.
     """
     from d2rpick.api.drives import Asked, Driving
     from d2rpick.running.drive import Commands

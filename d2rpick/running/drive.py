@@ -28,7 +28,7 @@ _STEP_RATIO: Final = 5.0
 # Restarts that a search keeps: it goes back by an eighth of the wait at most.
 _IN_SEARCH: Final = 9
 # Looks at a leg: so many seconds apart, so many times as long as a look takes, and by this share of the leg.
-_SHORTEST, _LOOKS, _SHARE = 0.2, 5.0, 0.005
+_SHORTEST, _LOOKS, _SHARE = 0.2, 2.0, 0.005
 
 
 class Cost(NamedTuple):
@@ -97,17 +97,21 @@ class Driver:
         """Copy the deck into the folder and run the starter, unless that is done."""
         if self.journal.all("prepared"):
             return
+        self._wait_for_end()  # of a starter that an earlier driver has left
         for name, content in self.deck.files.items():
             (self.solver.folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_whole(self.solver.folder / name, content)
         first = self.solver.file(1, ".rad")
         write_whole(first, self.deck.leg(1, self.deck.end, "", None))  # the starter looks for /RBODY/OFF there
         self.solver.start(self.commands.words("starter", self.solver.file(0, ".rad").name), 0)
-        while self.solver.alive:
-            time.sleep(_SHORTEST)
+        self._wait_for_end()
         if not self.solver.started_well():
             raise D2RPickError(f"{self.solver.file(0, '.out')}: the starter failed: {self.solver.last_lines(0)}")
         self.journal.add("prepared")
+
+    def _wait_for_end(self) -> None:
+        while self.solver.alive:
+            time.sleep(_SHORTEST)
 
     def run(self) -> None:
         """Compute leg after leg to the end of the run.
@@ -147,6 +151,8 @@ class Driver:
         before = next((one for one in reversed(legs) if one["order"][1] == number - 1), {"restart": ""})
         restart = before["restart"] if order.restart is None else order.restart
         cap = _STEP_RATIO * self._step() if order.rigid else None
+        if order.restart is not None:  # what follows in the leg before is computed again
+            self.solver.shorten(number - 1, order.start)
         self.solver.clear(number)
         text = self.deck.leg(number, order.until, restart, cap and min(self.deck.interval, cap), self._ring(order))
         write_whole(self.solver.file(number, ".rad"), text)
@@ -207,8 +213,7 @@ class Driver:
         except (KeyboardInterrupt, D2RPickError):
             self.solver.tell(order.number, "/KILL\n" if order.rigid else "/STOP\n")
             self.told("stopping: the solver writes its restart")
-            while self.solver.alive:
-                time.sleep(_SHORTEST)
+            self._wait_for_end()
             left = self.solver.left(order.number)
             if left.normal:
                 self._end(order, left)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ConfigurationError, D2RPickError, FormatError, printable
 from d2rpick.base.files import write_whole
+from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.listings import Timing, read_timing
 
 if TYPE_CHECKING:
@@ -189,6 +190,11 @@ class Solver:
     def started_well(self) -> bool:
         """Whether the starter has ended without an error, and left a restart."""
         return bool(self._restarts(0)) and not _STARTER_ERROR.search(_tail(self.file(0, ".out")))
+
+    def shorten(self, number: int, time: float) -> None:
+        """Cut the history of a leg behind a time: a reader would find two energies there."""
+        path = self.history(number)
+        os.truncate(path, TimeHistory(path.read_bytes(), str(path)).size_until(time))
 
     def last_lines(self, number: int) -> str:
         """Give the last lines that the solver printed, in one."""

@@ -138,6 +138,8 @@ def _after_load(legs: Sequence[Leg], limits: Limits) -> Order | None:
         return None
     if last.cut or not lasts(last.order, seen, limits):
         return _following(last, LOAD, limits.end)
+    if not _room(seen, seen.time, limits):
+        return _following(last, LOAD, limits.end)._replace(after=seen.time)
     if seen.idle:
         return _following(last, PROBE, limits.end)
     return _following(last, SEARCH, min(seen.time + seen.wait, limits.end))
@@ -211,6 +213,11 @@ def lasts(order: Order, seen: Seen, limits: Limits, share: float = 1.0) -> bool:
     return seen.time - seen.free >= share * _wait(seen, limits) - limits.same
 
 
+def _room(seen: Seen, time: float, limits: Limits) -> bool:
+    """Whether a window that begins at a time can last for two waits before the run ends."""
+    return limits.end - time >= 2 * _wait(seen, limits)
+
+
 def _wait(seen: Seen, limits: Limits) -> float:
     return min(seen.wait, limits.shortest) if seen.idle and limits.shortest else seen.wait
 
@@ -248,4 +255,6 @@ def control(order: Order, seen: Seen, limits: Limits) -> str:
     if order.kind != LOAD or seen.free is None or not lasts(order, seen, limits, 0.5):
         return ""
     ready = seen.free + _wait(seen, limits)
+    if not _room(seen, ready, limits):
+        return ""
     return f"/TIME/{ready:.9g}\n/STOP\n" if ready > seen.time else "/STOP\n"

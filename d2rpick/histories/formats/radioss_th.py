@@ -123,6 +123,10 @@ class TimeHistory(Database):
             raise FormatError(f"{self.source}: no global {name}, there are {listing(self.channels, most=30)}")
         return self._columns(1, [self.channels.index(name)])[:, 0]
 
+    def size_until(self, time: float) -> int:
+        """Bytes of the head and of the states up to a time [time]."""
+        return self._records.at + self._stride * int(np.searchsorted(self.time, time, side="right"))
+
     @cached_property
     def part_time(self) -> Samples:
         """Return the times of all states, shape (n,) [time]."""

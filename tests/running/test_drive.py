@@ -1,0 +1,141 @@
+"""A run that switches itself, with a solver that is a script: what is left of it, also after what ends it early."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from d2rpick.base.errors import D2RPickError
+from d2rpick.histories.opening import open_run
+from d2rpick.running import engine
+from tests.command import ROOT, run
+from tests.deck.test_openradioss import ENGINE, starter
+from tests.decks import wide
+
+FAKE = Path(__file__).with_name("fake_solver.py")
+GRAVITY = (
+    f"/FUNCT/1\ngravity\n{wide(0.0, -9.81, width=20)}{wide(10.0, -9.81, width=20)}"
+    f"/GRAV/1\ngravity\n{wide(1, 'Z', 0, 0, 1)[:-1]}{wide(1.0, 1.0, width=20)}"
+)
+WAIT, END, LANDS, LOADED = 0.02, 0.22, 0.17, 0.03
+
+
+def command(kind: str) -> str:
+    return shlex.join([sys.executable, str(FAKE), kind, "{deck}"])
+
+
+def asked(folder: Path, *more: str) -> list[str]:
+    deck = folder / "deck"
+    if not deck.exists():
+        deck.mkdir()
+        (deck / "strip_0000.rad").write_text(starter().replace("/TH/PART", f"{GRAVITY}/TH/PART"))
+        text = ENGINE.replace("0.02\n/VERS", f"{END}\n/VERS").replace("/TFILE/4\n2e-05", "/TFILE/4\n0.001")
+        (deck / "strip_0001.rad").write_text(text)
+    return [
+        "drive", str(deck / "strip_0000.rad"), "-o", str(folder / "run"), "--wait", str(WAIT),
+        "--starter", command("starter"), "--engine", command("engine"), "-f", "json", *more,
+    ]  # fmt: skip
+
+
+def check(found: dict[str, object], folder: Path) -> None:
+    """What must hold of every run that came to its end: it is whole, and rigid in the flight alone."""
+    switched = [one for one in found["windows"] if one["reason"] is None]  # type: ignore[attr-defined]
+    assert len(switched) == 1
+    (window,) = switched
+    assert LOADED - 0.002 <= window["free"] <= LOADED + 0.002
+    assert window["tr"] >= window["free"] + WAIT
+    assert window["td"] < LANDS < window["contact"]
+    joined = open_run([str(path) for path in sorted((folder / "run").glob("stripT??"))]).databases[0]
+    assert joined.time[-1] == pytest.approx(END, abs=0.002)
+    # what the parts say is void exactly where they were rigid
+    parts = joined.part_channel("internal_energy", [1])[:, 0]
+    rigid = joined.time[parts > 1e9]
+    assert rigid[0] == pytest.approx(window["tr"], abs=0.0021)
+    assert rigid[-1] == pytest.approx(window["td"], abs=0.0021)
+
+
+def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(tmp_path: Path) -> None:
+    report = tmp_path / "page.html"
+    found = json.loads(run(*asked(tmp_path, "--report", str(report), "-q")).stdout)
+    check(found, tmp_path)
+    kinds = [leg["kind"] for leg in found["legs"]]
+    assert kinds[-3:] == ["probe", "rigid", "load"]
+    assert all(leg["cpu"] == 1.0 for leg in found["legs"])
+    assert "First run: strip" in report.read_text()
+    restarts = {int(path.name[6:10]) for path in (tmp_path / "run").glob("*.rst")}
+    assert max(restarts) - min(restarts) <= 2
+    assert not list((tmp_path / "run").glob("*.ctl"))
+    again = run(*asked(tmp_path))
+    assert again.exit_code == 2
+    assert "--resume" in again.stderr
+    assert json.loads(run(*asked(tmp_path, "--resume", "-q")).stdout)["windows"] == found["windows"]
+
+
+def test_what_a_solver_says_when_it_fails_is_told_and_the_run_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("D2RPICK_FAKE", "fail")
+    failed = run(*asked(tmp_path))
+    assert failed.exit_code == 2
+    assert "strip_0002.out: the solver failed" in failed.stderr
+    assert "NEGATIVE VOLUME IN ELEMENT 7" in failed.stderr
+    monkeypatch.delenv("D2RPICK_FAKE")
+    check(json.loads(run(*asked(tmp_path, "--resume", "-q")).stdout), tmp_path)
+
+
+@pytest.mark.parametrize("ended", [signal.SIGKILL, signal.SIGINT], ids=["killed", "interrupted"])
+def test_a_driver_that_is_ended_loses_no_leg(tmp_path: Path, ended: signal.Signals) -> None:
+    words = [sys.executable, "-m", "d2rpick", *asked(tmp_path)]
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        time.sleep(4)
+        process.send_signal(ended)
+        process.wait()
+    found = run(*asked(tmp_path, "--resume", "-q"))
+    assert not found.stderr
+    check(json.loads(found.stdout), tmp_path)
+
+
+def test_a_second_driver_is_kept_out(tmp_path: Path) -> None:
+    with engine.alone(tmp_path), pytest.raises(D2RPickError, match="another d2rpick drives"), engine.alone(tmp_path):
+        pass
+
+
+def test_a_leg_is_not_begun_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import shutil
+
+    (tmp_path / "strip_0001_0001.rst").write_bytes(bytes(1000))
+    solver = engine.Solver(tmp_path, "strip")
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=2999))
+    with pytest.raises(D2RPickError, match="make room, then --resume"):
+        solver.check_room(2, 0.5)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=3000))
+    solver.check_room(2, 0.5)
+
+
+def test_commands_are_split_as_a_shell_does_and_given_to_none() -> None:
+    deck = "a b; rm -rf x_0001.rad"
+    assert engine.words("engine", "mpirun -np 2 'my engine' -i {deck} -nt {threads}", deck, 4) == [
+        "mpirun", "-np", "2", "my engine", "-i", deck, "-nt", "4",
+    ]  # fmt: skip
+    for wrong in ("engine", "engine '{deck}"):
+        with pytest.raises(D2RPickError):
+            engine.words("engine", wrong, deck, 1)
+
+
+def test_a_restart_that_may_be_cut_is_not_taken(tmp_path: Path) -> None:
+    solver = engine.Solver(tmp_path, "strip")
+    for name, at in (("strip_0001_0001_I.rst", 10), ("strip_0001_0001_J.rst", 30), ("stripT01", 20)):
+        (tmp_path / name).write_bytes(b"x")
+        os.utime(tmp_path / name, (at, at))
+    assert solver.left(1).restart == "I"
+    (tmp_path / "strip_0001.out").write_text(" NORMAL TERMINATION\n")
+    assert solver.left(1).restart == "J"
