@@ -258,7 +258,7 @@ SCHEMAS = [
     f"schemas/{name}.json"
     for name in (
         *("suggest-1", "explore-1", "plan-1", "parts-1", "calibrate-1", "verify-1", "info-1", "check-1", "study-1"),
-        *("reproduce-2", "rollover-1"),
+        *("reproduce-2", "rollover-1", "drive-1"),
     )
 ]
 

@@ -16,11 +16,11 @@ from d2rpick.deck import read_inventory
 from d2rpick.deck.driven import driven_deck
 from d2rpick.deck.inner_period import inner_period
 from d2rpick.histories.opening import open_run
-from d2rpick.running.drive import JOURNAL, Commands, Cost, Driver
+from d2rpick.running.drive import JOURNAL, Commands, Cost, Driven, Driver
 from d2rpick.running.engine import Solver, alone
 from d2rpick.running.journal import Journal
 from d2rpick.running.look import Looks
-from d2rpick.running.sequence import Limits, Window, windows
+from d2rpick.running.sequence import Limits, windows
 from d2rpick.running.wait import Wait, refuse_wait
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from d2rpick.api.cards import Cards
     from d2rpick.choice.warnings import Caution
-    from d2rpick.deck.driven import DrivenDeck
-    from d2rpick.histories.run import Run
 
 # Of a second: where nothing vibrates so long without a force is flight, and so long before a contact td lies at least.
 _SHORTEST = 2e-3
@@ -50,19 +48,9 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Drive(Paged):
-    """Answer of `drive`, of the run as far as it is; nothing of it changes.
+class Drive(Paged, Driven):
+    """Answer of ``d2rpick drive``; nothing of it changes."""
 
-    ``windows`` are those of all flights, ``costs`` what each leg took, ``saved`` the share of the cost of a deformable
-    run that is saved by the cost model and by the processor time of this run, None where it is not known.
-    """
-
-    run: Run
-    deck: DrivenDeck
-    windows: tuple[Window, ...]
-    costs: tuple[Cost, ...]
-    why: str
-    saved: tuple[float | None, float | None]
     command: tuple[str, ...]
     kind = "drive"
     said = ("windows", "saved")

@@ -22,9 +22,8 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\b
 Examples:
-  d2rpick drive run/CAR_0000.rad --part 1-17 -o driven
-  d2rpick drive run/CAR_0000.rad --part 1-17 -o driven --resume
-  d2rpick drive run/CAR_0000.rad -o driven --starter 'starter -i {deck} -np 1' --engine 'mpirun -np 4 engine -i {deck}'
+  d2rpick drive sample_data/flying_box/BOX_0000.rad --wait 0.002 -o driven --dry-run \\
+      --starter 'starter -i {deck} -np 4' --engine 'mpirun -np 4 engine -i {deck}'
 """
 
 

@@ -64,26 +64,26 @@ def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
     Parameters
     ----------
     path : str
-        Its starter deck, or its only engine file.
+        Its starter deck or an engine file; of several engine files the first says what to write, the last when to end.
     parts : collection of int
         Parts to be switched; without any, those of the bodies that the engine file puts off.
 
     Raises
     ------
     DeckError
-        If it is no Radioss run with a starter deck and one engine file that says how often the time history is
+        If it is no Radioss run with a starter deck and an engine file that says how often the time history is
         written, or the parts cannot become rigid bodies.
     """
     run = read_run(path)
-    if run.starter is None or len(run.legs) != 1:
-        found = "no starter deck" if run.starter is None else f"{len(run.legs)} engine files"
-        raise DeckError(f"{path}: the run has {found}; its starter deck and one engine file were expected")
-    (leg,) = run.legs
+    if run.starter is None or not run.legs:
+        found = "starter deck" if run.starter is None else "engine file"
+        raise DeckError(f"{path}: the run has no {found}; its starter deck and an engine file were expected")
+    leg = run.legs[0]
     chosen = tuple(sorted(parts or _parts_off(run)))
     if not chosen:
         raise DeckError(f"{path}: the engine file puts no rigid body off; name the parts to be switched with --part")
     bodies = bodies_for(path, chosen)
-    others = tuple(node for node in kept_off(run.legs) if node not in bodies.nodes)
+    others = tuple(node for node in kept_off([leg]) if node not in bodies.nodes)
     source = run.starter.sources[0]
     main = f"{leg.name}_0000.rad"
     content = with_cards(source, bodies.cards, blocks(source))
@@ -94,14 +94,23 @@ def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
         if (words := keyword(block)) and words[0] not in _NOT_REPEATED
     )
     return DrivenDeck(
-        leg.name, _end(leg), chosen, bodies.nodes, others, _interval(leg), _second(run), files, further, bodies.notes
+        leg.name,
+        _end(run.legs[-1]),
+        chosen,
+        bodies.nodes,
+        others,
+        _interval(leg),
+        _second(run),
+        files,
+        further,
+        bodies.notes,
     )
 
 
 def _parts_off(run: Run) -> Iterator[int]:
     """Parts of the bodies that the only leg puts off."""
     assert run.starter
-    off = kept_off(run.legs)
+    off = kept_off(run.legs[:1])
     groups = {body.node.value: body.group for body in run.starter.bodies if body.node.value in off}
     yield from set().union(*rigid_parts(run.starter, groups).values()) if groups else ()
 

@@ -11,8 +11,8 @@ from d2rpick.report.html import document, drawings, pairs, remarks, section, tab
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.api.drives import Drive
     from d2rpick.report.html import Markup
+    from d2rpick.running.drive import Driven
 
 _WINDOW: Final = row(
     Field("free", "number", "since when no force has acted"),
@@ -37,13 +37,13 @@ DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in
 _NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps of the vibration is an expectation"
 
 
-def as_table(found: Drive) -> str:
+def as_table(found: Driven) -> str:
     """The windows, what the legs took, and what was saved."""
     parts = [tables.as_text(*_windows(found)) if found.windows else "no window", tables.as_text(*_legs(found))]
     return "\n\n".join([*parts, "\n".join(tables.in_line(_outlook(found), 9))])
 
 
-def _windows(found: Drive) -> tuple[list[str], list[list[tables.Cell]]]:
+def _windows(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     columns = {
         "flight": lambda one: one.free, "wait": lambda one: f"{one.wait:.4g}",
         "tr": lambda one: one.tr, "td": lambda one: one.td,
@@ -55,7 +55,7 @@ def _windows(found: Drive) -> tuple[list[str], list[list[tables.Cell]]]:
     return tables.filled(columns, found.windows)
 
 
-def _legs(found: Drive) -> tuple[list[str], list[list[tables.Cell]]]:
+def _legs(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     rows: list[list[tables.Cell]] = []
     for kind in dict.fromkeys(one.kind for one in found.costs):
         own = [one for one in found.costs if one.kind == kind]
@@ -64,19 +64,19 @@ def _legs(found: Drive) -> tuple[list[str], list[list[tables.Cell]]]:
     return ["kind", "legs", "time", "cycles", "CPU s"], rows
 
 
-def _outlook(found: Drive) -> list[tuple[str, str]]:
+def _outlook(found: Driven) -> list[tuple[str, str]]:
     words = zip(found.saved, ("by the cost model", "by the processor time of its legs"), strict=True)
     saved = [f"{value:.0%} {by}" for value, by in words if value is not None]
     lines = [("saves", f"{', '.join(saved)}, against a deformable run")] if saved else []
     return [*lines, *([("wait", found.why)] if found.why else []), ("keeps", _NOT_KNOWN)]
 
 
-def drive_page(found: Drive, command: Sequence[str]) -> str:
+def drive_page(found: Driven, command: Sequence[str]) -> str:
     """Write the page; ``command`` are the arguments that repeat the run."""
     return document(f"First run: {found.deck.name}", *_sections(found, command), signed=page.CHECKED)
 
 
-def _sections(found: Drive, command: Sequence[str]) -> Iterator[Markup]:
+def _sections(found: Driven, command: Sequence[str]) -> Iterator[Markup]:
     from d2rpick.histories.names import Selection
     from d2rpick.report.figures import svg_element
     from d2rpick.report.figures_choice import draw_driven

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
@@ -16,10 +17,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
+    from d2rpick.choice.warnings import Caution
     from d2rpick.deck.driven import DrivenDeck
+    from d2rpick.histories.run import Run
     from d2rpick.running.engine import Left, Solver
     from d2rpick.running.journal import Journal
-    from d2rpick.running.sequence import Limits
+    from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
 # Largest step while rigid over the mean one before: a rigid leg costs a few percent of a deformable one then, and the
@@ -43,6 +46,23 @@ class Cost(NamedTuple):
     def rigid(self) -> bool:
         """Whether the parts were rigid in it."""
         return self.kind in RIGID_KINDS
+
+
+@dataclass(frozen=True, kw_only=True)
+class Driven:
+    """What has come of a run so far.
+
+    ``windows`` are those of all flights, ``costs`` what each leg took, ``why`` the reason of the wait.  ``saved``: what
+    share of a deformable run is saved, by the cost model and by the processor time of this run; None where unknown.
+    """
+
+    run: Run
+    deck: DrivenDeck
+    windows: tuple[Window, ...]
+    costs: tuple[Cost, ...]
+    why: str
+    saved: tuple[float | None, float | None]
+    cautions: tuple[Caution, ...]
 
 
 class Commands(NamedTuple):
