@@ -123,7 +123,8 @@ class Driving:
     def _by_model(self, costs: Sequence[Cost]) -> float | None:
         share = CostModel(self.inventory).saved(self.deck.parts).value
         steps = [
-            [one.length / one.cycles for one in costs if one.cycles and one.rigid is rigid] for rigid in (False, True)
+            [one.length / one.cycles for one in costs if one.cycles and one.length > 0 and one.rigid is rigid]
+            for rigid in (False, True)
         ]
         if share is None or not all(steps):
             return None

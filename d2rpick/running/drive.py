@@ -183,7 +183,7 @@ class Driver:
 
     def _step(self) -> float:
         """Smallest mean step of a deformable leg, or the interval of the history where none is known yet [time]."""
-        known = [one.length / one.cycles for one in self.costs if one.kind == LOAD and one.cycles]
+        known = [one.length / one.cycles for one in self.costs if one.kind == LOAD and one.cycles and one.length > 0]
         return float(f"{min([self.deck.interval, *known]):.3g}")
 
     def _ring(self, order: Order) -> tuple[int, int]:
