@@ -46,18 +46,23 @@ def asked(folder: Path, *more: str) -> list[str]:
 
 
 def check(found: dict[str, object], folder: Path) -> None:
-    """What must hold of every run that came to its end: it is whole, and rigid in the flight alone."""
+    """What must hold of every run that came to its end: it is whole, and rigid in the flight alone.
+
+    The solver goes on without a driver, so that one that comes back late may find the flight over.
+    """
     switched = [one for one in found["windows"] if one["reason"] is None]  # type: ignore[attr-defined]
-    assert len(switched) == 1
-    (window,) = switched
-    assert LOADED - 0.002 <= window["free"] <= LOADED + 0.002
-    assert window["tr"] >= window["free"] + WAIT
-    assert window["td"] < LANDS < window["contact"]
     joined = open_run([str(path) for path in sorted((folder / "run").glob("stripT??"))]).databases[0]
     assert joined.time[-1] == pytest.approx(END, abs=0.002)
     # what the parts say is void exactly where they were rigid
     parts = joined.part_channel("internal_energy", [1])[:, 0]
     rigid = joined.time[parts > 1e9]
+    assert len(switched) == bool(rigid.size)
+    if not switched:
+        return
+    (window,) = switched
+    assert LOADED - 0.002 <= window["free"] <= LOADED + 0.002
+    assert window["tr"] >= window["free"] + WAIT
+    assert window["td"] < LANDS < window["contact"]
     assert rigid[0] == pytest.approx(window["tr"], abs=0.0021)
     assert rigid[-1] == pytest.approx(window["td"], abs=0.0021)
 
@@ -66,6 +71,7 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(tmp_path: Path) -> No
     report = tmp_path / "page.html"
     found = json.loads(run(*asked(tmp_path, "--report", str(report), "-q")).stdout)
     check(found, tmp_path)
+    assert len(found["windows"]) == 1
     kinds = [leg["kind"] for leg in found["legs"]]
     assert kinds[-3:] == ["probe", "rigid", "load"]
     assert all(leg["cpu"] == 1.0 for leg in found["legs"])
