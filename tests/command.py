@@ -8,6 +8,7 @@ import shlex
 import signal
 import subprocess
 import sys
+import tempfile
 from contextlib import contextmanager, suppress
 from inspect import signature
 from pathlib import Path
@@ -19,7 +20,7 @@ from click.testing import CliRunner
 from d2rpick.cli import d2rpick
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Hashable, Iterator, Mapping, Sequence
 
     from click.testing import Result
 
@@ -32,6 +33,8 @@ DECK = str(ROOT / "sample_data" / "switching.k")
 MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
 BOX = str(ROOT / "sample_data" / "rolloverT01.gz")
 OSCILLATOR = tuple(shlex.split("--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6"))
+_TEMPORARY = Path(tempfile.gettempdir())
+_ANSWERED: dict[Hashable, Result] = {}
 _INTERRUPTIBLE = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\nfrom d2rpick.__main__ import main; main()"
 )
@@ -42,11 +45,34 @@ _APART: dict[str, Any] = {"mix_stderr": False} if "mix_stderr" in signature(CliR
 
 
 def run(*args: str, stdin: bytes | None = None, color: bool = False, env: Mapping[str, str] | None = None) -> Result:
-    """Call ``d2rpick`` with these arguments; whatever it raises but the exit itself is raised here."""
-    result = CliRunner(**_APART).invoke(d2rpick, args, input=stdin, color=color, env={**_ENVIRONMENT, **(env or {})})
-    if result.exception and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result
+    """Call ``d2rpick`` with these arguments; whatever it raises but the exit itself is raised here.
+
+    What was asked before is not computed again, where it wrote no file and none has changed since.
+    """
+    given = {**_ENVIRONMENT, **(env or {})}
+    around = frozenset((name, value) for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST")
+    files = _files(args)
+    asked = (args, stdin, color, *given.items(), around, Path.cwd(), files)
+    if asked not in _ANSWERED:
+        result = CliRunner(**_APART).invoke(d2rpick, args, input=stdin, color=color, env=given)
+        if result.exception and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        if _files(args) != files:
+            return result
+        _ANSWERED[asked] = result
+    return _ANSWERED[asked]
+
+
+def _files(args: Sequence[str]) -> frozenset[tuple[str, int, int, int]]:
+    """Temporary files that may be read or written, and their state; those of the clone stay as they are."""
+    named = (Path(os.path.abspath(arg)).parent for arg in args if "/" in arg and "\0" not in arg)  # noqa: PTH100
+    found = set()
+    for folder in {Path.cwd(), *named}:
+        for place, _, names in os.walk(folder) if _TEMPORARY in folder.parents else ():
+            for path in (os.path.join(place, name) for name in names):  # noqa: PTH118  fast
+                state = os.lstat(path)
+                found.add((path, state.st_ino, state.st_size, state.st_mtime_ns))
+    return frozenset(found)
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.alone import ROOT, WATCH, is_beside
+from tests.command import ENERGY, run
 from tests.computed import DATA
 from tests.real.files import REAL
 
@@ -119,3 +120,15 @@ def test_each_file_of_the_data_has_a_line_that_says_what_wrote_it() -> None:
     told = re.findall(r"^\| `(.+?)` \| .+ \| .+ \|$", (DATA / "README.md").read_text("utf-8"), re.MULTILINE)
     assert sorted(told) == sorted(files.keys() - {"README.md"})
     assert sum(files.values()) < 2_000_000
+
+
+def test_a_command_is_asked_again_where_it_wrote_a_file_or_one_has_changed(tmp_path: Path) -> None:
+    whole, file, written = Path(ENERGY).read_bytes(), tmp_path / "run.csv", tmp_path / "written.csv"
+    file.write_bytes(whole)
+    before = run("info", str(file))
+    assert run("info", str(file)) is before
+    file.write_bytes(whole[:-1000])
+    assert run("info", str(file)).stdout != before.stdout
+    for _ in range(2):
+        assert run("extract", str(file), "-o", str(written)).exit_code == 0
+        written.unlink()  # it is there

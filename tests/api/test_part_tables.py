@@ -43,7 +43,7 @@ def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
 def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
     """Typed without them it would give another run time; as it stands it is refused."""
     weights = Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0)
-    asked: Any = {"parts": "recommended", "deck": DECK, "weights": weights}
+    asked: Any = {"parts": "recommended", "deck": DECK, "weights": weights, "replay": False}
     read = d2.read(BOX)
     answers: list[Any] = [
         d2.parts(read, deck=DECK, weights=weights), d2.plan(read, **asked), d2.suggest(read, **asked),

@@ -36,7 +36,7 @@ def test_arguments_mean_what_options_mean(arguments: dict[str, Any], options: tu
 
 
 def test_a_table_a_figure_and_a_page(tmp_path: Path) -> None:
-    found = d2.plan(d2.read(MATSUM), parts="box")
+    found = d2.plan(d2.read(MATSUM), parts="box", replay=False)
     frame = found.to_frame()
     assert frame["status"].tolist() == [row.status for row in found.flights]
     assert found.plot().axes

@@ -101,7 +101,7 @@ def test_a_run_that_was_never_rigid_is_an_objection() -> None:
 
 
 def test_the_energy_that_was_locked_in_is_judged() -> None:
-    pair = ("--tr", "0.02", "--td", "0.37", "--energy", "boxIE_J")
+    pair = ("--tr", "0.02", "--td", "0.37", "--no-verify", "--energy", "boxIE_J")
     found = answer("verify", *pair, ROLLOVER, "--switched", stored("rollover_r20.csv.gz"))
     assert found["verified"] is False
     assert any("locked in, 11.1" in reason for reason in found["reasons"])

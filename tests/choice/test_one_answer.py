@@ -83,11 +83,10 @@ def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:
 
 
 def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
-    for margin in (0.0123456789, 0.02):
-        asked = Settings(margin=margin)
-        for row in plan_of(box, asked).rows:
-            if row.window:
-                assert read_again(box.history, *row.window, asked).verified
+    asked = Settings(margin=0.0123456789, replay=False)
+    for row in plan_of(box, asked).rows:
+        if row.window:
+            assert read_again(box.history, *row.window, asked).verified
 
 
 def test_every_tr_of_the_windows_that_are_read_verifies() -> None:

@@ -86,7 +86,7 @@ def test_info_lists_all_flights_of_the_parts_asked_for() -> None:
         (str(ROOT / "sample_data/rollover_box.glstat"),),
         (str(ROOT / "sample_data/rolloverT01.gz"), "--part", "box"),
         (ENERGY,),
-        (ROLLOVER, "--energy", "boxIE_J"),
+        (ROLLOVER, "--energy", "stepIE_J"),
     ],
 )
 def test_info_lists_the_flights_that_plan_and_suggest_choose_from(args: tuple[str, ...]) -> None:

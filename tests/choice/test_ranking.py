@@ -177,7 +177,7 @@ def test_a_td_near_the_zero_of_the_energy_is_poor_by_the_energy_alone() -> None:
 )
 def test_a_record_that_no_level_can_be_read_from_is_poor(energy: np.ndarray, reason: str) -> None:
     history = History(np.linspace(0, 1, 400), energy, ("x",), "made", "E")
-    answers = [suggest(history, td, Settings(after=0.1, replay=False)) for td in np.linspace(0.7, 0.9, 20)]
+    answers = [suggest(history, td, Settings(after=0.1, replay=False)) for td in np.linspace(0.7, 0.9, 7)]
     found = [answer.quality for answer in answers if answer.quality]
     assert found
     assert all(one.grade == "poor" and any(reason in text for text in one.reasons) for one in found)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
+import d2rpick as d2
 from d2rpick.base.errors import FormatError
 from d2rpick.choice.cost import CostModel, Weights
 from d2rpick.choice.sets_of_parts import Parts, parts_of, recommended_parts
@@ -15,6 +17,7 @@ from d2rpick.choice.situation import Settings
 from d2rpick.choice.switchable_parts import InFlight, PartFacts, PartRow, facts_of, landing_alone, rows_of, step_growth
 from d2rpick.deck import read_inventory
 from d2rpick.histories.opening import open_run
+from d2rpick.report.formats import Shown
 from d2rpick.vibration.measures import run_time_share
 from tests import made_car
 from tests.command import ROOT, answer, run
@@ -30,9 +33,12 @@ if TYPE_CHECKING:
 BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 
 
+opened = cache(lambda history: open_run([history]))
+
+
 def asked(history: str, deck: str | None = None, **more: object) -> Parts:
     model = CostModel(read_inventory(deck)) if deck else None
-    return parts_of(open_run([history]), Settings(), model, **more)  # type: ignore[arg-type]
+    return parts_of(opened(history), Settings(replay=False), model, **more)  # type: ignore[arg-type]
 
 
 def test_without_a_deck_no_verdict_is_guessed_and_the_cost_stays_open() -> None:
@@ -287,27 +293,26 @@ def warned(found: dict[str, Any], code: str) -> list[str]:
 @pytest.mark.parametrize("deck", ["MADE_0000.rad", "made.k"])
 def test_the_car_without_its_wheels_is_recommended_in_its_own_flight(folder: Path, deck: str) -> None:
     """All parts fly until the wheels land, and the car flies on: a set that saves a third of that was recommended."""
-    found = answer("parts", "--deck", str(folder / deck), str(folder / "MADET01"))
-    check_by_schema(found)
-    (best,) = [one for one in found["sets"] if one["recommended"]]
-    assert best["parts"] == list(made_car.BODY)
-    assert best["bodies"] == [list(made_car.BODY)]
-    assert made_car.WHEELS_LAND < best["td"] < made_car.LANDS
-    given = answer("parts", "--deck", str(folder / deck), "--td", "0.05", str(folder / "MADET01"))
-    assert {one["td"] for one in given["sets"]} == {0.05}
+    run = d2.read(folder / "MADET01")
+    found = d2.parts(run, replay=False, deck=folder / deck)
+    check_by_schema(found.to_dict())
+    best = sure(found.recommended)
+    assert best.parts == made_car.BODY
+    assert best.bodies == (made_car.BODY,)
+    assert made_car.WHEELS_LAND < sure(best.window)[1] < made_car.LANDS
+    assert {sure(one.window)[1] for one in d2.parts(run, replay=False, deck=folder / deck, td=0.05).sets} == {0.05}
 
 
 @pytest.mark.parametrize(("deck", "bodies"), [("MADE_0000.rad", 2), ("made.k", 3)])
 def test_a_set_without_what_moves_is_offered_where_wheels_hang_loose(
     folder: Path, tmp_path: Path, deck: str, bodies: int
 ) -> None:
-    history = made_car.t01(tmp_path, 3.0, made_car.LANDS)
-    asked = ("parts", "--deck", str(folder / deck))
-    sets = {one["name"]: one for one in answer(*asked, history)["sets"]}
-    assert len(sets["all that may"]["bodies"]) == bodies
-    assert sets["all but what moves"]["parts"] == list(made_car.BODY)
-    same = answer(*asked, "--part", CAR, history)
-    assert [one["name"] for one in same["sets"]] == [*sets]  # no set twice
+    run = d2.read(made_car.t01(tmp_path, 3.0, made_car.LANDS))
+    asked: dict[str, Any] = {"deck": folder / deck, "replay": False}
+    sets = {one.name: one for one in d2.parts(run, **asked).sets}
+    assert len(sets["all that may"].bodies) == bodies
+    assert sets["all but what moves"].parts == made_car.BODY
+    assert [one.name for one in d2.parts(run, **asked, given=CAR).sets] == [*sets]  # no set twice
 
 
 def test_ls_dyna_is_not_offered_one_body_of_loose_pieces(folder: Path) -> None:
@@ -326,23 +331,22 @@ def test_ls_dyna_is_not_offered_one_body_of_loose_pieces(folder: Path) -> None:
 
 
 def test_cards_keep_the_wheels_apart_from_the_car(folder: Path) -> None:
-    asked = ("--td", "0.05", "--solver", "ls-dyna", "--deck", str(folder / "made.k"), str(folder / "MADET01"))
+    deck, history = str(folder / "made.k"), str(folder / "MADET01")
+    asked = ("--td", "0.05", "--no-verify", "--solver", "ls-dyna", "--deck", deck, history)
     card = run("suggest", "-q", "--part", "1-9", "-f", "card", *asked).stdout
     rows = [line.split() for line in card.splitlines() if line.endswith("PART") and len(line.split()) == 3]
     assert {int(part): int(lead) for part, lead, _ in rows} == {
         1: 0, 7: 0, **dict.fromkeys((2, 3, 4, 5, 6), 1), 8: 7, 9: 7
     }  # fmt: skip
-    merged = answer("suggest", "--part", "1-9", "--merge", "1", "--report", str(folder / "page.html"), *asked)
-    assert warned(merged, "merged-apart") == [
-        "--merge 1 makes one rigid body of what nothing joins: parts 1-6; parts 7-9; leave it out to keep them apart"
-    ]
-    whole = answer("suggest", "--part", CAR, "--merge", "1", "--report", str(folder / "two.html"), *asked)
-    assert warned(whole, "merged-apart") == []
+    merged, whole = (run("suggest", "--part", one, "--merge", "1", "-f", "card", *asked) for one in ("1-9", CAR))
+    told = "--merge 1 makes one rigid body of what nothing joins: parts 1-6; parts 7-9; leave it out to keep them apart"
+    assert f"warning: merged-apart: {told}\n" in merged.stderr
+    assert "merged-apart" not in whole.stderr
 
 
 def test_without_a_deck_parts_that_fly_away_are_no_body(folder: Path) -> None:
     """Momenta show it: a hub with a tyre each, and the car, change their velocities by nothing against each other."""
-    asked = ("verify", "--tr", TR, "--td", "0.05", str(folder / "MADET01"))
+    asked = ("verify", "--tr", TR, "--td", "0.05", "--no-verify", str(folder / "MADET01"))
     found = answer(*asked, "--part", "1-9")
     assert found["position_error"] is None
     (told,) = warned(found, "moves-apart")
@@ -368,21 +372,19 @@ def test_a_body_of_the_deck_that_holds_what_flies_away_is_not_recommended(folder
 @pytest.mark.parametrize(("periods", "bound"), [(0.8, True), (2.0, False)])
 @pytest.mark.parametrize("deck", [False, True])
 def test_a_slow_swing_makes_the_error_a_lower_bound(tmp_path: Path, periods: float, bound: bool, deck: bool) -> None:
-    history = made_car.t01(tmp_path, periods)
-    known = ("--deck", made_car.starter(tmp_path)) if deck else ()
-    found = answer("verify", "--tr", TR, "--td", TD, "--part", CAR, *known, history)
+    run, known = d2.read(made_car.t01(tmp_path, periods)), made_car.starter(tmp_path) if deck else None
+    asked: dict[str, Any] = {"parts": CAR, "deck": known, "replay": False}
+    found = d2.verify(run, float(TR), float(TD), **asked).to_dict()
     check_by_schema(found)
     assert found["position_error_part"] == "engine"
     assert found["position_error_is_lower_bound"] is bound
-    asked = ("--td", TD, "--part", CAR, *known, history)
-    assert ("off by at least" in run("suggest", "-q", *asked).stdout) is bound
+    assert ("off by at least" in d2.suggest(run, float(TD), **asked).text("table", Shown())) is bound
     assert all(("off by at least" in told) is bound for told in warned(found, "out-of-place"))
-    plan = run("plan", "-q", "--part", CAR, *known, history).stdout
-    assert (">= 0.0" in plan) is bound
+    assert (">= 0.0" in d2.plan(run, **asked).text("table", Shown())) is bound
     if deck:
-        (best,) = [one for one in answer("parts", *known, history)["sets"] if one["recommended"]]
-        assert best["position_is_lower_bound"] is bound
-        (row,) = [line for line in run("parts", "-q", *known, history).stdout.splitlines() if f"  {CAR}  " in line]
+        sets = d2.parts(run, replay=False, deck=known)
+        assert sure(sets.recommended).position_is_lower_bound is bound
+        (row,) = [line for line in sets.text("table", Shown()).splitlines() if f"  {CAR}  " in line]
         assert row.count(">= ") == (2 if bound else 0)  # position and angle
 
 

@@ -116,7 +116,7 @@ def holds(history: History, pair: Pair | None, asked: Settings) -> bool:
     return verify(history, pair.tr, pair.td, asked).verified
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(histories(), st.floats(3.0, 9.9), OPTIONS)
 def test_what_is_chosen_for_a_td_is_verified(history: History, td: float, asked: Settings) -> None:
     td = min(td, float(history.time[-1]))
@@ -125,7 +125,7 @@ def test_what_is_chosen_for_a_td_is_verified(history: History, td: float, asked:
     assert holds(history, answer.better_pair, asked)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(histories(), st.floats(3.0, 8.0), OPTIONS)
 def test_what_is_chosen_in_a_window_is_verified(history: History, low: float, asked: Settings) -> None:
     answer = suggest_in_window(history, (low, min(low + 1.5, float(history.time[-1]))), asked)

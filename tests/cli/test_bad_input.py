@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.cli.test_output import FORMATS
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, codes, run
 from tests.json_schemas import check_by_schema
 
@@ -240,7 +239,7 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(
     assert found["recommended"] is None
     assert not any(candidate["acceptable"] for candidate in found["candidates"])
     assert {code, "no-candidate"} <= codes(found)
-    for form in FORMATS["suggest"]:
+    for form in ("table", "value"):
         result = run("suggest", "--td", "0.5", *args, "-f", form, "input")
         assert result.exit_code == 1
         assert [line.split(": ")[:2] for line in result.stderr.splitlines() if line.startswith("warning")] == [

@@ -345,8 +345,11 @@ def examples(command: str) -> list[list[str]]:
 @pytest.mark.parametrize("command", ["", *COMMANDS])
 def test_every_help_ends_with_examples_that_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("D2RPICK_EXPLORE_STEPS", "20")
+    monkeypatch.setenv("D2RPICK_EXPLORE_STEPS", "4")
     monkeypatch.setenv("D2RPICK_ROLLOVER_DT", "1e-3")
+    monkeypatch.setenv("D2RPICK_ROLLOVER_MESH", "4")
+    for name in ("SUGGEST", "VERIFY", "PLAN", "EXPLORE"):
+        monkeypatch.setenv(f"D2RPICK_{name}_NO_VERIFY", "1")
     shutil.copytree(ROOT / "sample_data", "sample_data")
     calls = examples(command)
     assert calls

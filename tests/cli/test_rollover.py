@@ -10,9 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from d2rpick.choice.situation import Settings
+from d2rpick.choice.suggest import suggest
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import RigidWindow, simulate
+from d2rpick.models.box_run import Outcome, RigidWindow, history_of, simulate
 from d2rpick.report import figures_models
+from d2rpick.report.formats import Shown, write
+from d2rpick.report.rollover import Scan
 from tests.command import answer, codes, run
 from tests.json_schemas import check_by_schema
 
@@ -111,33 +115,36 @@ def points(line: Line2D) -> np.ndarray:
 
 
 def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
-    asked = (*SCAN, "--td", "0.1", "-q")
     plot = tmp_path / "scan.png"
-    found = json.loads(run(*asked, "-f", "json", "--plot", str(plot)).stdout)
+    found = json.loads(run(*SCAN, "--td", "0.1", "-q", "-f", "json", "--plot", str(plot)).stdout)
     check_by_schema(found)
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert found["recommended"] in [one["tr"] for one in found["runs"]]
-    rows = list(csv.DictReader(io.StringIO(run(*asked, "-f", "csv").stdout)))
+    reference = simulate(Parameters(mesh=4), 0.11, interval=1e-3)
+    chosen = suggest(history_of(reference), 0.1, Settings())
+    scanned = Scan(reference, [Outcome(**one) for one in found["runs"]], chosen, chosen.cautions)
+    assert json.loads(write("rollover", "json", scanned, Shown()))["runs"] == found["runs"]
+    rows = csv.DictReader(io.StringIO(write("rollover", "csv", scanned, Shown())))
     assert [{name: float(cell) for name, cell in row.items()} for row in rows] == found["runs"]
-    text = run(*asked).stdout
+    assert write("rollover", "markdown", scanned, Shown()).startswith("| tr |")
+    text = write("rollover", "table", scanned, Shown())
     assert "\n* " in text
     assert f"recommended  tr = {found['recommended']:.6g}" in text
 
 
 def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
-    asked = (*SCAN, "--td", "0.06")
-    result = run(*asked, "-f", "markdown")
-    assert result.stdout.startswith("| tr |")
+    result = run(*SCAN, "--td", "0.06", "-f", "json")
     told = {line.split(": ")[1] for line in result.stderr.splitlines()}
     assert "no-free-flight" in told
-    assert codes(answer(*asked)) == told
+    assert codes(json.loads(result.stdout)) == told
 
 
 def test_a_scan_at_whose_td_nothing_can_be_recommended_says_so() -> None:
     asked = (*SCAN, "--td", "0.04")
-    assert run(*asked, "-q").stdout.endswith("\n\nrecommended  none\n")
-    assert [run(*asked, *extra).exit_code for extra in ((), ("-f", "csv"), ("--exit-zero",))] == [1, 1, 0]
-    found = answer(*asked)
+    table, plain = run(*asked, "-q", "--exit-zero"), run(*asked, "-f", "json")
+    assert table.stdout.endswith("\n\nrecommended  none\n")
+    assert (table.exit_code, plain.exit_code) == (0, 1)
+    found = json.loads(plain.stdout)
     assert found["recommended"] is None
     assert "no-candidate" in codes(found)
 

@@ -384,7 +384,7 @@ def test_a_file_in_the_folder_of_a_run_is_never_written_to(tmp_path: Path, optio
 
 
 # Svg grows most with the number of curves; from eleven runs on they are drawn as many.
-@pytest.mark.parametrize(("number", "suffix"), [*product((1, 3, 12), ("png", "pdf")), *product((1, 3, 60), ("svg",))])
+@pytest.mark.parametrize(("number", "suffix"), [(3, "png"), (12, "pdf"), *product((1, 3, 12), ("svg",))])
 def test_a_plot_shows_the_runs(runs: list[str], tmp_path: Path, number: int, suffix: str) -> None:
     figure = tmp_path / f"figure.{suffix}"
     sources = (runs * 20)[:number]

@@ -135,9 +135,12 @@ CASES = {
 THREADED = ("deck", "elements")  # what is asked of one file does not depend on how many there are
 
 
-@pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize(
-    ("case", "size"), [(case, size) for case in CASES for size in SIZES if "threads" not in size or case in THREADED]
+    ("case", "size", "change"),
+    [
+        *((case, size, change) for case in CASES for size in ("small", "big") for change in CHANGES),
+        *((case, "big, by threads", change) for case in THREADED for change in (cut, replace)),
+    ],
 )
 def test_a_change_at_any_moment_gives_one_of_the_states_or_an_error(
     case: str, change: Callable[[Path, str], None], size: str, tmp_path: Path

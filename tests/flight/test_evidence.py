@@ -12,7 +12,7 @@ import pytest
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest
-from d2rpick.choice.verify import verify
+from d2rpick.choice.verify import verify_at
 from d2rpick.flight.flight import seen_flight
 from d2rpick.flight.internal_energy import quiet_time
 from d2rpick.histories.digits import window_as_read
@@ -54,7 +54,7 @@ class Rolled(NamedTuple):
 )
 def rolled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Rolled:
     """Runs that no threshold was set by."""
-    record = simulate(request.param, 0.5, interval=2e-4)
+    record = simulate(request.param, 0.5, interval=4e-4)
     assert record.released is not None
     assert record.landed is not None
     folder = tmp_path_factory.mktemp("rolled")
@@ -67,14 +67,14 @@ def rolled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 @pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])
 def test_every_format_of_a_run_tells_its_flight_within_a_millisecond(rolled: Rolled, form: str) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
-    asked = ["suggest", "--td", str(round(rolled.end - 0.01, 3)), *part, str(rolled.files[form])]
+    asked = ["suggest", "--no-verify", "--td", str(round(rolled.end - 0.01, 3)), *part, str(rolled.files[form])]
     found = answer(*asked)
     flight = found["flight"]
     assert flight["certain"]
     assert flight["source"] == "momentum"
     assert flight["start"] == pytest.approx(rolled.start, abs=MILLISECOND)
     assert flight["end"] == pytest.approx(rolled.end, abs=MILLISECOND)
-    assert found["recommended"]["tr"] >= rolled.start - 2e-4
+    assert found["recommended"]["tr"] >= rolled.start - 4e-4
     assert not codes(found) & {"contact-in-window", "work-in-window", "flight-sources-disagree"}
 
 
@@ -96,7 +96,7 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
     kept.to_csv(tmp_path / "run.csv", index=False)
     td = str(round(rolled.end - 0.01, 3))
     found, expected = (
-        answer("suggest", "--td", td, *asked, str(file))["flight"]
+        answer("suggest", "--no-verify", "--td", td, *asked, str(file))["flight"]
         for asked, file in ((options, tmp_path / "run.csv"), ((), rolled.files["csv"]))
     )
     assert found == expected
@@ -107,7 +107,7 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
 def test_td_after_the_contact_is_refused(rolled: Rolled, form: str) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
     file, td = str(rolled.files[form]), rolled.end + 0.02
-    result = run("suggest", "--td", str(td), "-f", "json", *part, file)
+    result = run("suggest", "--no-verify", "--td", str(td), "-f", "json", *part, file)
     assert result.exit_code == 1
     assert "no free flight at td" in result.stderr
     flight = json.loads(result.stdout)["flight"]
@@ -191,7 +191,7 @@ def test_in_a_free_fall_there_is_nothing_to_match() -> None:
     assert (known(found.recommended).tr, found.candidates[0].kind) == (0.0, "start")
     assert "at-rest" in {caution.code for caution in found.cautions}
     assert known(found.windows)[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
-    assert all(verify(history, tr, 0.2838, Settings()).verified for tr in (0.0, 0.1, 0.28))
+    assert all(verify_at(found.situation, tr).verified for tr in (0.0, 0.1, 0.28))
     alone = suggest(table(history.time, history.energy), 0.2838, Settings())
     assert known(alone.recommended).tr == 0.0
 

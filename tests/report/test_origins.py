@@ -68,7 +68,7 @@ def test_what_took_no_part_is_not_named() -> None:
 
 
 def test_the_library_names_them_too() -> None:
-    found = d2.suggest(d2.read(BOX), td=0.37, parts="all", deck="main.k", weights="site.toml")
+    found = d2.suggest(d2.read(BOX), td=0.37, parts="all", replay=False, deck="main.k", weights="site.toml")
     assert found.to_dict()["weights"]["sha256"] == digest("site.toml")
     assert digest("note.k") in found.report("page.html").read_text("utf-8")
 

@@ -86,11 +86,11 @@ def test_intervals_of_a_fit_hold_the_true_crossing() -> None:
     assert np.mean(inside) >= 0.99
 
 
-@pytest.mark.parametrize("samples_per_period", [40, 200])
-def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(samples_per_period: int) -> None:
+@pytest.mark.parametrize(("samples_per_period", "runs"), [(40, 25), (200, 15)])
+def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(samples_per_period: int, runs: int) -> None:
     rng = np.random.default_rng(11)
     inside = []
-    for _ in range(40):
+    for _ in range(runs):
         main = random_mode(rng)
         other = Mode(2 * np.pi * rng.uniform(1.6, 2.7), main.alpha, 0.04 * rng.normal(), 0.04 * rng.normal(), 0.0)
         both = Modes((main, other))
@@ -104,7 +104,7 @@ def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(sample
             assert one.tr_high is not None
             if np.abs(true - one.tr).min() < 0.25 / 2:  # the level is passed, not only nearly touched
                 inside.append(bool(np.any((one.tr_low <= true) & (true <= one.tr_high))))
-    assert len(inside) > 200
+    assert len(inside) > 5 * runs
     assert np.mean(inside) >= 0.99
 
 
@@ -199,7 +199,7 @@ def test_candidates_state_how_large_their_residual_may_be() -> None:
 
 @pytest.mark.parametrize("kind", ["one", "small", "large"])
 def test_of_random_records_95_percent_are_within_their_bounds(kind: str) -> None:
-    found = small_second_modes(kind, range(10))
-    assert len(found) >= 5
+    found = small_second_modes(kind, range(6))
+    assert len(found) >= 3
     off = [max(one.stated - one.true, one.true - one.highest, 0.0) for one in found]
     assert np.percentile(off, 95) <= 0.05

@@ -198,20 +198,20 @@ def test_any_byte_of_a_time_historys_structure_may_be_wrong(flip: int, tenth: in
 
 
 @pytest.mark.parametrize("made", [BINOUT, LONG], ids=["short", "long"])
-@cases(100)
+@cases(40)
 @given(draw=st.data())
 def test_records_of_a_binout_may_be_lost_doubled_and_moved(made: LsdaWriter, draw: st.DataObject) -> None:
     true_binout(_shuffled(draw, made, st.integers(1, 30)))
 
 
-@cases(100)
+@cases(40)
 @given(st.data())
 def test_records_of_a_time_history_may_be_lost_doubled_and_moved(draw: st.DataObject) -> None:
     true_t01(_shuffled(draw, T01, st.integers(1, 24).filter(lambda length: length % 5)))
 
 
 @pytest.mark.parametrize("made", [BINOUT, T01], ids=["binout", "T01"])
-@cases(100)
+@cases(40)
 @given(draw=st.data())
 def test_bytes_may_be_added_between_records_and_structure_flipped(
     made: LsdaWriter | T01Writer, draw: st.DataObject

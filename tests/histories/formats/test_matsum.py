@@ -186,8 +186,7 @@ def test_something_else_is_no_matsum(text: bytes) -> None:
         read(text)
 
 
-@pytest.mark.parametrize("lines", [3, 4])
-@pytest.mark.parametrize("legend", [True, False])
+@pytest.mark.parametrize(("lines", "legend"), [(3, True), (4, False)])
 def test_cut_at_every_byte_gives_whole_states_only(lines: int, legend: bool) -> None:
     text = matsum_text(TIMES[:3], IDS, ENERGIES[:3], lines)
     first = text.index(b" time =")
