@@ -4,20 +4,16 @@ A test that opens a file beside the clone, lists a folder there or names one to 
 of the error.  The tests in tests/real have the marker ``real`` and are free.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile
+from collections.abc import Generator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from tests.real.files import REAL
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
 
 ROOT = Path(__file__).resolve().parents[1]
 LEFT_OUT = pytest.StashKey[int]()

@@ -5,19 +5,18 @@ the file or an error of d2rpick in one line; anything else, a warning and the de
 fault.  Counts are printed for each format; exit code 1 when there is a fault.  ``--only FORMAT NUMBER`` repeats one.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.workers import answers, cores, on_cores
@@ -30,9 +29,6 @@ from tests.faults import Fault, damage
 from tests.hdf5_files import plain, written
 from tests.histories.formats import test_curves, test_faults_binary, test_faults_text, test_radioss_th
 from tests.reading import run_of, states_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _CHUNK: Final = 200  # inputs of one task
 _SHOWN: Final = 5  # faults of a format that are printed

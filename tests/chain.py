@@ -1,17 +1,12 @@
 """A chain of three masses and two springs, run by a real solver with and without switching."""
 
-from __future__ import annotations
-
 import csv
 from functools import cache
-from typing import TYPE_CHECKING
 
+from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from tests.computed import results, stored
 from tests.reading import read_history
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import History
 
 TD_PEAK, TD_LATE = 0.13505, 0.238
 

@@ -1,7 +1,5 @@
 """The command line called inside this process, with its output streams apart."""
 
-from __future__ import annotations
-
 import json
 import os
 import shlex
@@ -9,20 +7,16 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from inspect import signature
 from pathlib import Path
 from threading import Timer
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 
 from d2rpick.cli import d2rpick
-
-if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterator, Mapping, Sequence
-
-    from click.testing import Result
 
 TIME_LIMIT = 60  # [s] after which a child that hangs is ended
 ROOT = Path(__file__).resolve().parents[1]

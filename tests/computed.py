@@ -1,17 +1,12 @@
 """Runs that a solver computed: small copies of them in tests/data, and what the validation keeps."""
 
-from __future__ import annotations
-
 import gzip
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.histories.history import Samples
 from tests.command import ROOT
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import Samples
 
 DATA = ROOT / "tests" / "data"
 

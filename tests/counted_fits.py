@@ -1,13 +1,9 @@
 """Fits to windows of a record that are counted."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Callable, Hashable
+from typing import TypeVar
 
 from d2rpick.vibration.span import Fits
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable
 
 _Found = TypeVar("_Found")
 

@@ -1,16 +1,11 @@
 """Decks on disk for a test: write texts into a folder, read them back, check them."""
 
-from __future__ import annotations
-
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
 
 from d2rpick.deck import Deck, Windows, find_windows, read_deck, read_parts, read_switching
 from d2rpick.rules import check_deck
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
 
 MAIN = "main.k"
 

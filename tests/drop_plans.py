@@ -5,8 +5,6 @@ the stiffness of the ground and of the bars in turn.  Each supported window has 
 switched run.
 """
 
-from __future__ import annotations
-
 import tempfile
 from itertools import product
 from pathlib import Path

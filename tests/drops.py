@@ -1,18 +1,11 @@
 """Runs of the planar box that falls and bounces, as files of LS-DYNA."""
 
-from __future__ import annotations
-
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from d2rpick.models import files
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import RigidWindow, simulate
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.models.box_run import Record
+from d2rpick.models.box_run import Record, RigidWindow, simulate
 
 MESH = 6  # coarse, for speed
 T_END = 1.2

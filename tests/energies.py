@@ -1,17 +1,12 @@
 """Histories that several tests choose from, and what is warned of in an answer."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
+from d2rpick.choice.suggest import Suggestion
 from d2rpick.histories.history import History
 from tests.command import ROLLOVER
-
-if TYPE_CHECKING:
-    from d2rpick.choice.suggest import Suggestion
-
 
 T = TypeVar("T")
 

@@ -4,20 +4,16 @@
 you commit it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import re
 import shlex
 import shutil
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from tests.command import ROOT, run
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 README = ROOT / "README.md"
 PAGES = {str(path.relative_to(ROOT)): path for path in (README, *sorted((ROOT / "docs").glob("*.md")))}

@@ -3,17 +3,13 @@
 With ``D2RPICK_THOROUGH=20`` the tests of damage run twenty times as many cases, the exhaustive ones all of theirs.
 """
 
-from __future__ import annotations
-
 import os
 import re
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Sequence
+from typing import TypeVar
 
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Item = TypeVar("Item")
 _MORE = int(os.environ.get("D2RPICK_THOROUGH", "1"))

@@ -4,20 +4,15 @@ Each schema stands alone, so that a validator needs no other file.  ``python -m 
 read the difference before you commit it: keys are only added.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from d2rpick.report.fields import Field, Kind, kind_of
+from d2rpick.report.fields import Document, Field, Kind, kind_of
 from d2rpick.report.formats import FORMATS
 from tests.command import ROOT
 from validation.published import reproduction
-
-if TYPE_CHECKING:
-    from d2rpick.report.fields import Document
 
 SCHEMAS = ROOT / "d2rpick" / "schemas"
 DRAFT = "https://json-schema.org/draft/2020-12/schema"

@@ -1,15 +1,10 @@
 """Small HDF5 files of the layouts that users write."""
 
-from __future__ import annotations
-
 import io
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import h5py
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 TIME = np.array([0.0, 0.1, 0.25, 0.3])
 ENERGY = np.array([2e-20, 1.5, -3.25, 7.0])

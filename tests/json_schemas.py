@@ -1,7 +1,5 @@
 """Answers held against the JSON schemas that ship with the package; each schema is read and checked once."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from importlib.resources import files

@@ -1,15 +1,11 @@
 """Writes binouts for tests and benchmarks: LSDA with any byte order and field sizes, with symbol tables."""
 
-from __future__ import annotations
-
 import struct
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
 
 _FIELDS = {1: "B", 2: "H", 4: "I", 8: "Q"}
 _TYPES = {"i1": 1, "i2": 2, "i4": 3, "i8": 4, "f4": 9, "f8": 10}

@@ -4,19 +4,14 @@ Its body is thrown, turns and flies until it lands; the wheels, of which all hub
 from it and meet the ground before it does.  T01 as OpenRadioss writes it, and the mesh as decks of both solvers.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
+from d2rpick.histories.history import Samples
 from tests.made_t01 import MadePart, headed
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from d2rpick.histories.history import Samples
 
 BODY: Final = (1, 2, 3, 4, 5, 6)
 WHEELS: Final = (7, 8, 9)

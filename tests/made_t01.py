@@ -1,15 +1,10 @@
 """Writes Radioss time histories for tests, binary or text: any number of globals, parts with variables, groups."""
 
-from __future__ import annotations
-
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 @dataclass

@@ -3,8 +3,6 @@
 All digits come from the matrix exponential of the first-order system with 40 digits.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from d2rpick.histories.history import History, Samples

@@ -1,25 +1,17 @@
 """Contents of files as a run, past the names and folders that a user would give."""
 
-from __future__ import annotations
-
 import os
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import at_rest
 from d2rpick.choice.of_run import read
 from d2rpick.histories.content import OnDisk, Portions
 from d2rpick.histories.database import Legs
-from d2rpick.histories.opening import Run, Selection, open_run, open_sources
+from d2rpick.histories.history import History
+from d2rpick.histories.opening import Reader, Run, Selection, open_run, open_sources
 from d2rpick.histories.source import Source
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from d2rpick.histories.history import History
-    from d2rpick.histories.opening import Reader
-
 
 SMALL = Portions(block=256, gap=32, window=64)
 

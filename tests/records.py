@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from hypothesis import strategies as st
 
-from d2rpick.histories.history import Given, History, rows_of
-from d2rpick.vibration.modes import Mode
+from d2rpick.histories.history import Balance, Given, History, Momenta, Record, Samples, rows_of
+from d2rpick.vibration.modes import Mode, Modes
 from d2rpick.vibration.oscillator import from_mode, lacking_energy
 from tests import paper
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import Balance, Momenta, Record, Samples
-    from d2rpick.vibration.modes import Modes
 
 # y - z = -V0 exp(-alpha t/2) sin(omega t)/omega, eq. (7), with V0 = 6 m/s and k = 660e3 N/m
 MODE = Mode(paper.OMEGA_2, 50.0, 0.0, -6.0 / paper.OMEGA_2 * (660e3 / 2) ** 0.5, 0.0)

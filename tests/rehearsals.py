@@ -1,21 +1,14 @@
 """Twenty-one rollovers, fixed in advance, and what the tool says of each against what happens at every tr."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
 from d2rpick.models import files
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import BOX, Record, RigidWindow, scan, scan_times, simulate
+from d2rpick.models.box_run import BOX, Outcome, Record, RigidWindow, scan, scan_times, simulate
 from tests.command import answer
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.models.box_run import Outcome
 
 T_END = 0.55
 # td is this long before the ground comes [s], to the millisecond; as in the published study.

@@ -5,24 +5,19 @@ glstat and matsum are what ``d2rpick rollover --dt 1e-3 -o FILE`` writes; a bino
 written by the program, and the writers of the tests make them.
 """
 
-from __future__ import annotations
-
 import struct
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
+from d2rpick.histories.history import Samples
 from d2rpick.models.box_model import Parameters, build
 from d2rpick.models.box_run import PARTS, Record, simulate
 from d2rpick.models.files import BOX_WRITERS
 from tests.command import ROOT
 from tests.made_binout import LsdaWriter
 from tests.made_t01 import T01Writer
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from d2rpick.histories.history import Samples
 
 T_END, INTERVAL = 0.42, 1e-3
 _GLOBALS: Final = 22

@@ -5,19 +5,13 @@ Run as ``python -m tests.sample_deck``.  The LS-DYNA deck has the parts of the s
 ``d2rpick calibrate``; their listings are what the solver printed, cut to the summary.
 """
 
-from __future__ import annotations
-
 import itertools
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 
+from d2rpick.histories.history import Samples
 from tests.command import ROOT
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from d2rpick.histories.history import Samples
 
 DECK = ROOT / "sample_data" / "rollover_box.k"
 FLYING = ROOT / "sample_data" / "flying_box"

@@ -1,14 +1,12 @@
 """The suite stands alone: what its modules may name, what they may open, and where its data come from."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -16,9 +14,6 @@ from tests.alone import ROOT, WATCH, is_beside
 from tests.command import ENERGY, run
 from tests.computed import DATA
 from tests.real.files import REAL
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 FOREIGN = str(REAL / "glstat")
 HOME, TEMPORARY = Path("/home/one"), Path(tempfile.gettempdir())

@@ -1,7 +1,5 @@
 """Damaged inputs of all formats are read or refused: a few, a million with ``D2RPICK_THOROUGH=20``."""
 
-from __future__ import annotations
-
 from collections import Counter
 from random import Random
 

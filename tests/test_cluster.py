@@ -1,16 +1,15 @@
 """A real Dask scheduler and workers, each a process of its own, do the work; one of them is killed on the way."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -18,9 +17,6 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.base.workers import Cluster
 from tests import variants
 from tests.command import ROOT, run
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 distributed = pytest.importorskip("distributed", reason="needs the extra 'dask'")
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")

@@ -1,14 +1,12 @@
 """The documentation shows what the program does: its examples are run, its commands and links exist."""
 
-from __future__ import annotations
-
 import doctest
 import re
 import shlex
 import shutil
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -28,9 +26,6 @@ from tests.examples import (
     sessions,
     text_of,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 README = text_of("README.md")
 ALL = "\n".join(text_of(page) for page in PAGES)

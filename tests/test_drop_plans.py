@@ -1,7 +1,5 @@
 """Supported windows end before the landing of the switched run; all twenty sets: ``python -m tests.drop_plans``."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.drop_plans import SETS, outcome

@@ -1,23 +1,17 @@
 """The samples of the rollover box are one run in every format, and its energies balance in each."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from d2rpick.histories.history import History
 from d2rpick.histories.opening import READERS, Selection, open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import simulate
 from tests import sample_box
 from tests.command import ROOT, answer
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from d2rpick.histories.history import History
 
 KEPT = ROOT / "sample_data"
 NAMES = (*(f"rollover_box.{suffix}" for suffix in ("csv", "h5", "glstat", "matsum", "binout")), "rollover_boxT01")

@@ -1,15 +1,14 @@
 """What must hold of the package as a whole: the direction of its imports, and what a command loads."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -18,10 +17,6 @@ from d2rpick.cli import models
 from d2rpick.histories.opening import READERS
 from d2rpick.models.files import OSCILLATOR_WRITERS
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 PACKAGE = ROOT / "d2rpick"
 

@@ -1,7 +1,5 @@
 """Thinned time histories hold the numbers of their source, and tables the cells of theirs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

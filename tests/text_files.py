@@ -1,15 +1,9 @@
 """glstat and matsum as LS-DYNA writes them, from numbers."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike
 
 HEAD = (
     b" Bolted Connection Type b                                                \n"

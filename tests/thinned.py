@@ -5,24 +5,20 @@ n-th state and the last one up to a time, and of its parts the variables that ar
 interfaces and subsets goes.  A table keeps the columns that are named.
 """
 
-from __future__ import annotations
-
 import csv
 import gzip
 import io
 import struct
 import sys
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from tests.computed import DATA
 from tests.made_t01 import T01Writer
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 MOTION = (1, 2, 3, 4, 5, 6)  # internal and kinetic energy, momentum, mass
 CENTRES = (7, 9, 10, 11)  # hourglass energy, centre

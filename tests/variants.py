@@ -1,17 +1,12 @@
 """Runs that differ a little, as variants of one model do, and the command line that studies them."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
 from d2rpick.vibration.modes import Mode
 from tests.paper import OMEGA_2
 from tests.records import MODE, TIME
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 TD = 0.0687534  # the paper's energy peaks there
 STUDY = ("study", "--td", str(TD), "--jobs", "1")

@@ -1,12 +1,11 @@
 """The library gives what the command line gives, loses nothing in tables, and names a wrong argument."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,9 +18,6 @@ from d2rpick.api.answer import written
 from d2rpick.report.keys import MEASURES
 from tests.command import BOX, DECK, ENERGY, GLSTAT, ROLLOVER, answer, run
 from tests.sample_deck import DECK as SAMPLE_DECK
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
 
 TD = "0.0687534"
 loose: Any = d2  # for what a type checker would not let pass

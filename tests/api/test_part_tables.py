@@ -1,9 +1,8 @@
 """``d2.parts``: the same as the command, as objects and frames."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,9 +10,6 @@ import d2rpick as d2
 from d2rpick.choice.cost import Weights
 from tests.command import ROOT, answer, run
 from tests.sample_deck import DECK
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 

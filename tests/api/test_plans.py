@@ -1,17 +1,13 @@
 """The plan in Python says what the command line says."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 import d2rpick as d2
 from tests.command import ENERGY, answer, run
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 MATSUM = "sample_data/rollover_box.matsum"
 

@@ -1,7 +1,5 @@
 """``import d2rpick`` is light, offers every public name, and its types hold for whoever uses it."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """One table of what can be asked: it contradicts nothing, and is written as it is typed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,12 +1,9 @@
 """What a ledger gives back is what was put in, unless files, options or version have changed; cut lines are no harm."""
 
-from __future__ import annotations
-
 import json
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -15,13 +12,9 @@ from d2rpick.api.studies import Ledger, fingerprint, line
 from d2rpick.base.errors import FormatError
 from d2rpick.choice import study
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.study import Question, ask
+from d2rpick.choice.study import Question, StudyRow, ask
 from d2rpick.histories.opening import Selection
 from tests import variants
-
-if TYPE_CHECKING:
-    from d2rpick.choice.study import StudyRow
-
 
 QUESTION = Question(variants.TD, Settings())
 

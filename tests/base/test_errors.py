@@ -1,7 +1,5 @@
 """Names in messages: nothing in them may break a line or reach a terminal as a command."""
 
-from __future__ import annotations
-
 import unicodedata
 
 from hypothesis import given

@@ -1,18 +1,13 @@
 """When a file is at rest: so long after its last change that no write is under way and a later one would show."""
 
-from __future__ import annotations
-
 import os
 import time
+from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick.base.files import settled_state
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 NOW = 1_700_000_000_123_456_789
 MOMENT, HOUR = 10**6, 3600 * 10**9

@@ -1,23 +1,18 @@
 """Calls are computed here, by processes, or by a cluster, always the same way; a process that dies stops nothing."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys
 import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from subprocess import PIPE, Popen
-from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.workers import Cores, Farm, Here, answers, cores
 from tests.command import TIME_LIMIT
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 FARMS = [Here, lambda: Cores(2, __name__)]
 

@@ -1,9 +1,5 @@
 """Windows of acceptable tr: what lies inside verifies, what lies outside does not, and many are counted right."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
@@ -21,7 +17,7 @@ from d2rpick.choice.acceptable_windows import (
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import Suggestion, suggest
 from d2rpick.choice.verify import verify, verify_at
-from d2rpick.histories.history import History
+from d2rpick.histories.history import History, Samples
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.modes import Mode, Modes
 from tests import chain
@@ -30,9 +26,6 @@ from tests.energies import sure
 from tests.paper import OMEGA_2
 from tests.reading import read_history
 from tests.records import ENERGY, MODE, TIME, noisy
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import Samples
 
 TD = 0.064
 PAPER = History(TIME, ENERGY, ("paper",), "made", "energy")

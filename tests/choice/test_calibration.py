@@ -1,9 +1,8 @@
 """Weights fitted to legs: what the legs tell is found, what they do not keeps its ratio."""
 
-from __future__ import annotations
-
 import shutil
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
 
 import pytest
 
@@ -12,10 +11,6 @@ from d2rpick.choice.calibration import Observation, calibrate, observations_of, 
 from d2rpick.choice.cost import MEASURED
 from tests.deck.test_radioss import BEGIN, PROPS, nodes
 from tests.decks import wide
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
 
 TRUE = {"QBAT": 2.0, "BT": 0.9, "solid": 1.5}
 REST, RIGID, NODES = 0.01, 0.1, 20_000

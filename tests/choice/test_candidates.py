@@ -1,7 +1,5 @@
 """Candidates for tr: which times are offered, what is measured at them, and what speaks against them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

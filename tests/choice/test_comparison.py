@@ -1,12 +1,12 @@
 """Finished switched runs held against their reference: by a solver, and by the closed form; which parts count."""
 
-from __future__ import annotations
-
 import re
+from collections.abc import Callable
 from csv import DictReader
 from functools import cache
 from io import StringIO
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,19 +16,13 @@ from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_r
 from d2rpick.choice.of_run import Reference, compare_with, read, verify_of
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.switched_run import switched_history
-from d2rpick.histories.history import History, Track
+from d2rpick.choice.verify import Verdict
+from d2rpick.histories.history import History, Samples, Track
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import BOX, ENERGY, OSCILLATOR, ROLLOVER, answer, run
 from tests.computed import results, stored
 from tests.energies import sure
 from tests.json_schemas import check_by_schema
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from d2rpick.choice.verify import Verdict
-    from d2rpick.histories.history import Samples
 
 TR, TD = 0.0135867, 0.0687534
 VERIFY = ("verify", "--tr", "0.1", "--td", "0.37", "--part", "box")

@@ -1,10 +1,9 @@
 """The cost model: shares of a step, and what is said where they are not known."""
 
-from __future__ import annotations
-
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,10 +16,6 @@ from d2rpick.deck.formulations import ls_dyna, radioss
 from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
 from tests.energies import sure
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
 
 QBAT, UNKNOWN = Formulation("QBAT", "QBAT"), Formulation("strange", None, measured=False)
 

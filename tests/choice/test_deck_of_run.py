@@ -1,10 +1,9 @@
 """What a deck tells of a run, and what makes it worth little: the same words in every command, nothing of another."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,23 +14,18 @@ from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.choice.flights import find_flights
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest
+from d2rpick.choice.warnings import Caution
 from d2rpick.deck import read_inventory
 from d2rpick.flight.momentum import flight_around
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.surroundings import Support, Surroundings
-from d2rpick.rules import RULES, check_deck
+from d2rpick.rules import RULES, Example, check_deck
 from tests import made_car
 from tests.command import ENERGY, OSCILLATOR, ROOT, answer, codes, run
 from tests.decks import write
 from tests.histories.test_listings import listing
 from tests.sample_deck import DECK
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.choice.warnings import Caution
-    from d2rpick.rules import Example
 
 TD = ("--td", "0.0687534")
 

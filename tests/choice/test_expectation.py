@@ -1,9 +1,6 @@
 """More energy than the reference has never comes back: where the estimate says so, the pair is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -11,16 +8,13 @@ import pytest
 from d2rpick.choice.acceptable_windows import acceptable_windows
 from d2rpick.choice.candidates import judge
 from d2rpick.choice.expectation import MOST_KEPT, expectation, most_energy
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.situation import Settings, Situation, examine
 from d2rpick.choice.suggest import suggest_at
 from d2rpick.choice.trade_off import offers_of
 from d2rpick.choice.verify import verify_at
 from d2rpick.histories.history import History
 from d2rpick.rules.judgement import faults_of
 from tests.energies import sure
-
-if TYPE_CHECKING:
-    from d2rpick.choice.situation import Situation
 
 TIME = np.linspace(0, 1, 2001)
 # Two modes in flight up to 0.8, and a crash of which nothing is told; the mean up to td is far below the energy there.

@@ -1,9 +1,7 @@
 """The margin before a contact, against landings that a real solver computed with and without switching."""
 
-from __future__ import annotations
-
 import csv
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -17,9 +15,6 @@ from d2rpick.flight.margin import SHARE, landing_spread, margin_before_contact
 from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta
 from tests.computed import results, stored
 from tests.energies import sure
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 positive = st.floats(0.1, 10.0)
 

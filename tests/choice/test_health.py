@@ -1,16 +1,15 @@
 """Health of a run: every threshold from both sides, every missing term, real runs, and runs that cannot be judged."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from d2rpick.choice.health import Health, assess, cautions_of_health, unsound
 from d2rpick.histories.balance import balance_of
-from d2rpick.histories.history import Balance, Given, History, Precision
+from d2rpick.histories.history import Balance, Given, History, Precision, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import open_run
 from d2rpick.report.situation import measures_of
@@ -18,11 +17,6 @@ from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run
 from tests.computed import stored
 from tests.energies import sure
 from tests.made_t01 import t01, value
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.histories.history import Samples
 
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
 TIME: Samples = np.linspace(0.0, 1.0, 201)

@@ -1,7 +1,5 @@
 """Cards judged as they are printed: for which solver, whom they switch, and what their comments say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The one way from files to an answer: every user of it gets the same, and a record is examined once per question."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 

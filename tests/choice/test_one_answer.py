@@ -1,16 +1,15 @@
 """One question has one answer: pairs, windows and flights that are named are those that another command finds there."""
 
-from __future__ import annotations
-
 import re
 from html import unescape
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from d2rpick.choice.acceptable_windows import acceptable_windows
-from d2rpick.choice.of_run import read
+from d2rpick.choice.of_run import Reference, read
 from d2rpick.choice.plan import plan_of
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest import suggest
@@ -18,6 +17,7 @@ from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.verify import Verdict, verify, verify_at
 from d2rpick.flight.flight import all_seen, seen_flight
 from d2rpick.histories.digits import as_read
+from d2rpick.histories.history import History, Samples
 from d2rpick.histories.opening import Selection
 from d2rpick.report.suggestion import acceptable
 from d2rpick.rules.judgement import faults_of
@@ -26,12 +26,6 @@ from tests.command import BOX, run
 from tests.computed import stored
 from tests.drops import drop, written
 from tests.energies import codes, of, sure
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.choice.of_run import Reference
-    from d2rpick.histories.history import History, Samples
 
 PLAIN = Settings()
 

@@ -1,7 +1,5 @@
 """What info tells of a run, whatever its files hold."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,10 +1,8 @@
 """Plans: flights, windows and what one reference supports, on computed runs of the box and of a real solver."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,9 +20,6 @@ from d2rpick.histories.opening import Selection
 from tests.computed import stored
 from tests.drops import drop, written
 from tests.energies import sure
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 PLAIN = Settings()
 BOX = Selection(parts=("box",))

@@ -1,17 +1,12 @@
 """What is stated of springs that stiffen and of records that drift holds for the motion that was integrated."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.benchmarks.promise import BAD, CLASSES, tried
 from tests.energies import sure
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """A grade on parts is a promise: what is stated of random records holds in their exact motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

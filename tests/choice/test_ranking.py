@@ -1,7 +1,5 @@
 """The order of candidates, the limits that a recommendation keeps, and how good it is called."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,23 +1,16 @@
 """Answers stay what they were: a table of old ones, to the digits people read, that work on speed must not change."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 
 from d2rpick.choice.of_run import read, suggest_of
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.suggest import suggest
+from d2rpick.choice.suggest import Suggestion, suggest
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from tests.command import ROOT
 from tests.computed import stored
-
-if TYPE_CHECKING:
-    from d2rpick.choice.suggest import Suggestion
 
 SAMPLES = {
     "paper": ("energy.csv", Selection()),

@@ -1,10 +1,9 @@
 """Verdicts on parts, and sets of them: on a made run, a made car with loose wheels, and one that a solver computed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,9 +25,6 @@ from tests.energies import sure
 from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
 from tests.text_files import matsum_text
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 

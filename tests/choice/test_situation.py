@@ -1,9 +1,6 @@
 """A record seen from one td: what is found in it, which model of the vibration counts, what stays the same."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,15 +10,13 @@ from d2rpick.choice.of_run import read
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.flight.bodies import RigidBody
+from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.oscillator import to_mode
 from d2rpick.vibration.span import Fits
 from tests import chain, paper
 from tests.counted_fits import CountedFits
 from tests.energies import of, rollover, sure
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import History
 
 PLAIN = Settings()
 

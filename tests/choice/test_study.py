@@ -1,7 +1,5 @@
 """What many runs have in common: the spread, the agreement, one tr for all or why none, and which stand out."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path

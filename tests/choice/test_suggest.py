@@ -1,7 +1,5 @@
 """What suggest decides: the published example, a computed rollover, the end of the flight, units."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

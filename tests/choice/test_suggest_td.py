@@ -1,9 +1,6 @@
 """Choosing both times, on every basis, what is said when td is missing, and the bound by which a window is searched."""
 
-from __future__ import annotations
-
 import csv
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -15,10 +12,10 @@ from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.expectation import expectation, shortfall
 from d2rpick.choice.of_run import read
 from d2rpick.choice.ranking import rank
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.situation import Settings, Situation, examine
 from d2rpick.choice.suggest import suggest, suggest_at
 from d2rpick.choice.suggest_td import longest_rigid_times, suggest_in_window
-from d2rpick.histories.history import EXACT, Given, History, Momenta
+from d2rpick.histories.history import EXACT, Given, History, Momenta, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.models.box_model import Parameters
@@ -29,10 +26,6 @@ from tests.command import ENERGY, ROLLOVER, answer, run
 from tests.computed import results, stored
 from tests.counted_fits import CountedFits
 from tests.energies import of, sure
-
-if TYPE_CHECKING:
-    from d2rpick.choice.situation import Situation
-    from d2rpick.histories.history import Samples
 
 PLAIN = Settings()
 T01 = str(ROLLOVER).replace(".csv", "T01.gz")

@@ -1,8 +1,6 @@
 """When the parts of a question were rigid, and when only others were."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +8,8 @@ import pytest
 from d2rpick.choice.of_run import read
 from d2rpick.choice.switched_run import switched_history
 from d2rpick.histories.formats import glstat, matsum
+from d2rpick.histories.history import Samples
 from d2rpick.histories.opening import Selection
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.histories.history import Samples
 
 TIME = np.linspace(0, 1, 501)
 

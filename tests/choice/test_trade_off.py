@@ -1,10 +1,8 @@
 """Every td of a trade-off is answered as ``suggest`` answers it, and what is marked as unbeaten is."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,15 +14,12 @@ from d2rpick.choice.of_run import Reference, read
 from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest, suggest_at
-from d2rpick.choice.trade_off import explore_of
+from d2rpick.choice.trade_off import Offer, TradeOff, explore_of
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
+from d2rpick.histories.run import Run
 from d2rpick.vibration.span import Fits
 from tests.command import ROOT
-
-if TYPE_CHECKING:
-    from d2rpick.choice.trade_off import Offer, TradeOff
-    from d2rpick.histories.run import Run
 
 SAMPLES = {
     "energy.csv": Selection(),

@@ -1,7 +1,5 @@
 """Judging one pair; over random histories and options what is recommended, and what is named as better, is verified."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,21 +1,16 @@
 """What cannot be run has one line that says where, what and what to do; what has no answer is an objection."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math
 import shlex
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, codes, run
 from tests.json_schemas import check_by_schema
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 HEAD = "time,internal_energy\n"
 

@@ -1,20 +1,15 @@
 """The commands ``card`` and ``rule``, and ``suggest -f card``."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
+from click.testing import Result
 
 from d2rpick.rules import RULES
 from tests import paper
 from tests.command import BOX, ENERGY, answer, run
-
-if TYPE_CHECKING:
-    from click.testing import Result
 
 GOOD = ("--tr", "0.0135867", "--td", "0.0687534")
 OPPOSITE = ("--tr", "0.0122659", "--td", "0.064")

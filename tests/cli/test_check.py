@@ -1,12 +1,11 @@
 """The command ``check`` as a CI job sees it: exit codes, formats, configuration, several decks, histories."""
 
-from __future__ import annotations
-
 import json
 import os
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -17,9 +16,6 @@ from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, answer, run
 from tests.json_schemas import check_by_schema
 from tests.report.test_findings import junit_is_valid, sarif_is_valid
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 FORMATS = ("table", "json", "github", "junit", "sarif")
 LATE = HEAD + PARTS + THERE + automatic(2, "0.5", deformable=["1"]) + END

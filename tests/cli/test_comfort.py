@@ -1,7 +1,5 @@
 """What makes the command line easy to live with: settings, versions, completion, near misses, a manual page."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,14 +1,13 @@
 """What the commands and their options do, seen from outside."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from subprocess import CompletedProcess
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,9 +18,6 @@ from d2rpick.histories.opening import Selection
 from tests import paper
 from tests.command import ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, ROOT, TIME_LIMIT, answer, codes, run
 from tests.reading import read_history
-
-if TYPE_CHECKING:
-    from subprocess import CompletedProcess
 
 SUGGEST = ("suggest", "--td", "0.064")
 ROLLING = ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER)

@@ -1,12 +1,10 @@
 """``explore``: its forms, its schema, and that every td is what ``suggest`` says of it."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -15,9 +13,6 @@ import pytest
 import d2rpick as d2
 from tests.command import BOX, ENERGY, ROOT, answer, run
 from tests.json_schemas import check_by_schema
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
 WINDOW = ("--td-window", "0.06", "0.07", "--steps", "20")

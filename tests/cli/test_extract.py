@@ -1,11 +1,8 @@
 """Histories that are written and read back: extract as csv and hdf5, replay as matsum and hdf5."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,13 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.base.errors import FormatError
+from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, format_of, open_run, write_table
 from tests.command import BOX as ROLLOVER_T01
 from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, run
 from tests.reading import read_history
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import History
 
 REPLAY = ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4")
 SUFFIXES = ["csv", "h5", "hdf5"]

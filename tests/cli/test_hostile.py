@@ -1,7 +1,5 @@
 """Closed streams, full disks, interrupts and damaged files: one line, or the result."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import json
@@ -9,8 +7,9 @@ import os
 import subprocess
 import sys
 import zlib
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
@@ -20,9 +19,6 @@ from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, run, started
 from tests.made_binout import binout as made_binout
 from tests.made_t01 import t01, value
 from tests.text_files import glstat_text, matsum_text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
 
 
 def child(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:

@@ -1,7 +1,5 @@
 """Names that hold control codes, markup, and what shells, spreadsheets and terminals act on, in every output."""
 
-from __future__ import annotations
-
 import csv
 import html
 import io

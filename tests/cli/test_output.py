@@ -1,7 +1,5 @@
 """Where results go and in which form: formats, files, figures, colours, exit codes."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io
@@ -13,9 +11,10 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -27,10 +26,6 @@ from d2rpick import __version__
 from d2rpick.cli import output
 from tests.command import DECK, ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, ROOT, answer, run, started
 from tests.json_schemas import check_by_schema
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
 
 SUGGEST = ("suggest", "--td", "0.064")
 VERIFY = ("verify", "--tr", "0.0135867", "--td", "0.0687534")

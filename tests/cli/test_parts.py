@@ -1,8 +1,7 @@
 """Parts to be switched and parts that fly with them: --part and --flying, seen from outside."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,9 +14,6 @@ from tests.command import BOX as ROLLOVER_T01
 from tests.command import OSCILLATOR, answer, codes, run
 from tests.json_schemas import check_by_schema
 from tests.records import ENERGY, TIME
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 BOX, STEP, SLED = ({"id": i, "title": title} for i, title in enumerate(("box", "step", "sled"), start=1))
 

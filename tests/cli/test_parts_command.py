@@ -1,11 +1,9 @@
 """The commands ``parts`` and ``calibrate`` in all their forms, and ``--deck`` where a cost share was asked for."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -14,9 +12,6 @@ from tests.choice.test_calibration import run_folder
 from tests.command import ROOT, answer, run
 from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 ENERGY = str(ROOT / "sample_data" / "energy.csv")

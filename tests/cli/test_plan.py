@@ -1,9 +1,7 @@
 """The command ``plan`` in all its forms."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -11,10 +9,6 @@ from tests.command import BOX, ENERGY, answer, run
 from tests.computed import starter, stored
 from tests.drops import drop, written
 from tests.json_schemas import check_by_schema
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 PART = ("--part", "box", "--no-verify")  # no oscillator describes it, and none is sought
 

@@ -1,9 +1,8 @@
 """The position error in what suggest, verify and plan write, of a car that a solver computed."""
 
-from __future__ import annotations
-
+from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -15,10 +14,6 @@ from tests.command import answer, run
 from tests.computed import starter, stored
 from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 ONE_BODY = "the parts become one rigid body"
 

@@ -1,14 +1,13 @@
 """The command ``rollover``: what it writes is read back, scans in every form, figures, refusals."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.lines import Line2D
 
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest import suggest
@@ -19,12 +18,6 @@ from d2rpick.report.formats import Shown, write
 from d2rpick.report.rollover import Scan
 from tests.command import answer, codes, run
 from tests.json_schemas import check_by_schema
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from matplotlib.lines import Line2D
-
 
 SMALL = ("--mesh", "4", "--dt", "5e-4")
 SHORT = (*SMALL, "--t-end", "0.12")

@@ -1,7 +1,5 @@
 """The command ``study`` as a user meets it: formats, codes, lists, and what is left when it is killed."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import io
@@ -9,9 +7,10 @@ import json
 import os
 import signal
 import time
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jsonschema
 import pytest
@@ -21,9 +20,6 @@ from tests import variants
 from tests.command import BOX, ENERGY, GLSTAT, ROOT, answer, run, started
 from tests.json_schemas import check_by_definition, check_by_schema
 from tests.variants import STUDY
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 FORMATS = ("table", "json", "csv", "markdown", "ndjson")
 KEYS = ("source", "tr", "tr_low", "tr_high", "energy_td", "residual", "status", "message", "td", "common_error")

@@ -1,19 +1,14 @@
 """The library speaks of arguments; every argument that a message names has an option."""
 
-from __future__ import annotations
-
 import ast
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import pytest
 
 from d2rpick.cli import COMMANDS
 from d2rpick.cli.output import ARGUMENTS, option_of, with_options
 from tests.command import ENERGY, ROLLOVER, ROOT, run
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 # Layers whose messages name no options.
 SPEAKING = ("histories", "vibration", "flight", "choice", "models")

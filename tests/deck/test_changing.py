@@ -1,16 +1,15 @@
 """Decks that are cut, rewritten or replaced while they are read: one of their states or an error, never a mix."""
 
-from __future__ import annotations
-
 import builtins
 import itertools
 import os
 import shutil
 import time
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -24,9 +23,6 @@ from d2rpick.rules import RULES, check_deck
 from d2rpick.rules.examples import BACK, GOOD, PARTS, THERE
 from tests.decks import spans, write
 from tests.sample_deck import DECK
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterator
 
 WINDOW = [(1, 0.02, 0.09)]
 RUN = RULES["D2R401"].passing[0]

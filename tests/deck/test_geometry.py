@@ -1,7 +1,5 @@
 """Masses and stable steps of parts, against sizes worked out by hand; where parts lie, and what nodes a run watches."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,9 +1,7 @@
 """The longest inner period by masses and springs: what a closed form gives, and what is not known."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -13,9 +11,6 @@ from d2rpick.deck import read_inventory
 from d2rpick.deck.inner_period import inner_period
 from tests.decks import wide
 from tests.sprung import DENSITY, cubes
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def period(folder: Path, deck: str) -> tuple[float, ...] | None:

@@ -1,21 +1,15 @@
 """What joins parts that share no nodes: in every form that is followed, and what is named because it is not."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from d2rpick.choice.deck_of_run import bodies_of
+from d2rpick.deck.model import Inventory
 from d2rpick.flight.bodies import RigidBody
 from tests.deck import test_radioss as rad
 from tests.deck.test_ls_dyna import inventory, nodes
 from tests.decks import row, wide
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.deck.model import Inventory
 
 # Parts 7, 9 and 11, a shell each, without a node in common: 1 to 4, 5 to 8, 9 to 12.
 MESH = (

@@ -4,26 +4,20 @@ The mesh is that of the made car: six parts that share nodes 1 to 12, in three r
 to 26 and 31 to 36.
 """
 
-from __future__ import annotations
-
 from math import inf
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.deck import read_inventory
+from d2rpick.deck.model import Inventory
 from d2rpick.deck.pieces import supports_of
 from d2rpick.histories.opening import open_run
 from d2rpick.histories.run import Run
+from d2rpick.histories.surroundings import Surroundings
 from tests import made_car
 from tests.decks import wide
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.deck.model import Inventory
-    from d2rpick.histories.surroundings import Surroundings
 
 BODY, WHEEL, OTHER = set(made_car.BODY), {7, 8}, {7, 9}  # both wheels have hubs of one part
 

@@ -1,9 +1,8 @@
 """Elements of LS-DYNA decks, against an independent count."""
 
-from __future__ import annotations
-
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -11,16 +10,11 @@ from hypothesis import strategies as st
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck import ls_dyna, read_inventory
+from d2rpick.deck.model import Inventory
 from d2rpick.deck.pieces import pieces_of
 from d2rpick.deck.reader import read_deck
 from tests.decks import read, row, write
 from tests.sample_deck import DECK, FLYING, deck, radioss
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from d2rpick.deck.model import Inventory
 
 HEAD = "*KEYWORD\n*PART\na\n         7         1         1\n*PART\nb\n         9         1         1\n"
 

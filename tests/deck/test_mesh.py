@@ -1,7 +1,5 @@
 """The table of nodes: every id has one place, however large it is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,13 +1,12 @@
 """Which rigid bodies parts become: what springs hold, what a rigid body of the deck has, and what nothing joins."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from d2rpick.choice.deck_of_run import bodies_of
 from d2rpick.deck import read_inventory
+from d2rpick.deck.model import Inventory
 from d2rpick.deck.pieces import pieces_of
 from d2rpick.flight.bodies import RigidBody
 from tests import made_car
@@ -15,11 +14,6 @@ from tests.deck import test_radioss as rad
 from tests.deck.test_joints import MESH
 from tests.deck.test_ls_dyna import inventory
 from tests.decks import row, wide
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.deck.model import Inventory
 
 # Part 1 is a row of shells on the nodes 1 to 40, parts 2 and 3 are one shell each: 41 to 44, 45 to 48.
 ROW = "".join(wide(n, 2 * n - 1, 2 * n, 2 * n + 2, 2 * n + 1) for n in range(1, 20))

@@ -3,8 +3,6 @@
 Runs only where OPENRADIOSS_PATH names an installation of OpenRadioss; takes some seconds.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 from pathlib import Path

@@ -1,12 +1,10 @@
 """Printed cards: numbers in columns, windows that follow each other, LS-DYNA cards and Radioss engine files."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -19,9 +17,6 @@ from d2rpick.histories.opening import READERS
 from d2rpick.rules import check_deck
 from tests.command import run
 from tests.decks import found, read, spans, write
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 TIMES = st.floats(1e-9, 1e9)
 ALL = Printing(part=(11,), node=(1001,), end=1e6)

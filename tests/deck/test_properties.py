@@ -1,7 +1,5 @@
 """Decks made at random: what is written is read, and no bytes whatever bring the check down."""
 
-from __future__ import annotations
-
 import contextlib
 import string
 from dataclasses import dataclass, field

@@ -1,21 +1,16 @@
 """Elements of Radioss starter decks."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick.deck import radioss, read_inventory
+from d2rpick.deck.model import Inventory
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.rules import check_deck
 from tests.computed import starter, stored
 from tests.deck.test_ls_dyna import counted
 from tests.decks import wide
-
-if TYPE_CHECKING:
-    from d2rpick.deck.model import Inventory
 
 BEGIN = "#RADIOSS STARTER\n/BEGIN\nTEST\n      2022         0\n                  kg\n                  kg\n"
 PROPS = (

@@ -1,9 +1,6 @@
 """Rigid bodies that a deck lacks: their parts, their main node, and what moves it."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -12,13 +9,10 @@ from d2rpick.deck.mesh import nodes_of
 from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import cards
 from d2rpick.deck.radioss_bodies import Bodies, bodies_for
-from d2rpick.deck.radioss_run import read_run, rigid_parts
+from d2rpick.deck.radioss_run import Run, read_run, rigid_parts
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import check_deck
 from tests.decks import wide
-
-if TYPE_CHECKING:
-    from d2rpick.deck.radioss_run import Run
 
 REAL = 20
 ENGINE = "/RUN/box/1\n 0.4\n/VERS/2022\n/TFILE/4\n1e-5\n"

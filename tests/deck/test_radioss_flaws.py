@@ -3,9 +3,7 @@
 The decks are the strip of four shells of `tests.deck.test_openradioss`: nodes 1 to 10, 0.1 apart, and main node 99.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -14,9 +12,6 @@ from d2rpick.deck.radioss_flaws import flaws_of
 from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw, read_run
 from tests.deck.test_openradioss import MAIN, starter
 from tests.decks import wide
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 WIDE = 20
 OFF, ON = f"/RBODY/OFF\n{MAIN}\n", f"/RBODY/ON\n{MAIN}\n"

@@ -1,7 +1,5 @@
 """Radioss runs: which files belong together, and when which part is rigid."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,9 +1,7 @@
 """The reader: where keywords and fields stand, formats, comments, parameters, includes, and what tells of a cut."""
 
-from __future__ import annotations
-
 import gzip
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -14,9 +12,6 @@ from d2rpick.deck.reader import holds_mesh
 from d2rpick.deck.source import Block, Held, SourceFile, find_marks
 from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.decks import found, read, spans
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 WINDOW = [(1, 0.02, 0.09)]
 LONG_CARDS = (

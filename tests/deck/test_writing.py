@@ -1,26 +1,19 @@
 """Decks written with cards in them: nothing else changes, and what is there is never lost."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.printed_card import Printing
+from d2rpick.deck.printed_card import PrintedCard, Printing
 from d2rpick.deck.printing import cards
+from d2rpick.deck.radioss_deck import Leg
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import RULES, check_deck
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE
 from tests.decks import write
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from d2rpick.deck.printed_card import PrintedCard
-    from d2rpick.deck.radioss_deck import Leg
 
 WINDOWS = [(0.02, 0.09), (0.1, 0.15)]
 CARD = cards(WINDOWS, Printing(part=(1,)))

@@ -1,10 +1,7 @@
 """Which of several rigid bodies is off most at td: of made drifts, and of a car that a solver computed."""
 
-from __future__ import annotations
-
 import csv
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -15,13 +12,11 @@ from d2rpick.choice.of_run import read
 from d2rpick.flight.bodies import Bodies, RigidBody, bodies_in_flight
 from d2rpick.flight.flight import Flight, find_flight, seen_flight
 from d2rpick.flight.position_error import MOST_OF_PATH, Drift
+from d2rpick.histories.history import History
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, stored
 from tests.records import known
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import History
 
 TIME = np.linspace(0.0, 1.0, 11)
 

@@ -1,9 +1,8 @@
 """When the parts fly, by everything that the files of computed runs tell, against what is known of these runs."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -27,10 +26,6 @@ from tests.computed import columns, stored
 from tests.json_schemas import check_by_schema
 from tests.records import known, table
 from tests.sample_box import t01
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 MILLISECOND = 1e-3
 CAR, DROP = stored("carT01.gz"), stored("drop2T01.gz")

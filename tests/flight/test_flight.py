@@ -1,10 +1,8 @@
 """The end of the load: found by the oscillator that describes the rest, or by the energy alone."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,17 +12,13 @@ from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import end_of_load
+from d2rpick.histories.history import History
 from d2rpick.vibration.oscillator import to_mode
 from d2rpick.vibration.span import Span, described_span
 from tests import paper
 from tests.command import ROLLOVER
 from tests.computed import columns, stored
 from tests.records import noisy, table
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from d2rpick.histories.history import History
 
 PERIOD = 2 * np.pi / paper.OMEGA_2
 

@@ -1,9 +1,5 @@
 """No flight is claimed where forces act: walls that do no work, loads that fade, friction, supports, other bodies."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 
@@ -12,14 +8,10 @@ from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around
-from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision
+from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision, Samples
 from d2rpick.histories.names import Part
 from tests.benchmarks import flights as campaign
 from tests.records import known, printed, table
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import Samples
-
 
 PLAIN = Settings(replay=False)
 TIME = np.linspace(0.0, 1.0, 1001)

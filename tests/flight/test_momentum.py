@@ -1,10 +1,9 @@
 """Free flight found in the momentum: on motions made up of known pieces, and on runs that a solver computed."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -23,19 +22,12 @@ from d2rpick.flight.momentum import (
     with_parts_by_number,
 )
 from d2rpick.flight.window import FreeFlight
-from d2rpick.histories.history import EXACT, Momenta, Precision
+from d2rpick.histories.history import EXACT, Momenta, Precision, Samples
 from d2rpick.histories.names import Part
-from d2rpick.histories.opening import Selection, open_run
+from d2rpick.histories.opening import Run, Selection, open_run
 from tests.command import BOX, ENERGY, GLSTAT, answer, run
 from tests.computed import stored
 from tests.records import known, printed
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from d2rpick.histories.history import Samples
-    from d2rpick.histories.opening import Run
-
 
 PARTS = (Part(1, "box"), Part(2, "step"), Part(3, "sled"))
 MASSES = np.array([300.0, 78.0])

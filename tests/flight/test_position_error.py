@@ -1,10 +1,7 @@
 """How far a body is out of place at td: of bodies that turn, of those that tell nothing, and of a solver's runs."""
 
-from __future__ import annotations
-
 import csv
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -15,14 +12,11 @@ from d2rpick.choice.of_run import Reference, read
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.flight.turning import Flying
-from d2rpick.histories.history import EXACT, Momenta
+from d2rpick.histories.history import EXACT, Momenta, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, stored
 from tests.records import known
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import Samples
 
 TIME = np.linspace(0.0, 0.1, 401)
 FLIGHT = (0.0, 0.1)

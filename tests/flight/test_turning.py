@@ -1,11 +1,11 @@
 """How a body that is rigid for a while turns away: against bodies whose motion is integrated step by step."""
 
-from __future__ import annotations
-
 import csv
+from collections.abc import Callable, Collection
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 import pytest
@@ -18,17 +18,11 @@ from d2rpick.deck.geometry import Placed, Placement
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.flight.turning import Flying
-from d2rpick.histories.history import EXACT, Momenta
+from d2rpick.histories.history import EXACT, Momenta, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, starter, stored
 from tests.records import known
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
-    from pathlib import Path
-
-    from d2rpick.histories.history import Samples
 
 TIME = np.linspace(0.0, 0.1, 401)
 PLACES = np.array([[1.5, 0.7, 0.1], [1.4, -0.7, 0.0], [-1.5, 0.6, 0.2], [-1.3, -0.7, 0.6], [0.9, 0.1, 0.3]])

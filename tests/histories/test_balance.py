@@ -1,9 +1,6 @@
 """Energy of springs and dampers: found where energies add up, left out of the level, kept where there is no other."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,12 +9,10 @@ from d2rpick.choice.of_run import read
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.balance import spring_energy, springs_among
+from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from tests.computed import stored
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import Samples
 
 TIME = np.linspace(0.0, 1.0, 50)
 PARTS = tuple(Part(i + 1, f"part {i + 1}") for i in range(4))

@@ -1,18 +1,17 @@
 """The bytes of files that are appended to, cut, replaced or written anew while they are read."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import sys
 import time
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from itertools import cycle
+from pathlib import Path
 from threading import Event, Thread
 from time import sleep
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -30,10 +29,6 @@ from tests.made_binout import binout
 from tests.made_t01 import t01
 from tests.reading import on_disk, read_history, run_of_file, run_on_disk
 from tests.text_files import glstat_text, matsum_text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
 
 pytestmark = pytest.mark.usefixtures("new_files")
 

@@ -1,7 +1,5 @@
 """Times as they are read and typed again."""
 
-from __future__ import annotations
-
 from hypothesis import example, given
 from hypothesis import strategies as st
 

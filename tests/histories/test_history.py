@@ -1,21 +1,16 @@
 """What a history refuses, and what it tells of one time is what it tells of many."""
 
-from __future__ import annotations
-
 import pickle
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
 from d2rpick.base.errors import RangeError
 from d2rpick.histories.history import History, Precision, Samples
 from d2rpick.histories.samples import find_turns
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 
 def history(energy: ArrayLike, time: ArrayLike | None = None) -> History:

@@ -1,8 +1,6 @@
 """What solvers print beside the histories: the engine, what a run took, the smallest steps."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -11,9 +9,6 @@ from d2rpick.histories.listings import printed_steps, read_timing, read_zone_tim
 from d2rpick.histories.opening import open_run
 from tests.command import GLSTAT
 from tests.text_files import glstat_text
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 BAR = "*" * 72
 HEAD = """ CAR_0002.out

@@ -1,7 +1,5 @@
 """Parts by number, range and title."""
 
-from __future__ import annotations
-
 import pytest
 
 from d2rpick.base.errors import FormatError

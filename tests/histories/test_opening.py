@@ -1,7 +1,5 @@
 """Recognition by content, where the bytes come from, and the errors of both."""
 
-from __future__ import annotations
-
 import gzip
 import hashlib
 import io

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import gzip
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from d2rpick.choice.overview import survey
 from d2rpick.histories.companions import check_companions
 from d2rpick.histories.database import Legs
 from d2rpick.histories.formats import binout, csv_table, glstat, matsum, radioss_th
+from d2rpick.histories.history import Samples
 from d2rpick.histories.opening import READERS, Run, Selection, open_run, reader
 from d2rpick.histories.source import Source
 from tests.computed import stored
@@ -22,11 +23,6 @@ from tests.made_binout import values
 from tests.made_t01 import MadePart, t01, value
 from tests.reading import history_of, read_history, run_of, states_of
 from tests.text_files import HEAD, glstat_text, matsum_head, matsum_part, matsum_text
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from d2rpick.histories.history import Samples
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 TIMES = np.arange(1, 9) / 8

@@ -1,7 +1,5 @@
 """Where a curve crosses a level or turns, and its outline with fewer points."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from itertools import pairwise
 

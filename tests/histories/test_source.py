@@ -1,15 +1,13 @@
 """Where the bytes come from: files, folders, globs, gzip and standard input, for all formats."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import os
 import time
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -24,9 +22,6 @@ from tests.made_binout import binout
 from tests.made_t01 import t01
 from tests.reading import read_history
 from tests.text_files import glstat_text, matsum_text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 TIMES = [0.125, 0.25, 0.375]
 CONTENTS = {

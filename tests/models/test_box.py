@@ -1,7 +1,5 @@
 """The rollover box: what mechanics asks of it, what switching keeps, and that it is the study's time table."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,9 +1,7 @@
 """The tool on twenty-one structures of many modes: what it recommends, against what happens at every tr."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -12,9 +10,6 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.models.box_run import history_of
 from tests.faults import thirds
 from tests.rehearsals import SETS, rehearse
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 # The suite takes coarse boxes; tests/benchmarks/rollover.py runs the sets as they are.
 MESH, INTERVAL, EVERY = 4, 3e-4, 18

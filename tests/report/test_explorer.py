@@ -1,12 +1,12 @@
 """The interactive part of a page in a real browser: what it shows of a td is what ``suggest --td`` prints."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex
+from collections.abc import Iterator
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,10 +24,6 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.select import Select
 
 from tests.report.browser import NEEDS_BROWSER, Browser, browsing
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 # Where the first and the last td lie in the chart of the energy, in pixels.
 ENDS = """

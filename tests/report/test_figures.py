@@ -1,11 +1,8 @@
 """Figures say one thing each: the flight, what is acceptable in it, runs told apart."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 import d2rpick as d2
@@ -15,9 +12,6 @@ from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
 from d2rpick.report.figures_choice import draw_study, draw_suggestion
 from tests.command import BOX, ENERGY, ROOT
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 def texts(axes: Axes) -> list[str]:

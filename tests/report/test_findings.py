@@ -1,7 +1,5 @@
 """Reports of findings, each against its published schema."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from xml.etree import ElementTree as ET

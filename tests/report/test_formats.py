@@ -1,7 +1,5 @@
 """Every form of every result can be written, and the commands offer just these."""
 
-from __future__ import annotations
-
 import click
 import pytest
 

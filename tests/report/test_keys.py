@@ -1,7 +1,5 @@
 """The public keys: the schemas that ship say what the fields of the results say."""
 
-from __future__ import annotations
-
 import pytest
 
 from d2rpick.report import keys

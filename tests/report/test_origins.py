@@ -1,7 +1,5 @@
 """JSON documents and pages name every file that an answer rests on, with its SHA-256."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The HTML report: whole, self-contained, safe, and readable in a browser at any width and on paper."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import html

@@ -1,7 +1,5 @@
 """Lines that say what was read."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from d2rpick.histories.history import History

@@ -1,7 +1,5 @@
 """What is narrowed loses no word but columns that may be left out, and is as wide as asked for where words allow it."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -1,7 +1,5 @@
 """What is looked at to see a choice, and the motion that is drawn."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,12 +1,11 @@
 """Every rule: its examples, how it is selected and silenced, and that decks are judged apart."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,10 +23,6 @@ from d2rpick.rules import (
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import answer, run
 from tests.decks import found, write
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 PASSING = [(rule, example) for rule in RULES.values() for example in rule.passing]
 FAILING = [(rule, example) for rule in RULES.values() for example in rule.failing]

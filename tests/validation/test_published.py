@@ -1,10 +1,8 @@
 """The published oscillator results: numbers, integration, exhibits, and the command that writes them."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,9 +16,6 @@ from tests.json_schemas import check_by_schema
 from validation.published import box, exhibits, saving, values
 from validation.published.drawing import draw_exhibit
 from validation.published.values import MISPRINTS, integrated, table
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 SOLVER = str(ROOT / "sample_data" / "oscillator_solver.csv")
 RUN = str(ROOT / "sample_data" / "oscillator_solver_6_80.csv")

@@ -1,7 +1,5 @@
 """The runs of the solver that the documentation quotes: decks, legs, comparison, figures."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a fit leaves over: scatter or structure, and when a part of the samples is enough to tell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """The oscillator behind an energy history: bounds on its parameters, and what is refused and why."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -10,16 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
+from d2rpick.histories.history import Samples
 from d2rpick.vibration.identify import Identification, _covariance, identify
 from d2rpick.vibration.modes import Mode
 from tests.command import ROLLOVER
 from tests.computed import columns, stored
 from tests.records import ENERGY, MODE, TIME, noisy, printed, vibration
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from d2rpick.histories.history import Samples
 
 
 def accepted(time: Samples, energy: Samples) -> tuple[Identification, Mode]:

@@ -1,21 +1,15 @@
 """Measures of a pair of times, against the motion of the oscillator and against independent digits."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.vibration import measures
+from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import Replay, from_mode, to_mode
 from tests import paper
 from tests.records import MODES, replayed_residual
-
-if TYPE_CHECKING:
-    from d2rpick.vibration.modes import Mode
 
 
 @settings(max_examples=80, deadline=None)

@@ -1,7 +1,5 @@
 """How the lock-in error runs before td: its minima, and how far a tr may be off."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

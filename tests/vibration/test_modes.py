@@ -1,8 +1,6 @@
 """The closed form of a single-mode energy record."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -12,6 +10,7 @@ from scipy.optimize import approx_fprime
 
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest
+from d2rpick.histories.history import Samples
 from d2rpick.vibration.identify import identify, identify_several
 from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual
 from d2rpick.vibration.modes import Mode, Modes, sum_and_jacobian
@@ -19,11 +18,6 @@ from tests import chain, paper
 from tests.command import ROLLOVER
 from tests.computed import columns
 from tests.records import MODE, noisy, printed, replayed_residual, table
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from d2rpick.histories.history import Samples
 
 MODES = st.builds(
     Mode,

@@ -1,7 +1,5 @@
 """Closed forms against independent numbers, scipy's integrator, and what mechanics says must hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,23 +1,17 @@
 """A sign is claimed of a part where its motion is sure: one deformation, or modes that do not mix."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest
+from d2rpick.histories.history import History
 from d2rpick.vibration.measures import kinetic_share, lock_in_error
 from d2rpick.vibration.part_motion import all_zeros, by_own_modes, followed
 from d2rpick.vibration.part_signs import read_parts
 from d2rpick.vibration.waves import Waves
 from tests.benchmarks.promise_parts import Motion, history
 from tests.records import known, noisy
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import History
 
 TIME = np.arange(0, 0.4, 4e-4)
 NAMES = ("A", "B")

@@ -1,9 +1,6 @@
 """Deformations of single parts: their signs, what they say of a pair, and where they say nothing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -11,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.candidates import judge
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.situation import Settings, Situation, examine
 from d2rpick.choice.suggest import suggest
 from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threads
 from d2rpick.histories.history import History
@@ -24,9 +21,6 @@ from tests import chain
 from tests.command import BOX
 from tests.computed import stored
 from tests.records import known, printed
-
-if TYPE_CHECKING:
-    from d2rpick.choice.situation import Situation
 
 PLAIN = Settings()
 NAMES = ("IE_spring1_J", "IE_spring2_J")

@@ -1,21 +1,15 @@
 """The window in which a record stays with an oscillator, and what is tried to find it."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 
 from d2rpick.choice.situation import Settings, examine
+from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, identify_several, judge_given
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.span import Fits, Span, described_span, span_of
 from tests import paper
 from tests.records import ENERGY, MODE, TIME, noisy, table
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import History
 
 
 def of(energy: np.ndarray) -> History:

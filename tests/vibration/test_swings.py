@@ -1,9 +1,5 @@
 """Counting the swings of an energy: the signs of a motion that was integrated, or none where a mode hides."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,11 +8,9 @@ from scipy.integrate import solve_ivp
 
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest import suggest
+from d2rpick.histories.history import Samples
 from d2rpick.vibration.swings import count_swings
 from tests.records import known, table
-
-if TYPE_CHECKING:
-    from d2rpick.histories.history import Samples
 
 TIME: Samples = np.linspace(0.0, 30.0, 1201)
 

@@ -1,7 +1,5 @@
 """Intervals of tr must hold the true crossing, and be no wider than they need."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Waves: signed records made of a few are found again, others are none."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,9 +1,7 @@
 """binout: made files of every style."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from itertools import product
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -16,9 +14,6 @@ from d2rpick.histories.source import Source
 from tests.made_binout import GLSTAT, LsdaWriter, Style, values
 from tests.made_binout import binout as made_binout
 from tests.reading import run_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 def opened(*files: LsdaWriter | bytes) -> Binout:

@@ -1,27 +1,20 @@
 """Tables of text: small texts in, expected numbers out; every cut gives an error or a true prefix."""
 
-from __future__ import annotations
-
 import contextlib
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.base.errors import FormatError
+from d2rpick.histories.content import OnDisk
 from d2rpick.histories.formats import csv_table
 from d2rpick.histories.formats.layout import Portions, Text
-from d2rpick.histories.history import EXACT, Precision
+from d2rpick.histories.history import EXACT, History, Precision
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
 from tests.reading import history_of, on_disk, states_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.histories.content import OnDisk
-    from d2rpick.histories.history import History
 
 TIMES = [0.0, 0.25, 0.625]
 ENERGIES = [1.5, 2.75, -3.125]

@@ -1,7 +1,5 @@
 """Curves one after the other: what LS-PrePost, T/HIS and DYNAFORM export, and what is refused."""
 
-from __future__ import annotations
-
 import contextlib
 
 import pytest

@@ -4,13 +4,12 @@ Structure is damaged at every byte and by hypothesis; the numbers in a file carr
 part, so a shifted one is seen.  Damage of the numbers themselves cannot be found by anyone and is not tried.
 """
 
-from __future__ import annotations
-
 import tracemalloc
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -18,16 +17,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.base.errors import FormatError
+from d2rpick.histories.database import Database
 from d2rpick.histories.formats.binout import Binout
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from tests.faults import cases, some
 from tests.made_binout import GLSTAT, LsdaWriter, Style, binout, values
 from tests.made_t01 import MadePart, T01Writer, t01, value
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from d2rpick.histories.database import Database
 
 Read = TypeVar("Read")
 

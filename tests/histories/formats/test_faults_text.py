@@ -1,7 +1,5 @@
 """Damaged glstat and matsum: an error of ours, or the numbers that a plain reader finds in the lines."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,9 +1,7 @@
 """Numbers taken while blocks are compared are those that are fetched by themselves, in damaged files too."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -16,9 +14,6 @@ from d2rpick.histories.formats.fixed_text import PORTIONS, Portions
 from d2rpick.histories.formats.glstat import Glstat
 from d2rpick.histories.formats.matsum import Matsum
 from tests.text_files import glstat_text, matsum_text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 IDS = [1, 20, 300]
 

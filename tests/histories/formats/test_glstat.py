@@ -1,7 +1,5 @@
 """glstat: what it may look like and what is refused; every cut gives an error or a true prefix."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

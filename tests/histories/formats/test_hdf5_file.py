@@ -1,13 +1,11 @@
 """HDF5 files of every layout: the numbers that were put in, or a refusal that lists what there is."""
 
-from __future__ import annotations
-
 import io
 import os
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import nullcontext
-from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -18,17 +16,13 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import hdf5_file
 from d2rpick.histories.formats.hdf5_columns import check_file
 from d2rpick.histories.formats.hdf5_file import SavedBinout
+from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
 from tests.computed import stored, unpacked
 from tests.faults import FAULTS, Fault, cases, damage
 from tests.hdf5_files import ENERGY, KINETIC, LAYOUTS, PARTS, TIME, lasso, plain, written
 from tests.reading import history_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from d2rpick.histories.history import History
 
 
 def read(file: io.BytesIO, *energy: str, time: str | None = None) -> History:

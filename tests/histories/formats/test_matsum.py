@@ -1,7 +1,5 @@
 """What a matsum may look like, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,10 +1,9 @@
 """Radioss T01, binary and as text: computed runs against other readings, made files of every age, damaged texts."""
 
-from __future__ import annotations
-
 import gzip
+from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,10 +20,6 @@ from tests.faults import cases, some
 from tests.histories.formats.test_faults_binary import bounded_memory, t01_value, true_columns
 from tests.made_t01 import MadePart, T01TextWriter, T01Writer, real, t01, value
 from tests.reading import run_of, run_on_disk
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 STATES = 3
 SMALL = t01(

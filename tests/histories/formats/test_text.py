@@ -1,8 +1,7 @@
 """The lines of a text, of a big one that stays on its disk as of one in memory."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from hypothesis import example, given
@@ -14,10 +13,6 @@ from d2rpick.histories.content import OnDisk
 from d2rpick.histories.formats.layout import Portions, Text
 from d2rpick.histories.source import Source
 from tests.reading import on_disk
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 CONTENTS = st.lists(st.sampled_from([b"0.125,17", b"\n", b"\r\n", b"\xc2\xb5s", b"\xb5", b""]), max_size=40).map(
     b"".join
