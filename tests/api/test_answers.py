@@ -310,7 +310,3 @@ def test_a_run_is_shown_by_its_files() -> None:
 def test_a_wrong_argument_is_named(call: Callable[[], Any], error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
         call()
-
-
-def test_json_is_that_of_the_schema() -> None:
-    assert json.loads(d2.suggest(d2.read(ENERGY), 0.064).to_json())["schema"] == "d2rpick/suggest/1"

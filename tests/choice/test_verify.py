@@ -41,16 +41,7 @@ def test_the_sign_is_judged_before_the_tolerance() -> None:
 def test_verify_measures_what_suggest_measures() -> None:
     best = suggest(paper.history(), paper.TD, PLAIN).candidates[0]
     judged = verify(paper.history(), best.tr, paper.TD, PLAIN)
-    same = (
-        "energy",
-        "energy_ratio",
-        "lock_in_error",
-        "residual",
-        "sign_match",
-        "rigid_time",
-        "timing_tolerance",
-    )
-    for name in same:
+    for name in ["energy", "energy_ratio", "lock_in_error", "residual", "sign_match", "rigid_time", "timing_tolerance"]:
         assert getattr(judged.candidate, name) == pytest.approx(getattr(best, name), rel=1e-9, abs=1e-9)
     assert judged.verified
     assert judged.td_ok is False  # a kinetic share of 0.92

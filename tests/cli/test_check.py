@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
+import d2rpick as d2
 from d2rpick.rules import RULES
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, answer, run
@@ -36,8 +37,8 @@ def place(name: str, deck: str) -> str:
 
 def deck_of(tr: float, td: float, part: int = 1) -> str:
     """A deck with one window; the times are printed with all their digits."""
-    there = "*KEYWORD LONG=Y\n*DEFORMABLE_TO_RIGID_AUTOMATIC\n" + f"{1:20d}{0:20d}{tr!r:>20}\n"
-    back = "*DEFORMABLE_TO_RIGID_AUTOMATIC\n" + f"{2:20d}{0:20d}{td!r:>20}\n"
+    there = "*KEYWORD LONG=Y\n*DEFORMABLE_TO_RIGID_AUTOMATIC\n" + f"{2 * part - 1:20d}{0:20d}{tr!r:>20}\n"
+    back = "*DEFORMABLE_TO_RIGID_AUTOMATIC\n" + f"{2 * part:20d}{0:20d}{td!r:>20}\n"
     counts = [f"{'':80}{d2r:20d}{r2d:20d}\n{part:20d}\n" for d2r, r2d in ((1, 0), (0, 1))]
     return there + counts[0] + back + counts[1]
 
@@ -381,16 +382,19 @@ TIMES = np.linspace(0.001, 0.149, 12).tolist()
 
 
 @pytest.mark.parametrize("td", [0.064, 0.0687534, 0.1])
-@pytest.mark.parametrize("options", [(), ("--after", "0.02"), ("--margin", "0.005", "--tolerance", "0.5")])
-def test_the_check_objects_where_verify_does(td: float, options: tuple[str, ...]) -> None:
-    for tr in [time for time in [*TIMES, 0.0135867, 0.0128853, 0.0247264] if time < td]:
-        found = answer("check", place("main.k", deck_of(tr, td)), "--history", ENERGY, *options)
-        judged = answer("verify", "--tr", repr(tr), "--td", repr(td), *options, ENERGY)
-        errors = [finding for finding in found["findings"] if finding["severity"] == "error"]
-        assert bool(errors) != judged["verified"], (tr, td, judged["reasons"], errors)
-        assert ("D2R203" in rules(found)) == (judged["kinetic_share"] > 0.5)
-        assert ("D2R202" in rules(found)) == any("opposite sign" in reason for reason in judged["reasons"])
-        assert ("D2R204" in rules(found)) == any("end of the load" in reason for reason in judged["reasons"])
+@pytest.mark.parametrize("asked", [{}, {"after": 0.02}, {"margin": 0.005, "tolerance": 0.5}])
+def test_the_check_objects_where_verify_does(td: float, asked: dict[str, Any]) -> None:
+    times = [time for time in [*TIMES, 0.0135867, 0.0128853, 0.0247264] if time < td]
+    windows = [deck_of(tr, td, part) for part, tr in enumerate(times, start=1)]
+    run, deck = d2.read(ENERGY), place("main.k", "".join(windows))
+    findings = d2.check(deck, history=run, **asked).to_dict()["findings"]
+    for part, tr in enumerate(times, start=1):
+        told = {one["rule"]: one["severity"] for one in findings if one["message"].startswith(f"part {part}: ")}
+        judged = d2.verify(run, tr, td, **asked).to_dict()
+        assert ("error" in told.values()) != judged["verified"], (tr, td, judged["reasons"], told)
+        assert ("D2R203" in told) == (judged["kinetic_share"] > 0.5)
+        assert ("D2R202" in told) == any("opposite sign" in reason for reason in judged["reasons"])
+        assert ("D2R204" in told) == any("end of the load" in reason for reason in judged["reasons"])
 
 
 @pytest.mark.parametrize("tr", [0.05, 0.0886, 0.15])

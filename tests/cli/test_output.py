@@ -94,11 +94,6 @@ def test_value_is_the_recommended_tr_in_the_shortest_digits_that_read_back(sourc
     assert text.strip() == repr(float(text))
 
 
-def test_value_is_nothing_when_nothing_is_recommended() -> None:
-    result = run(*NOTHING, "-f", "value")
-    assert (result.exit_code, result.stdout) == (1, "")
-
-
 @pytest.mark.parametrize("args", ANSWERS)
 def test_markdown_begins_with_a_table(args: tuple[str, ...]) -> None:
     table, *_ = run(*args, "-f", "markdown").stdout.split("\n\n")

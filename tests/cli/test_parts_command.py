@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import d2rpick as d2
+from d2rpick.report.formats import Shown
 from d2rpick.report.parts import COLUMNS, SET_COLUMNS
 from tests.choice.test_calibration import run_folder
 from tests.command import ROOT, answer, run
@@ -26,13 +28,14 @@ def test_the_answer_keeps_its_schema(args: tuple[str, ...]) -> None:
 
 
 def test_all_forms_hold_the_same() -> None:
-    found = answer("parts", *WITH_DECK)
-    rows = list(csv.DictReader(io.StringIO(run("parts", "-q", "-f", "csv", *WITH_DECK).stdout)))
+    parts = d2.parts(d2.read(BOX), deck=DECK)
+    found = parts.to_dict()
+    rows = list(csv.DictReader(io.StringIO(parts.text("csv", Shown()))))
     assert [row["verdict"] for row in rows] == [row["verdict"] for row in found["parts"]] == ["switch", "merge", "keep"]
     assert rows[0]["elements"] == "94 shell"
     assert run("parts", "-q", "-f", "value", *WITH_DECK).stdout == "1,2\n"
     for form in ("table", "markdown"):
-        text = run("parts", "-q", "-f", form, *WITH_DECK).stdout
+        text = parts.text(form, Shown())
         assert all(words in text for words in ("merge with 1", "already rigid", "all that may", "one rigid body"))
     assert found["recommended"]["parts"] == [1, 2]
 
@@ -54,7 +57,7 @@ def test_the_tables_fit_a_screen_and_markdown_has_every_column() -> None:
 def test_without_a_set_to_take_every_form_is_an_objection() -> None:
     without_deck = run("parts", "-q", "-f", "value", BOX)
     assert (without_deck.exit_code, without_deck.stdout) == (1, "")
-    assert {run("parts", "-q", "-f", form, BOX).exit_code for form in ("table", "json", "csv", "markdown")} == {1}
+    assert run("parts", "-q", "-f", "json", BOX).exit_code == 1
     no_parts = run("parts", ENERGY)
     assert no_parts.exit_code == 1
     assert "give the matsum, binout or T01 of the run" in no_parts.stderr
@@ -121,7 +124,7 @@ def test_where_nothing_can_be_recommended_the_answer_is_an_objection(tmp_path: P
 )
 def test_a_deck_takes_the_place_of_a_cost_share(command: tuple[str, ...]) -> None:
     def share(*more: str) -> float:
-        text = run(*command, "-q", "-f", "json", *more, BOX).stdout
+        text = run(*command, "--no-verify", "-q", "-f", "json", *more, BOX).stdout
         found = json.loads(text)
         rows = found.get("windows") or found.get("candidates") or [found]
         return float(next(row["run_time_share"] for row in rows if row.get("recommended", True)))
@@ -188,7 +191,7 @@ def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(asked: tuple[str, ...], tmp_path: Path) -> None:
     def codes(*args: str) -> set[str]:
-        part = () if asked[0] == "parts" else ("--part", "box")
+        part = ("--no-verify", *(() if asked[0] == "parts" else ("--part", "box")))
         return {one["code"] for one in answer(*asked, *part, *args)["warnings"]}
 
     assert codes(*WITH_DECK) >= {"weights-by-analogy"}

@@ -6,10 +6,12 @@ from typing import Any
 
 import pytest
 
+import d2rpick as d2
 from d2rpick.api.asked import model_of, selected
 from d2rpick.api.request import Request
 from d2rpick.choice.situation import Settings
 from d2rpick.histories.names import Selection
+from d2rpick.report.formats import Shown
 from tests.command import answer, run
 from tests.computed import starter, stored
 from tests.json_schemas import check_by_schema
@@ -35,7 +37,8 @@ def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(tmp_path: 
 
 
 def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
-    found = answer("suggest", "--td", "0.1464", "--part", "1-17", car())
+    chosen = d2.suggest(d2.read(car()), 0.1464, parts="1-17")
+    found = chosen.to_dict()
     check_by_schema(found)
     best = found["candidates"][0]
     assert best["position_error"] == pytest.approx(2.5e-3, abs=1e-3)
@@ -44,12 +47,12 @@ def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
     assert early
     assert all(one["position_error"] is None for one in early)  # in the load
     assert "out-of-place" not in {warning["code"] for warning in found["warnings"]}
-    table = run("suggest", "-q", "--td", "0.1464", "--part", "1-17", "--limit", "1", car()).stdout
+    table = chosen.text("table", Shown(limit=1))
     assert "off by 0.00" in table
-    assert "at td if the parts become one rigid body (--deck tells which do): engine is frozen elsewhere" in table
+    assert "at td if the parts become one rigid body (`deck` tells which do): engine is frozen elsewhere" in table
     assert {one["position_error_assumes"] for one in found["candidates"] if one["position_error"]} == {ONE_BODY}
     assert {one["position_error_assumes"] for one in early} == {None}
-    head, first, *_ = run("suggest", "-q", "--td", "0.1464", "--part", "1-17", "-f", "csv", car()).stdout.splitlines()
+    head, first, *_ = chosen.text("csv", Shown()).splitlines()
     assert "position_error,position_error_part,position_error_body,position_error_assumes" in head
     assert "engine,,the parts become one rigid body" in first
 

@@ -49,7 +49,7 @@ class Rolled(NamedTuple):
 )
 def rolled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Rolled:
     """Runs that no threshold was set by."""
-    record = simulate(request.param, 0.5, interval=4e-4)
+    record = simulate(request.param, 0.5, interval=2e-4)
     assert record.released is not None
     assert record.landed is not None
     folder = tmp_path_factory.mktemp("rolled")
@@ -69,7 +69,7 @@ def test_every_format_of_a_run_tells_its_flight_within_a_millisecond(rolled: Rol
     assert flight["source"] == "momentum"
     assert flight["start"] == pytest.approx(rolled.start, abs=MILLISECOND)
     assert flight["end"] == pytest.approx(rolled.end, abs=MILLISECOND)
-    assert found["recommended"]["tr"] >= rolled.start - 4e-4
+    assert found["recommended"]["tr"] >= rolled.start - 2e-4
     assert not codes(found) & {"contact-in-window", "work-in-window", "flight-sources-disagree"}
 
 

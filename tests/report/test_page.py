@@ -190,7 +190,8 @@ def test_a_title_of_html_stays_text(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", [NASTY, r"IE $\foo$", "_energy", "$"])
 def test_a_column_of_any_name_stays_text(tmp_path: Path, name: str) -> None:
-    (tmp_path / "energy & <i>.csv").write_text(Path(ENERGY).read_text("utf-8").replace("internal_energy", f"'{name}'"))
+    head, *rows = Path(ENERGY).read_text("utf-8").splitlines(keepends=True)
+    (tmp_path / "energy & <i>.csv").write_text(head.replace("internal_energy", f"'{name}'") + "".join(rows[::5]))
     energy = ("--no-verify", "--energy", f"'{name}'")
     page = page_of(tmp_path, "--td", "0.064", *energy, str(tmp_path / "energy & <i>.csv"))
     assert name in page.text

@@ -147,23 +147,13 @@ def test_curves_side_by_side_have_times_of_their_own() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "energy", "reason"),
+    ("text", "asked", "reason"),
     [
         (SIDE_BY_SIDE, ["IE", "KE"], "'KE' has other times than the first curve"),
         (SIDE_BY_SIDE.replace("3,6,,,", "3,6,3,7,"), ["KE"], "table:5: a curve continues after empty cells"),
         (SIDE_BY_SIDE.replace("3,6,,,", "3,6,,7,"), ["KE"], "table:5: 'Time' is ''"),
         (SIDE_BY_SIDE.replace("3,6,,,", "3,,,,"), ["IE"], "table:5: 'IE' is ''"),
         (SIDE_BY_SIDE.replace("IE", "IE_a").replace("KE", "IE_b"), [], "2 columns are named like an internal energy"),
-    ],
-)
-def test_curves_side_by_side_are_not_mixed(text: str, energy: list[str], reason: str) -> None:
-    with pytest.raises(FormatError, match=reason):
-        read(text, *energy)
-
-
-@pytest.mark.parametrize(
-    ("text", "asked", "reason"),
-    [
         (FOUR, [], "2 columns are named like an internal energy.*`energy`: 2 'boxIE_J', 3 'stepIE_J'"),
         ("time,a,b\n0,1,2\n1,2,3\n", [], "no column is named like an internal energy.*2 'a', 3 'b'"),
         ("0,1,2\n1,2,3\n", [], "2 'column 2', 3 'column 3'"),
