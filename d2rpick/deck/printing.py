@@ -235,6 +235,7 @@ def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequ
     how = (
         f"Each /RBODY with main node {nodes} takes sensor {last}: sens_ID, columns 11 to 20 below its title.",
         f"/BEGIN needs version {STOPS_SINCE} or later, which knows when a sensor of time stops.",
+        "The largest step holds for the whole run: below the deformable step it changes that run; set --step-cap.",
     )
     told = _told(windows, printing, (*_OF_SENSORS, *how, *remarks), files, sensors)
     return replace(told, sensors=dict.fromkeys(ids, last))

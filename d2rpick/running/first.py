@@ -46,6 +46,9 @@ _OF_RADIOSS: Final = (
     "A contact of the parts with themselves counts: while it pushes, they do not fly.",
     "Legs behind the end of the run take one step.",
 )
+_OF_WALLS: Final = (
+    "The sensor of a rigid wall stays active once it was: behind the first push of one nothing becomes rigid."
+)
 _OF_LS_DYNA: Final = (
     "CODE 2 has no wait: parts become rigid without force after TIME1, also before a push and between two of them.",
     "Other contacts, rigid walls and loads are not seen by these switches.",
@@ -157,7 +160,7 @@ def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
         lines += switch if rigid else off((*bodies.nodes, *others))
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
     how = f"at rest in free fall: rigid from 0; then {_waited(wait)}" if at_rest else _waited(wait)
-    notes = (how, *bodies.notes, *_OF_ALL, *_OF_RADIOSS)
+    notes = (how, *bodies.notes, *_OF_ALL, *_OF_RADIOSS, *((_OF_WALLS,) if run.starter.walls else ()))
     head = "".join(f"# {line}\n" for line in comments([*notes, *PHYSICS]))
     return First(PrintedCard(head, (), files, starter=bodies.cards + sensors), wait, notes)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import d2rpick as d2
 from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import cards
 from d2rpick.deck.writing import write_deck
@@ -114,3 +115,50 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
         inside |= held
     assert bool(np.ptp(history.energy[~inside]) > 0.5 * history.energy.max()) == vibrates
     assert (history.energy.max() > 0.1) == vibrates  # [J]
+
+
+def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
+    """Before tr all states are those of the run without switching, bit by bit; in the windows nothing deforms."""
+    windows, reference = [(0.003, 0.006), (0.009, 0.014)], tmp_path / "reference"
+    reference.mkdir()
+    (reference / "strip_0000.rad").write_text(starter())
+    (reference / "strip_0001.rad").write_text(ENGINE)
+    energies = {}
+    for solver in ("radioss", "radioss-sensors"):
+        # the cap of one run holds while it is deformable, too, where the step is 1.7e-5
+        card = cards(windows, Printing(node=(MAIN,), end=END, name="strip", step_cap=2.5e-5), solver)
+        main = write_deck(str(reference / "strip_0000.rad"), card, str(tmp_path / solver))[0]
+        assert [(window.tr, window.td) for window in check_deck(main).windows] == windows
+        solve(tmp_path / solver, "strip")
+        histories = sorted(map(str, (tmp_path / solver).glob("stripT0?")))
+        energies[solver] = open_run(histories).history(Selection(parts=("1",)))
+    solve(reference, "strip")
+    plain = open_run([str(reference / "stripT01")]).history(Selection(parts=("1",)))
+    for history in energies.values():
+        before = int(np.searchsorted(history.time, windows[0][0] - 4e-5))
+        assert before > 50
+        np.testing.assert_array_equal(history.energy[:before], plain.energy[:before])
+        for tr, td in windows:  # at which step it becomes rigid differs, and with it the energy that is locked in
+            held = history.energy[(history.time > tr + 6e-5) & (history.time < td - 6e-5)]
+            assert held.size > 50
+            assert np.ptp(held) <= 1e-9 * history.energy.max()
+
+
+def test_a_first_run_switches_itself_at_the_same_step_twice(tmp_path: Path) -> None:
+    """The strip flies 20 mm to a wall, at 5 m/s: rigid after the wait, and released by the force of the wall."""
+    head, _, rest = starter().partition("/RBODY/1")
+    reals = [wide(*row, width=WIDE) for row in ((0.0, 0.0, 0.0), (0.0, 0.0, -0.02), (0.0, 0.0, 1.0))]
+    wall = f"/GRNOD/NODE/5\nall\n{wide(*range(1, 11))}/RWALL/PLANE/8\nground\n{wide(0, 0, 5, 0)}{''.join(reals)}"
+    thrown = f"/INIVEL/TRA/3\nthrown\n{wide(0.0, 0.0, -5.0, width=WIDE)[:-1]}{wide(5)}"
+    reference = tmp_path / "reference"
+    reference.mkdir()
+    (reference / "strip_0000.rad").write_text(f"{head}{wall}{thrown}{rest[rest.index('/TH/PART') :]}")
+    (reference / "strip_0001.rad").write_text(f"/RUN/strip/1\n{END}\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n2e-05\n")
+    ends = []
+    for name in ("one", "other"):
+        d2.first(reference / "strip_0000.rad", tmp_path / name, parts=1, wait=0.003)
+        solve(tmp_path / name, "strip")
+        times = [open_run([str(tmp_path / name / f"stripT0{leg}")]).history(Selection()).time for leg in (1, 2, 3)]
+        ends.append([time[-1] for time in times])
+    assert ends[0] == ends[1]
+    assert ends[0] == [pytest.approx(one, abs=5e-5) for one in (0.003, 0.004, END)]
