@@ -25,13 +25,14 @@ HALF = 0.5
 
 
 class _Half(NamedTuple):
-    """Half of the wait that a record asks for."""
+    """Half of the wait that was given, or that a record asks for."""
 
+    given: float | None
     whole: InnerMotion
 
     def needed(self, start: float, now: float) -> float | None:
         """Half of the wait; None where it is not known."""
-        needed = self.whole.needed(start, now)
+        needed = self.given or self.whole.needed(start, now)
         return needed and HALF * needed
 
 
@@ -50,7 +51,7 @@ class Looks:
         """Say what is seen of the leg that is ordered, whose history is the last.
 
         ``known`` is the longest wait that the record before these histories asked for [time].  None where there is no
-        state yet; RangeError where the wait that was given is too short.
+        state yet.  A wait that was given is kept to where the record shows a longer one: ``why`` says so.
         """
         try:
             run = in_deck(open_run([str(path) for path in histories]), self._inventory)
@@ -62,17 +63,20 @@ class Looks:
         now = float(history.time[-1])
         if order.rigid:
             return Seen(now, contact=contact_after(history, order.start))
-        motion = InnerMotion(history, self._wait, self._floor(known))
-        quiet = quiet_times(history, _Half(motion))
+        motion = InnerMotion(history, None, self._floor(known))
+        quiet = quiet_times(history, _Half(self._wait, motion))
         free = quiet[-1].start if quiet and quiet[-1].end is None else None
         if order.kind != LOAD:
             lasting = free is not None and free <= order.start
             return Seen(now, free, peak=highest_energy(history, order.start, now), contact=None if lasting else now)
-        wait = None if free is None else motion.wait(free, now)
-        if wait is None:
+        asked = None if free is None else motion.wait(free, now)
+        at_rest = asked is not None and asked.source == "at-rest"
+        wait = asked if self._wait is None else Wait(self._wait, "given", "as given")
+        if free is None or wait is None:
             return Seen(now)
-        self.why = wait.reason
-        return Seen(now, free, wait.time, idle=wait.source == "at-rest")
+        longer = asked is not None and asked.time > wait.time
+        self.why = f"{wait.reason}, but {asked.reason}" if asked and longer else wait.reason
+        return Seen(now, free, wait.time, idle=at_rest)
 
     def _floor(self, known: float) -> Wait | None:
         """Give the longest wait that is known from the deck, or from the record of flights before."""
