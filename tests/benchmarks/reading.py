@@ -6,9 +6,11 @@ lasso-python is looked for in this interpreter, or in the one that D2RPICK_LASSO
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
+import tarfile
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -20,17 +22,18 @@ import numpy as np
 
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.opening import Selection, open_run
-from tests.benchmarks.timing import output, ratio, seconds
+from tests.benchmarks.timing import ROOT, output, ratio, seconds
 from tests.made_binout import GLSTAT, LsdaWriter, values
 from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from d2rpick.histories.history import History, Samples
 
 LASSO = Path(os.environ.get("D2RPICK_LASSO_PYTHON", sys.executable))
 _STATES = 100_000
+_FIRST = "507c24f"  # version 0.6.0
 _PARTS, _PART_STATES = 500, 2000
 _ROWS = 1_000_000
 _ROUNDS = 7
@@ -51,6 +54,33 @@ def glstat_to_bare_read() -> float:
     """Reading time and internal energy of the same glstat over reading its bytes."""
     file = _glstat()
     return ratio(lambda: _read(file), lambda: _bare_read(file), _ROUNDS)
+
+
+def glstat_to_first() -> float | None:
+    """CPU of reading the same glstat over that of version 0.6.0, as the git history has it; None without that."""
+    packed = subprocess.run(["git", "archive", _FIRST, "d2rpick"], cwd=ROOT, capture_output=True, check=False)
+    if packed.returncode:
+        return None
+    then = Path(_folder.name, "then")
+    with tarfile.open(fileobj=io.BytesIO(packed.stdout)) as archive:
+        archive.extractall(then, filter="data")
+
+    def reading(root: Path, module: str) -> Callable[[], float]:
+        code = (
+            f"import sys, time; sys.path.insert(0, {str(root)!r}); from {module} import Selection, open_run\n"
+            "def read(): open_run([sys.argv[1]]).history(Selection())\n"
+            "read(); start = time.process_time(); [read() for _ in range(5)]; print(time.process_time() - start)"
+        )
+        return lambda: float(output("-c", code, str(_glstat())))
+
+    now = reading(ROOT, "d2rpick.histories.opening")
+    return ratio(now, reading(then, "d2rpick.readers"), _ROUNDS, cost=_told)
+
+
+def _told(measure: Callable[[], object]) -> float:
+    found = measure()
+    assert isinstance(found, float)
+    return found
 
 
 def matsum_to_loop(part: int | None) -> float:
@@ -143,11 +173,11 @@ def csv_to_loadtxt() -> float:
     return ratio(lambda: _read(file), lambda: _loadtxt(file), _ROUNDS)
 
 
-def csv_to_pandas() -> float:
-    """Reading time and energy of a csv of 1e6 rows and 20 columns over pandas.read_csv of all of it."""
+def csv_to_pandas(columns: int) -> float:
+    """Reading time and energy of a csv of 1e6 rows and some columns over pandas.read_csv of all of it."""
     import pandas as pd
 
-    file = _csv(_ROWS, 20)
+    file = _csv(_ROWS, columns)
     return ratio(lambda: _read(file), lambda: pd.read_csv(file), _ROUNDS)
 
 
