@@ -92,15 +92,15 @@ def on_card_only(request: Request, run: histories.Run) -> bool:
     return bool(request.energy) or not run.parts
 
 
-def ask(run: Run, request: Request, *, prints: bool = False, merge: int | None = None) -> Asked:
+def ask(run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None) -> Asked:
     """Take the energy that is asked for of a run, with what its deck tells.
 
     Parameters
     ----------
     run : Run
     request : Request
-    prints : bool
-        A card is printed: parts that the history has not stand there alone, and the energy is that of the model.
+    card_alone : bool
+        Only a card is asked for: parts that the history has not stand there, and the energy is that of the model.
     merge : int, optional
         Part into which all others are merged on the card: they become one rigid body.
 
@@ -121,7 +121,7 @@ def ask(run: Run, request: Request, *, prints: bool = False, merge: int | None =
         files = in_deck(files, model.inventory)
         selection = selected(files, selection, settings, model)
     parts: tuple[str, ...] = ()
-    if prints and on_card_only(request, files):
+    if card_alone and on_card_only(request, files):
         parts, selection = selection.parts, selection._replace(parts=())
     elif selection.parts:
         request.selection()  # refuses a named energy beside them

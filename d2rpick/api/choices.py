@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Unpack
 from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
 from d2rpick.api.asked import ask, request_of
-from d2rpick.api.request import time_or_window
+from d2rpick.api.request import MIN_MEAN_ENERGY, time_or_window
+from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import of_run
 from d2rpick.choice import suggest as choice
 from d2rpick.choice import verify as judgement
@@ -235,10 +236,11 @@ def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestio
 
 def verify(
     run: Run,
-    tr: float,
-    td: float,
+    tr: float | None = None,
+    td: float | None = None,
     *,
     switched: Run | None = None,
+    min_mean_energy: float = MIN_MEAN_ENERGY,
     parts: Parts | None = None,
     flying: Parts | None = None,
     deck: arguments.Path | None = None,
@@ -252,9 +254,11 @@ def verify(
     run : Run
         As `read` gives it, without switching.
     tr, td : float
-        Switch times [time].
+        Switch times [time]; with ``switched`` they are read off that run where they are not given.
     switched : Run, optional
         A finished run with these switch times, to be compared with ``run``.
+    min_mean_energy : float
+        Mean energy of the switched run after td over that of ``run``, at least; it may be as far above 1 as below [-].
     parts, flying, deck, weights, **choosing
         As for `suggest`.
 
@@ -276,15 +280,35 @@ def verify(
     >>> d2.verify(run, tr=0.0135867, td=0.0687534).verified
     True
     """
-    pair = arguments.number("tr", tr), arguments.number("td", td)
+    pair = arguments.optional("tr", tr), arguments.optional("td", td)
+    least = arguments.number("min_mean_energy", min_mean_energy, 0.0, 1.0)
     asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
-    return judged(asked, *pair, switched)
+    return judged(asked, *pair, switched, least)
 
 
-def judged(asked: Asked, tr: float, td: float, switched: Run | None = None) -> Verdict:
-    """Judge a pair, also by a finished switched run."""
+def judged(
+    asked: Asked,
+    tr: float | None,
+    td: float | None,
+    switched: Run | None = None,
+    min_mean_energy: float = MIN_MEAN_ENERGY,
+) -> Verdict:
+    """Judge a pair, also by a finished switched run, of which its times are read where they are not given."""
+    if switched is None and (tr is None or td is None):
+        raise ArgumentError(
+            f"give the time of the switch as `{'tr' if tr is None else 'td'}`, or a finished run with it"
+        )
+    other = switched and asked.reference.like(switched.files, asked.selection)
+    if other and (tr is None or td is None):
+        from d2rpick.choice.comparison import times_of
+
+        read = times_of(other.history, asked.reference.history)
+        tr, td = read[0] if tr is None else tr, read[1] if td is None else td
+    assert tr is not None
+    assert td is not None
     found, times = of_run.verify_of(asked.reference, tr, td, asked.settings), ["--tr", repr(tr), "--td", repr(td)]
-    if switched is not None:
-        found = of_run.compare_with(found, asked.reference, asked.reference.like(switched.files, asked.selection))
+    if switched is not None and other:
+        found = of_run.compare_with(found, asked.reference, other, min_mean_energy)
         times += [text for name in switched.sources for text in ("--switched", name)]
+        times += ["--min-mean-energy", repr(min_mean_energy)] * (min_mean_energy != MIN_MEAN_ENERGY)
     return Verdict.about(asked, found, *times, compared=switched)

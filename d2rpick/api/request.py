@@ -30,6 +30,7 @@ class Number(NamedTuple):
 
 
 TIME, POSITIVE, NOT_NEGATIVE, FRACTION = Number(), Number(0.0, above=True), Number(0.0), Number(0.0, 1.0)
+MIN_MEAN_ENERGY: Final = 0.7  # of the reference's; in computed runs that were switched well it was 0.77 and more
 AT_LEAST_ONE: Final = Number(1.0)  # elements that are rigid no longer limit the step: it cannot become smaller
 UNLIMITED: Final = 2**63  # the end of a range of whole numbers that has none
 # of d2rpick.histories.opening, which is too heavy to be imported for --help; a test holds them together

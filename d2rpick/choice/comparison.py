@@ -169,6 +169,8 @@ _STILL, _STILL_OF_VIBRATION = 1e-4, 1e-2
 # A solver switches at the first step from tr on, and output may miss it by a state or two: this share of the energy
 # about tr is left to that.
 _ABOUT = 0.05
+# Times between two states at which it is looked when a run was switched.
+_BETWEEN: Final = 101
 
 
 @dataclass(frozen=True)
@@ -211,6 +213,7 @@ def compare_runs(
     centres: tuple[Track | None, Track | None],
     *,
     known: bool = True,
+    min_mean: float = 0.0,
 ) -> Comparison:
     """Hold a switched run against its reference: was it rigid from tr to td, and what came after td.
 
@@ -228,6 +231,8 @@ def compare_runs(
         Of the reference and of the switched run, None where it has none.
     known : bool
         Whether the switched run reports its energies right after td; else nothing is made of them.
+    min_mean : float
+        Mean energy after td as a share of the reference's, at least; it may be as far above 1 as below [-].
 
     Raises
     ------
@@ -251,6 +256,8 @@ def compare_runs(
     objections = [*_not_rigid(reference, switched, rigid, tr, td, still)]
     if known:
         objections += _not_locked_in(reference, tr, frozen, wanted, tolerance)
+        if float(reference_after.mean()) > round_off(reference):
+            objections += _another_mean(float(after.mean() / reference_after.mean()), min_mean)
     if error is not None and error > MOST_MOMENTUM_ERROR:
         moved = f"the switched run's momentum after td is off by {error:.1%}"
         objections.append(f"{moved}: its motion differs from the reference")
@@ -342,6 +349,47 @@ def _not_locked_in(reference: History, tr: float, frozen: float, wanted: float, 
         )
     if measures.level_error(frozen, wanted) > tolerance:
         yield f"the energy that was locked in, {frozen:.6g}, is not that of the reference at td, {wanted:.6g}"
+
+
+def _another_mean(share: float, least: float) -> Iterator[str]:
+    """Object when the mean energy after td is another one than that of the reference."""
+    if not least <= share <= 2 - least:
+        found = f"the mean energy after td is {share:.2g} times that of the reference"
+        yield f"{found}, {least:g} to {2 - least:g} were expected (`min_mean_energy`)"
+
+
+def times_of(switched: History, reference: History) -> tuple[float, float]:
+    """Read off a switched run when its parts were rigid: its energy stands still, and that of the reference does not.
+
+    Returns
+    -------
+    tr, td : float
+        tr between the last state that moves and the first that does not, where the reference has that energy; td is
+        the last state that does not [time].
+
+    Raises
+    ------
+    RangeError
+        If there is no such time.
+    """
+    time, energy = switched.time, switched.energy
+    limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quantum(float(np.abs(energy).max())))
+    still = stretches(np.append(False, np.abs(np.diff(energy)) <= limit[1:]))
+    spans = [(max(first - 1, 0), last) for first, last in still]
+    moving = [one for one in spans if _range(reference, *time[[*one]].tolist()) > 2 * limit[one[0] : one[1] + 1].max()]
+    if not moving:
+        raise RangeError(f"{', '.join(switched.source)}: its energy stands still nowhere; give `tr` and `td`")
+    first, last = max(moving, key=lambda one: time[one[1]] - time[one[0]])
+    before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
+    tr = before[np.abs(reference.energies_at(before) - energy[first]).argmin()]
+    return float(tr), float(time[last])
+
+
+def stretches(states: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last of states that follow each other."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]])))
+    pairs = edges.reshape(-1, 2)
+    return [(int(a), int(b) - 1) for a, b in pairs if b - a >= FEWEST]
 
 
 def _reported_wrong(rigid: float, after: Samples) -> bool:

@@ -68,11 +68,13 @@ def suggest_of(
     with_better: bool = True,
     fits: Fits | None = None,
     since: float | None = None,
+    times: Sequence[float] | None = None,
 ) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window (low, high) or, for None, in the longest flight [time].
 
     ``with_better`` False: for a given td no better one is looked for.  ``fits`` are those of an earlier look at the
-    record with the same settings.  ``since``: for a td in a window no flight is taken to begin before that [time].
+    record with the same settings.  For a td in a window: no flight is taken to begin before ``since``, and ``times``
+    are td that are looked at beside the peaks of the energy, by default an even grid [time].
 
     Raises
     ------
@@ -83,7 +85,7 @@ def suggest_of(
     if td is None or isinstance(td, tuple):
         from d2rpick.choice.suggest_td import suggest_in_window
 
-        answer = suggest_in_window(reference.history, td, settings, fits, since)
+        answer = suggest_in_window(reference.history, td, settings, fits, since, times)
     else:
         answer = suggest_at(examine(reference.history, td, settings, fits), with_better=with_better)
     return _with_health(answer, reference.run)
@@ -113,8 +115,10 @@ def judge_of(reference: Reference, known: Situation, tr: float, td: float) -> Ve
     return _with_health(verify_at(there, tr), reference.run)
 
 
-def compare_with(verdict: Verdict, reference: Reference, switched: Reference) -> Verdict:
+def compare_with(verdict: Verdict, reference: Reference, switched: Reference, min_mean: float = 0.0) -> Verdict:
     """Hold a finished switched run, read in the same way, against the reference by which its times were judged.
+
+    ``min_mean`` is the least mean energy after td that is expected, as a share of the reference's [-].
 
     Raises
     ------
@@ -122,7 +126,7 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference) ->
         If one of the two runs does not go on after td.
     """
     verdict = replace(verdict, cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)))
-    return with_comparison(verdict, _comparison(verdict, reference.run, switched))
+    return with_comparison(verdict, _comparison(verdict, reference.run, switched, min_mean))
 
 
 def _check(
@@ -174,7 +178,7 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
     return replace(answer, health=health, cautions=answer.cautions + cautions)
 
 
-def _comparison(verdict: Verdict, run: Run, switched: Reference) -> Comparison:
+def _comparison(verdict: Verdict, run: Run, switched: Reference, min_mean: float) -> Comparison:
     from d2rpick.choice.comparison import compare_runs, judged_parts
 
     situation = verdict.situation
@@ -191,6 +195,7 @@ def _comparison(verdict: Verdict, run: Run, switched: Reference) -> Comparison:
         momenta=(run.momentum(together), _momentum(switched.run, together)),
         centres=(run.centre(parts), switched.run.centre(parts)) if parts else (None, None),
         known=judged.known,
+        min_mean=min_mean,
     )
     objections, notes = (*judged.objections, *found.objections), (*judged.notes, *found.notes)
     return replace(found, objections=objections, notes=notes)

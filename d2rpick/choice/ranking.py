@@ -93,6 +93,8 @@ _MOST_FAIR, _MOST_GOOD = 0.5, 0.2
 _MOST_HIDDEN: Final = 0.3
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
 _BAND: Final = 0.25
+# Decimals of a share that people read.
+_READ: Final = 2
 _NOT_CERTAIN: Final = "the flight is not certain"
 _UNKNOWN_LOAD: Final = "kinetic and internal energy change together, by gravity or by another load"
 
@@ -129,7 +131,7 @@ def _poor(situation: Situation, best: Candidate, expected: Expectation | None) -
     found = []
     if best.residual is not None and best.residual > _MOST_FAIR:
         found.append(f"the vibration after td is off by {best.residual:.0%}")
-    if expected and expected.kinetic_share > POOR_KINETIC_SHARE:
+    if expected and round(expected.kinetic_share, _READ) > POOR_KINETIC_SHARE:  # an estimate: what is read counts
         found.append(f"about {expected.kinetic_share:.0%} of the vibration energy is kinetic at td")
     if situation.basis == "energy":
         found += _of_record(situation)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache, partial
+from math import sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -21,7 +22,7 @@ from d2rpick.histories.digits import not_after, sum_as_read
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.situation import Settings, Situation
@@ -74,6 +75,10 @@ def _reached(energy: Samples, level: Samples, near: Samples) -> Samples:
 # Peaks of a window that are tried: the highest, since the higher a peak of several modes, the less energy is kinetic,
 # and the last, since the later td the more is saved.
 _MOST_PEAKS: Final = 12
+# td in an even grid: on paper and on a screen a curve of so many points is smooth.
+STEPS: Final = 200
+# Decimals of an error that people read.
+_READ: Final = 3
 # Rigid time that is given up for quality is told from this share of the window on.
 _MUCH: Final = 0.1
 # An energy that stays on its level may hide the vibration of many modes, which moves the landing by more than what the
@@ -87,6 +92,7 @@ def suggest_in_window(
     settings: Settings,
     fits: Fits | None = None,
     since: float | None = None,
+    times: Sequence[float] | None = None,
 ) -> Suggestion:
     """Choose td in ``window``, for None in the longest flight up to the margin, and tr for it, not before ``since``.
 
@@ -94,6 +100,7 @@ def suggest_in_window(
     longest rigid window wins.  Where deformations are known, a residual within 0.02 of the smallest is alike; on the
     energy alone, a level within the tolerance of the best one, which is twice the mean energy.  td keeps the margin
     from the contact, unless the whole window lies in it.  Without an acceptable peak the ends of the window are tried.
+    A td of ``times``, by default an even grid, whose pair beats that in both error and rigid time takes its place.
     Where nothing vibrates, any td is as good, and the last one saves the most.
 
     Raises
@@ -111,8 +118,80 @@ def suggest_in_window(
     if look(td).at_rest:
         last = _last_at_rest(situation, inside)
         td = last if last > inside[0] and look(last).at_rest else td
+    elif chosen is not None:
+        td = _unbeaten(td, offered_times(situation, inside, STEPS)[0].tolist() if times is None else times, look)
     found = suggest_at(looking(history, settings, fits, since, quick=False)(td))
     return replace(found, td_window=window, longer=_given_up(longest, found.recommended, inside, look))
+
+
+def offered_times(situation: Situation, window: tuple[float, float], steps: int) -> tuple[Samples, set[float]]:
+    """Grid of td and peaks of the energy, ascending, and which of them are peaks."""
+    grid = np.linspace(*window, steps + 1)[1:]  # nothing can be rigid before the first
+    grid = grid[grid < situation.history.time[-1]]  # a run that ends at td is no use
+    peaks = np.array(situation.peaks(*window))
+    if peaks.size > steps:
+        place = np.searchsorted(grid, peaks)
+        order = np.lexsort((-situation.vibration.whole.energies(peaks), place))
+        highest = order[np.diff(place[order], prepend=-1) > 0]
+        peaks, grid = peaks[highest], np.delete(grid, place[highest])
+    return np.union1d(grid, peaks), set(peaks.tolist())
+
+
+def error_of(situation: Situation, best: Candidate | None) -> float | None:
+    """What pairs at different td are compared by [-]; None without one, or for a level above all vibration energy."""
+    if best is None:
+        return None
+    if situation.at_rest:
+        return 0.0
+    if best.residual is not None:
+        return best.residual
+    mean = mean_in_flight(situation)
+    error = np.inf if mean is None else float(shortfall(np.array(situation.energy_td), mean))
+    return error if error < np.inf else None
+
+
+def as_printed(error: float | None) -> float:
+    """Give an error to the digits that people read; infinite where it is unknown."""
+    return np.inf if error is None else round(error, _READ)
+
+
+def _unbeaten(td: float, times: Iterable[float], look: Look) -> float:
+    """Give ``td``, or the one of ``times`` with the longest rigid time whose pair beats its: no worse, and better.
+
+    Peaks were compared as one of them knows the flight; the energy alone shows another one to each td.
+    """
+    own = next(iter(_acceptable([look(td)])), None)
+    if own is None:
+        return td
+    seen = look if own[0].flight.source == "energy" else own[0].at
+    better = _beating(own, [there for time in times if _may_beat(there := seen(time), own)])
+    for there, _ in sorted(better, key=lambda one: (-one[1].rigid_time, as_printed(error_of(*one)))):
+        if _beating(own, [look(there.td)]):
+            return there.td
+    return td
+
+
+def _may_beat(there: Situation, own: Choice) -> bool:
+    """Whether a pair at another td may be no worse than one, of deformations or of levels as that is, nor shorter."""
+    if (there.basis == "energy") != (own[0].basis == "energy"):
+        return False
+    share, mean = there.kinetic_share, mean_in_flight(there)
+    least = 0.0 if mean is None else float(shortfall(np.array(there.energy_td), mean))
+    return bool(
+        as_printed(least if share is None else sqrt(share)) <= as_printed(error_of(*own))
+        and longest_rigid_times(there, np.array([there.td]))[0] >= own[1].rigid_time
+    )
+
+
+def _beating(own: Choice, situations: Iterable[Situation]) -> list[Choice]:
+    """Give the choices there that are better than one in error or rigid time and worse in neither, as they are read."""
+    error, rigid = as_printed(error_of(*own)), own[1].rigid_time
+    found = ((there, best, as_printed(error_of(there, best))) for there, best in _acceptable(situations))
+    return [
+        (there, best)
+        for there, best, its in found
+        if its <= error and best.rigid_time >= rigid and (its, best.rigid_time) != (error, rigid)
+    ]
 
 
 def looking(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError, if_written, listing
-from d2rpick.choice.comparison import FEWEST, rigid_parts, with_energy
+from d2rpick.choice.comparison import rigid_parts, stretches, with_energy
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import believed
@@ -16,8 +16,6 @@ from d2rpick.histories.history import Given
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-
-    from numpy.typing import NDArray
 
     from d2rpick.choice.of_run import Reference
     from d2rpick.flight.flight import Flight
@@ -222,7 +220,7 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     moves = np.interp(time, balance.time, balance.kinetic) > least
     gone = ((kinetic == 0) & kinetic.any(axis=0)).any(axis=1) & moves
     energies, found = reference.run.part_energies(parts), []
-    for first, last in _stretches(gone):
+    for first, last in stretches(gone):
         start, end = float(time[first]), float(time[last])
         rigid = rigid_parts(reference.run, parts, time, start, end)
         rigid = (kinetic[first : last + 1] == 0).all(axis=0) if rigid is None else rigid
@@ -230,13 +228,6 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
         deform = ~rigid & (np.ptp(energies[first : last + 1], axis=0) > least)
         found.append(_Absent(start, end, listing(names), not deform.any()))
     return tuple(found)
-
-
-def _stretches(states: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last of states that follow each other."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]])))
-    pairs = edges.reshape(-1, 2)
-    return [(int(a), int(b) - 1) for a, b in pairs if b - a >= FEWEST]
 
 
 def _deformable(reference: Reference) -> tuple[Part, ...]:

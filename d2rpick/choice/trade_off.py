@@ -9,13 +9,12 @@ import numpy as np
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.candidates import candidates_of
-from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import bounds, longest_flight
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import check_units, suggest_of
 from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.suggest import suggest_at
-from d2rpick.choice.suggest_td import looking, within_flight
+from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, looking, offered_times, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
 from d2rpick.vibration.span import Fits
 
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.ranking import Quality
     from d2rpick.choice.situation import Settings, Situation
     from d2rpick.choice.suggest import AcceptableWindow, Suggestion
-    from d2rpick.histories.history import Samples
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ def _offer(situation: Situation, found: Candidates, peak: bool) -> Offer:
         energy_td=situation.energy_td,
         kinetic_share=situation.kinetic_share,
         best=best,
-        error=_error(situation, best),
+        error=error_of(situation, best),
         quality=answer.quality,
         windows=answer.windows,
         expected=answer.expected,
@@ -99,23 +97,6 @@ def _offer(situation: Situation, found: Candidates, peak: bool) -> Offer:
     )
 
 
-def _error(situation: Situation, best: Candidate | None) -> float | None:
-    """What offers are compared by; None where nothing is recommended, or the level is above all vibration energy."""
-    if best is None:
-        return None
-    if situation.at_rest:
-        return 0.0
-    if best.residual is not None:
-        return best.residual
-    mean = mean_in_flight(situation)
-    error = np.inf if mean is None else float(shortfall(np.array(situation.energy_td), mean))
-    return error if error < np.inf else None
-
-
-# Decimals of an error that people read.
-_READ: Final = 3
-# td in an even grid: on paper and on a screen a curve of so many points is smooth.
-STEPS: Final = 200
 # Another td is worth a step where it leaves at most this share of the error, and that is more than people pass over.
 _MUCH_LESS: Final = 0.5
 # A step that gives up more of the rigid time than this leads to a pair that nobody asked for.
@@ -181,12 +162,12 @@ def explore_of(
     window = td_window or longest_flight(history, settings, fits, otherwise=None if td is None else record)
     look = looking(history, settings, fits, since)
     known_best, inside = within_flight(look, history, window)
-    suggestion = suggest_of(reference, window, settings, fits=fits, since=since)
+    offered, peaks = offered_times(known_best, inside, steps)
+    times = offered.tolist() if td is None else [*offered.tolist(), td]
+    suggestion = suggest_of(reference, window, settings, fits=fits, since=since, times=times)
     chosen = suggestion.recommended.td if suggestion.recommended else None
-    times, peaks = _times(known_best, inside, steps)
-    named = [time for time in (td, chosen) if time is not None]
     fully = looking(history, settings, fits, since, quick=False)
-    asked_at = map(look, np.unique([*times, *named]).tolist())
+    asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
     situations = [one if one.evidence.span else fully(one.td) for one in asked_at]  # why none is seen is told of each
     offers = [replace(one, recommended=one.td == chosen) for one in _marked([*offers_of(situations, peaks)])]
     asked = next((one for one in offers if one.td == td), None)
@@ -208,18 +189,6 @@ def explore_of(
     )
 
 
-def _times(situation: Situation, window: tuple[float, float], steps: int) -> tuple[Samples, set[float]]:
-    """Grid of td and peaks of the energy, ascending, and which of them are peaks."""
-    grid = np.linspace(*window, steps + 1)[1:]  # nothing can be rigid before the first
-    peaks = np.array(situation.peaks(*window))
-    if peaks.size > steps:
-        place = np.searchsorted(grid, peaks)
-        order = np.lexsort((-situation.vibration.whole.energies(peaks), place))
-        highest = order[np.diff(place[order], prepend=-1) > 0]
-        peaks, grid = peaks[highest], np.delete(grid, place[highest])
-    return np.union1d(grid, peaks), set(peaks.tolist())
-
-
 def _found(offer: Offer) -> bool:
     """Whether there is something to compare: a pair that saves something."""
     return offer.best is not None and offer.error is not None and not offer.best.same_swing
@@ -231,17 +200,12 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
     for known in (True, False):
         group = [one for one in offers if _found(one) and (one.basis != "energy") == known]
         least, longest = np.inf, np.inf
-        for one in sorted(group, key=lambda one: (-(one.rigid_time or 0.0), _printed(one))):
-            error, rigid = _printed(one), one.rigid_time or 0.0
+        for one in sorted(group, key=lambda one: (-(one.rigid_time or 0.0), as_printed(one.error))):
+            error, rigid = as_printed(one.error), one.rigid_time or 0.0
             if error < least or (error, rigid) == (least, longest):  # equal pairs do not beat each other
                 unbeaten.add(one.td)
                 least, longest = error, rigid
     return (replace(one, unbeaten=one.td in unbeaten) for one in offers)
-
-
-def _printed(offer: Offer) -> float:
-    """The error, to the digits that people read."""
-    return np.inf if offer.error is None else round(offer.error, _READ)
 
 
 def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:

@@ -108,7 +108,7 @@ def _judged(
     from d2rpick.api.cards import all_cautions, judged
     from d2rpick.deck.printing import SOLVERS
 
-    asked = ask(run, request, prints=True)
+    asked = ask(run, request, card_alone=True)
     history, wanted = asked.reference.history, cards.request(asked)
     module = SOLVERS[wanted.of(history)[0]]
     if wanted.printing.part and module.switches != "part":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from d2rpick.api.request import LIMITS, READING, check_window, time_or_window
+from d2rpick.api.request import FRACTION, LIMITS, MIN_MEAN_ENERGY, READING, Option, check_window, time_or_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.cli import options
 from d2rpick.cli.options import ANSWER, DECK, DECK_OF_PARTS, HISTORY, ONE_RUN, RESULT, WINDOW
@@ -50,9 +50,9 @@ def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, c
     wanted, card = time_or_window(td, td_window), output.output_format == "card"
     if card and not (request.part or cards.node):
         raise ArgumentError("-f card needs --part, the parts to switch (Radioss: --node, their main nodes)")
-    prints = output.prints(cards, request)
+    output.check(cards)
     with opened(request, output) as (run, output):
-        asked = ask(run, request, prints=prints, merge=cards.merge)
+        asked = ask(run, request, merge=cards.merge)
     answer = suggested(asked, wanted)
     told = [one for one in answer.cautions if one.code != "no-candidate" or output.output_format not in IN_WORDS]
     output.notes(asked.reference.history.notes, told)
@@ -101,9 +101,9 @@ def explore(
     from d2rpick.api.flights import explored
 
     check_window("td_window", td_window)
-    prints = output.prints(cards, request)
+    output.check(cards)
     with opened(request, output) as (run, output):
-        asked = ask(run, request, prints=prints, merge=cards.merge)
+        asked = ask(run, request, merge=cards.merge)
     answer = explored(asked, td, td_window, steps)
     output.notes(asked.reference.history.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
@@ -120,42 +120,40 @@ Examples:
 """
 
 
-class _Verify(options.Command):
-    """Lets ``--switched`` take all file names that follow it, as a shell's glob gives them."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        spread: list[str] = []
-        taking = False
-        for arg in args:
-            option = arg.startswith("-") and arg != "-"
-            if taking and not option and spread[-1] != "--switched":
-                spread.append("--switched")
-            taking = arg == "--switched" if option else taking
-            spread.append(arg)
-        return super().parse_args(ctx, spread)
-
-
-@options.command("verify", VERIFY, _Verify)
-@options.time("--tr", "Switch to rigid at this time.", required=True)
-@options.time("--td", "Switch back to deformable at this time.", required=True)
+@options.command("verify", VERIFY)
+@options.time("--tr", "Switch to rigid at this time.  [with --switched: read off that run]")
+@options.time("--td", "Switch back to deformable at this time.  [with --switched: read off that run]")
 @options.files(
-    "--switched", "Compare a finished switched run with the reference; takes all names up to the next option.", "FILE"
+    "--switched", "Compare a finished switched run with the reference: file, folder or glob; repeatable.", "FILE"
+)
+@options.option(
+    "min_mean_energy",
+    Option("Mean energy after td over the reference's, at least; it may be as far above 1 as below.", FRACTION, "E"),
+    default=MIN_MEAN_ENERGY,
 )
 @options.takes(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=FORMATS["verdict"])
-def verify(tr: float, td: float, switched: tuple[str, ...], request: Request, cards: Cards, output: Output) -> None:
+def verify(
+    tr: float | None,
+    td: float | None,
+    switched: tuple[str, ...],
+    min_mean_energy: float,
+    request: Request,
+    cards: Cards,
+    output: Output,
+) -> None:
     """Judge one pair of switch times against the HISTORY of a run without switching."""
     from d2rpick.api.asked import ask, open_run
     from d2rpick.api.choices import judged
 
-    prints = output.prints(cards, request)
+    output.check(cards)
     with opened(request, output) as (run, output):
-        asked = ask(run, request, prints=prints, merge=cards.merge)
+        asked = ask(run, request, merge=cards.merge)
     other = None
     if switched:
         with reading(switched, quiet=output.quiet):
             other = open_run(request, switched)
         output.spare(other.sources)
-    answer = judged(asked, tr, td, other)
+    answer = judged(asked, tr, td, other, min_mean_energy)
     output.notes(asked.reference.history.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
     output.answer(answer)

@@ -39,7 +39,19 @@ _PRINTED: Final = (".pdf", ".doc", ".docx")
 
 
 # Arguments that messages name in backticks, and which options set them where these have other names.
-ARGUMENTS: Final = (*OPTIONS, "td", "td_window", "tr", "min_rigid", "overwrite", "write_as", "done", "before", "wait")
+ARGUMENTS: Final = (
+    *OPTIONS,
+    "td",
+    "td_window",
+    "tr",
+    "min_rigid",
+    "overwrite",
+    "write_as",
+    "done",
+    "before",
+    "wait",
+    "min_mean_energy",
+)
 _OTHERS: Final = {"parts": "part", "channels": "channel", "replay": "no_verify"}
 _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 IN_WORDS: Final = {"table", "markdown"}  # forms in which the answer says itself why nothing is recommended
@@ -86,16 +98,10 @@ class Output:
             tell(f"note: {self.file} gets the table; -f {form} writes what its name promises")
         return output
 
-    def prints(self, cards: Cards, request: Request, *, by_itself: bool = False) -> bool:
-        """Whether a card is asked for, ``by_itself`` or in a page; ArgumentError where options do not fit that."""
-        prints = by_itself or self.output_format == "card" or self.report is not None
-        if not prints:
-            request.selection()
-            if cards.given:
-                raise ArgumentError(
-                    f"--{dashed(cards.given[0])} is about the card; ask for one with -f card or --report"
-                )
-        return prints
+    def check(self, cards: Cards, *, by_itself: bool = False) -> None:
+        """Refuse options of a card where none is asked for, ``by_itself`` or in a page."""
+        if cards.given and not (by_itself or self.output_format == "card" or self.report is not None):
+            raise ArgumentError(f"--{dashed(cards.given[0])} is about the card; ask for one with -f card or --report")
 
     def shown(self, **more: Any) -> Shown:
         """Give what a form may show beside the answer."""

@@ -84,9 +84,9 @@ def plan(
         raise click.UsageError("--all belongs to -f value, -f card and --write-deck; other forms hold every window")
     _check_deck(request, cards, form, write_deck)
     cards = _by_deck(cards, request.deck) if form == "card" or write_deck else cards
-    prints = output.prints(cards, request, by_itself=bool(write_deck))
+    output.check(cards, by_itself=bool(write_deck))
     with opened(request, output, done, *before) as (run, output):
-        asked = ask(run, request, prints=prints, merge=cards.merge)
+        asked = ask(run, request, merge=cards.merge)
         if write_deck:
             _check_model(asked)
         cards, added = cards.for_bodies(asked) if form == "card" or write_deck else (cards, ())

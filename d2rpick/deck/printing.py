@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -26,7 +27,7 @@ from d2rpick.deck.printed_card import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.deck.printed_card import Printing, Times
 
@@ -39,10 +40,14 @@ _OF_LS_DYNA = (
     "  (NRBF, NCSF, RWF 0); where they are, delete them (1) and activate again (2).",
     "Springs and dampers are not switched.",
 )
-_UNCAPPED = (
-    "DTMAX is 0: with nothing deformable left the time step may grow without",
-    "  limit and the second switch come late; set d2rpick card --step-cap.",
-)
+_CAPPED = "DTMAX: with nothing deformable left the time step would grow without limit."
+# Parts that are listed one by one; of more a set is printed, here with its number.
+_MOST_LISTED: Final = 10
+PartSets = Mapping[tuple[int, ...], int]
+_NO_SETS: Final[PartSets] = {}
+# Of the rigid window, per step: the release is at most a thousandth of it late.  Each window has its own, so that
+# further windows leave the run up to them as it was.
+_CAP_SHARE = 1000
 _UNMERGED = ("Merge parts that share nodes (d2rpick card --merge), never loose ones.",)
 
 
@@ -65,31 +70,68 @@ def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
     spans = ", ".join(f"{tr} to {td}" for tr, td in texts)
     lines = [*comments([f"Rigid from {spans}; written by d2rpick {__version__}"]), *told]
     lines = [f"$ {line}" for line in lines]
+    part_sets = _part_sets((ids, *_groups(ids, printing).values()), printing.swset[0])
+    for members, number in part_sets.items():
+        lines += _part_set(members, number)
     for pair, numbers in zip(texts, sets, strict=True):
-        lines += _window(pair, numbers, ids, printing)
+        lines += _window(pair, numbers, ids, printing, part_sets)
     text = "\n".join(lines) + "\n"
     return PrintedCard(text, tuple((float(tr), float(td)) for tr, td in texts), {_FILE: text}, notes)
 
 
-def _window(texts: tuple[str, str], sets: tuple[int, int], ids: Sequence[int], printing: Printing) -> Iterator[str]:
-    yield from header(sets[0], texts[0], shortest(printing.step_cap or 0.0), (len(ids), 0))
-    yield from to_rigid(ids, printing)
-    yield from header(sets[1], texts[1], "0.0", (0, len(ids)))
-    yield from to_deformable(ids)
+def _window(
+    texts: tuple[str, str], sets: tuple[int, int], ids: Sequence[int], printing: Printing, part_sets: PartSets
+) -> Iterator[str]:
+    rigid, free = [*to_rigid(ids, printing, part_sets)], [*to_deformable(ids, part_sets)]  # with a comment each
+    cap = printing.step_cap or _step_cap(*map(float, texts))
+    yield from (*header(sets[0], texts[0], shortest(cap), (len(rigid) - 1, 0)), *rigid)
+    yield from (*header(sets[1], texts[1], "0.0", (0, len(free) - 1)), *free)
 
 
-def to_rigid(ids: Sequence[int], printing: Printing) -> Iterator[str]:
-    """Write the parts that become rigid, those that lead first."""
-    leads = _leads(ids, printing)
+def to_rigid(ids: Sequence[int], printing: Printing, part_sets: PartSets = _NO_SETS) -> Iterator[str]:
+    """Write the parts that become rigid, those that lead first, or the sets that they make up."""
     yield "$#     pid       lrb     ptype"
-    for part in sorted(ids, key=lambda part: part in leads):
-        yield f"{part:10d}{leads.get(part, 0):10d}      PART"
+    for lead, some in _groups(ids, printing).items():
+        yield from (f"{name:10d}{lead:10d}{kind:>10}" for name, kind in _named(some, part_sets))
 
 
-def to_deformable(ids: Sequence[int]) -> Iterator[str]:
-    """Write the parts that become deformable."""
+def to_deformable(ids: Sequence[int], part_sets: PartSets = _NO_SETS) -> Iterator[str]:
+    """Write the parts that become deformable, or their set."""
     yield "$#     pid     ptype"
-    yield from (f"{part:10d}      PART" for part in ids)
+    yield from (f"{name:10d}{kind:>10}" for name, kind in _named(ids, part_sets))
+
+
+def _step_cap(tr: float, td: float) -> float:
+    """Largest step while rigid [time]."""
+    return float(f"{(td - tr) / _CAP_SHARE:.2g}")
+
+
+def _named(parts: Sequence[int], part_sets: PartSets) -> list[tuple[int, str]]:
+    """Name parts with their kind: by their set where there is one."""
+    number = part_sets.get(tuple(sorted(parts)))
+    return [(part, "PART") for part in parts] if number is None else [(number, "PSET")]
+
+
+def _part_sets(groups: Iterable[Sequence[int]], first: int) -> dict[tuple[int, ...], int]:
+    """Number a set for each of the groups that are too many to be listed."""
+    many = dict.fromkeys(tuple(sorted(group)) for group in groups if len(group) > _MOST_LISTED)
+    return {group: first + place for place, group in enumerate(many)}
+
+
+def _part_set(parts: Sequence[int], number: int) -> Iterator[str]:
+    yield f"$ Part set {number}: give it another id where the deck has one of that."
+    yield from ("*SET_PART_LIST", "$#     sid", f"{number:10d}")
+    yield "$#    pid1      pid2      pid3      pid4      pid5      pid6      pid7      pid8"
+    yield from ("".join(f"{part:10d}" for part in parts[i : i + 8]) for i in range(0, len(parts), 8))
+
+
+def _groups(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
+    """Give the parts by their lead, those without one first, under 0."""
+    leads = _leads(ids, printing)
+    found: dict[int, list[int]] = {}
+    for part in sorted(ids, key=lambda part: part in leads):
+        found.setdefault(leads.get(part, 0), []).append(part)
+    return found
 
 
 def _leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
@@ -152,8 +194,7 @@ def _roundings(asked: Times, texts: tuple[str, str]) -> Iterator[str]:
 
 def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
     yield from (*PHYSICS, *_OF_LS_DYNA)
-    if not printing.step_cap:
-        yield from _UNCAPPED
+    yield _CAPPED
     if printing.merge is None and printing.bodies:
         yield from (
             f"{len(body)} parts are one rigid body by the deck, led by part {body[0]} (LRB)."
@@ -168,9 +209,6 @@ def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
 
 _RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
 _NODES_PER_LINE = 10
-# Of the rigid window, per step: the release is at most a thousandth of it late.  Each window has its own, so that
-# further windows leave the run up to them as it was.
-_CAP_SHARE = 1000
 _MOST_LEGS = 99  # the solver numbers them with two digits where it matters, in the names of time histories
 _OF_RADIOSS = (
     "Ids are main nodes of /RBODY, not bodies; an unknown one is skipped silently.",
@@ -266,7 +304,7 @@ def _told(
 
 def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[EngineFile]:
     """Give the engine runs that the windows ask for; a window from 0 on needs none before it."""
-    caps = [step_cap or float(f"{(td - tr) / _CAP_SHARE:.2g}") for tr, td in windows]
+    caps = [step_cap or _step_cap(tr, td) for tr, td in windows]
     switches = zip(windows, caps, strict=True)
     stops = [(time, cap) for (tr, td), own in switches for time, cap in ((tr, None), (td, own)) if time > 0]
     if len(stops) >= _MOST_LEGS:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.of_run import Reference, read
+from d2rpick.choice.of_run import Reference, read, suggest_of
 from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest import suggest, suggest_at
@@ -20,6 +20,7 @@ from d2rpick.histories.names import Selection
 from d2rpick.histories.run import Run
 from d2rpick.vibration.span import Fits
 from tests.command import ROOT
+from tests.energies import sure
 
 SAMPLES = {
     "energy.csv": Selection(),
@@ -138,3 +139,33 @@ def test_the_basis_is_that_of_the_recommended_pair() -> None:
     refused = [of.situation.vibration.unknown for of in (found, found.suggestion)]
     assert refused[0] == refused[1]
     assert refused[0]
+
+
+@pytest.mark.parametrize("steps", [200, 37])
+@pytest.mark.parametrize(
+    ("file", "selection", "window"),
+    [
+        ("rollover.csv", Selection(energy=("boxIE_J",)), None),
+        ("rollover.csv", Selection(energy=("boxIE_J",)), (0.2, 0.38)),
+        ("rollover_box.matsum", Selection(parts=("box",)), None),
+        ("energy.csv", Selection(), (0.06, 0.07)),
+    ],
+)
+def test_no_offer_beats_the_one_that_is_recommended(
+    file: str, selection: Selection, window: tuple[float, float] | None, steps: int
+) -> None:
+    found = explore_of(read([f"sample_data/{file}"], selection), Settings(), window, steps=steps)
+    assert found.recommended is not None
+    assert found.recommended.unbeaten
+    if steps == 200 and file == "rollover.csv":
+        alone = suggest_of(read([f"sample_data/{file}"], selection), window, Settings())
+        assert (found.recommended.tr, found.recommended.td) == sure(alone.recommended)[:2]
+
+
+def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
+    """Plastic energy with a vibration of a ten-thousandth: about half of it is kinetic, whichever side of it td is."""
+    time = np.linspace(0, 1, 2001)
+    energy = 1000 + 0.05 * np.sin(400 * time) * np.sin(731 * time)
+    found = explore_of(reference(History(time, energy, ("made",), "made", "E")), Settings(after=0.1, replay=False))
+    grades = {one.quality.grade for one in found.offers if one.quality and one.best and not one.best.same_swing}
+    assert grades == {"fair"}

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 from click.testing import Result
 
+from d2rpick.report.formats import FORMATS
 from d2rpick.rules import RULES
 from tests import paper
-from tests.command import BOX, ENERGY, answer, run
+from tests.command import BOX, ENERGY, GLSTAT, answer, run
 
 GOOD = ("--tr", "0.0135867", "--td", "0.0687534")
 OPPOSITE = ("--tr", "0.0122659", "--td", "0.064")
@@ -204,14 +205,29 @@ def test_the_card_is_that_of_the_solver_that_wrote_the_history() -> None:
     assert "/RBODY/ON" in run(*card).stdout
 
 
-def test_a_table_takes_the_parts_of_the_card() -> None:
-    args = ("suggest", "--td", "0.0687534", ENERGY, "--part", "11,12")
-    assert [part for part, _, _ in pasted(run(*args, "-f", "card", "--merge", "11"))] == [11, 12]
-    assert run(*args).exit_code == 2
-    assert run(*args, "-q", "--report", "page.html", "--step-cap", "1e-5").exit_code == 0
-    page = Path("page.html").read_text()
-    assert "*DEFORMABLE_TO_RIGID_AUTOMATIC" in page
-    assert "1.0e-5" in page
+@pytest.mark.parametrize("form", [*FORMATS["suggestion"], "card"])
+def test_parts_that_the_history_does_not_have_are_refused_in_every_form(form: str) -> None:
+    for history in (GLSTAT, ENERGY):
+        refused = [run("suggest", "--td", "0.064", "--part", "11", history, "-f", one) for one in ("table", form)]
+        assert [(result.exit_code, result.stdout) for result in refused] == [(2, "")] * 2
+        assert refused[0].stderr == refused[1].stderr
+    page = run("suggest", "--td", "0.064", "--part", "11", ENERGY, "--report", "page.html")
+    assert (page.exit_code, Path("page.html").exists()) == (2, False)
+
+
+def test_a_card_says_whose_level_it_is_and_names_many_parts_by_sets() -> None:
+    asked = ("card", *GOOD, "--part", "101-130", "--history", ENERGY, "-o")
+    assert run(*asked, "alone.k").exit_code == run(*asked, "merged.k", "--merge", "101").exit_code == 0
+    assert "level is that of the whole model" in comments(Path("alone.k").read_text())
+    assert "whole model" not in comments(run("card", *GOOD, "--part", "1").stdout)
+    for card in ("alone.k", "merged.k"):
+        assert Path(card).read_text().count("PSET") == 2
+        (window,) = answer("check", card)["windows"]
+        assert sorted(window["parts"]) == [*range(101, 131)]
+    assert "       902       101      PSET" in Path("merged.k").read_text()
+
+
+def test_options_of_a_card_belong_to_a_card() -> None:
     assert "is about the card" in run("suggest", "--td", "0.0687534", ENERGY, "--merge", "11").stderr
 
 

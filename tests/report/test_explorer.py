@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from d2rpick.choice.trade_off import STEPS
+from d2rpick.choice.suggest_td import STEPS
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report.html import resource
 from d2rpick.report.tables import measure, short
