@@ -164,21 +164,22 @@ def _unbeaten(td: float, times: Iterable[float], look: Look) -> float:
     if own is None:
         return td
     seen = look if own[0].flight.source == "energy" else own[0].at
-    better = _beating(own, [there for time in times if _may_beat(there := seen(time), own)])
+    error = as_printed(error_of(*own))
+    better = _beating(own, [there for time in times if _may_beat(there := seen(time), own, error)])
     for there, _ in sorted(better, key=lambda one: (-one[1].rigid_time, as_printed(error_of(*one)))):
         if _beating(own, [look(there.td)]):
             return there.td
     return td
 
 
-def _may_beat(there: Situation, own: Choice) -> bool:
-    """Whether a pair at another td may be no worse than one, of deformations or of levels as that is, nor shorter."""
+def _may_beat(there: Situation, own: Choice, error: float) -> bool:
+    """Whether a pair there may be no worse than one with that ``error``, of deformations or levels too, nor shorter."""
     if (there.basis == "energy") != (own[0].basis == "energy"):
         return False
     share, mean = there.kinetic_share, mean_in_flight(there)
     least = 0.0 if mean is None else float(shortfall(np.array(there.energy_td), mean))
     return bool(
-        as_printed(least if share is None else sqrt(share)) <= as_printed(error_of(*own))
+        as_printed(least if share is None else sqrt(share)) <= error
         and longest_rigid_times(there, np.array([there.td]))[0] >= own[1].rigid_time
     )
 

@@ -8,6 +8,7 @@ from d2rpick.base.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe, one_of, row
 from d2rpick.report.situation import what_was_read
+from d2rpick.report.suggestion import given_up
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -134,7 +135,12 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     lines = []
     if plan.run_time_share is not None:
         lines.append(("run time", f"about {plan.run_time_share:.0%} of the reference's"))
-    lines += [(f"flight {row.number}", given_up(row)) for row in supported if row.answer and row.answer.longer]
+    found = [(row.number, row.answer) for row in supported if row.answer]
+    lines += [
+        (f"flight {number}", given_up(one.longer, one.recommended))
+        for number, one in found
+        if one.longer and one.recommended
+    ]
     graded = [(f"flight {row.number}", row.quality) for row in supported if row.quality]
     lines += [(name, quality.told) for name, quality in graded if quality.grade == "poor"]
     if any(row.candidate and row.candidate.position_error_assumes for row in plan.rows):
@@ -145,16 +151,6 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
         after = ", and plan the others from that run (--done)" if waiting else ""
         lines.append(("next", f"run from the start {what}{after}"))
     return lines
-
-
-def given_up(row: Planned) -> str:
-    """How much rigid time of a window was given up for quality."""
-    from d2rpick.report.suggestion import given_up as told
-
-    assert row.answer is not None
-    assert row.answer.longer is not None
-    assert row.answer.recommended is not None
-    return told(row.answer.longer, row.answer.recommended)
 
 
 def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
