@@ -38,7 +38,8 @@ def info(request: Request, output: Output) -> None:
         overview = survey(run.files, selection, request.deck)
     output.notes((), overview.cautions)
     form = output.output_format
-    output.result(in_words(write("overview", form, overview, output.shown()), form))
+    shown = output.shown()
+    output.result(in_words(write("overview", form, overview, shown), form, shown.width))
 
 
 EXTRACT: Final = """\b

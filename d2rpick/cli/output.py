@@ -114,11 +114,8 @@ class Output:
 
     def answer(self, answer: Answer, below: str = "", **shown: Any) -> None:
         """Give out an answer in the form that is asked for."""
-        text = in_words(answer.text(self.output_format, now := self.shown(**shown)), self.output_format)
-        if self.output_format == "table":
-            from d2rpick.report.tables import wrapped  # not above: --help does without it
-
-            text = wrapped(text, now.width)
+        now = self.shown(**shown)
+        text = in_words(answer.text(self.output_format, now), self.output_format, now.width)
         self.result(f"{text}\n\n{below}" if below else text)
 
     def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
@@ -291,15 +288,22 @@ def option_of(argument: str) -> str:
     return f"--{dashed(name)}" if name in ARGUMENTS else ""
 
 
-def in_words(text: str, form: str) -> str:
-    """Name the options in a result that people read; other programs get the arguments.
+def in_words(text: str, form: str, width: int = 0) -> str:
+    """Name the options in a result that people read, with lines of ``width`` columns; other programs get the arguments.
 
     Examples
     --------
     >>> in_words("choose with `energy`", "table"), in_words("choose with `energy`", "json")
     ('choose with --energy', 'choose with `energy`')
     """
-    return text if form in _FOR_PROGRAMS else with_options(text)
+    if form in _FOR_PROGRAMS:
+        return text
+    text = with_options(text)
+    if form != "table" or not width:
+        return text
+    from d2rpick.report.tables import wrapped  # not above: --help does without it
+
+    return wrapped(text, width)
 
 
 _PERIOD: Final = 1.0  # [s] before the first line, and between two
