@@ -87,7 +87,7 @@ def test_the_times_are_read_off_the_switched_run() -> None:
     never = run("verify", "--part", "box", "--switched", BOX, BOX)
     assert never.exit_code == 2
     assert "its energy stands still nowhere; give --tr and --td" in never.stderr
-    assert "--td is missing" in run("verify", "--tr", "0.1", "--part", "box", BOX).stderr
+    assert "give the time of the switch as --td" in run("verify", "--tr", "0.1", "--part", "box", BOX).stderr
 
 
 def test_the_table_sets_the_switched_run_beside_the_reference() -> None:

@@ -126,7 +126,7 @@ CARD = """\
 $#   swset      code     time1     time2     time3     entno     relsw    paired
        901         0      0.02       0.0       0.0         0         0         0
 $#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset
-         0         0         0       0.0         2         0       0.0
+         0         0         0    7.0e-5         2         0       0.0
 $#     pid       lrb     ptype
         11         0      PART
         12        11      PART
