@@ -127,14 +127,14 @@ def suggest_in_window(
 def offered_times(situation: Situation, window: tuple[float, float], steps: int) -> tuple[Samples, set[float]]:
     """Grid of td and peaks of the energy, ascending, and which of them are peaks."""
     grid = np.linspace(*window, steps + 1)[1:]  # nothing can be rigid before the first
-    grid = grid[grid < situation.history.time[-1]]  # a run that ends at td is no use
     peaks = np.array(situation.peaks(*window))
     if peaks.size > steps:
         place = np.searchsorted(grid, peaks)
         order = np.lexsort((-situation.vibration.whole.energies(peaks), place))
         highest = order[np.diff(place[order], prepend=-1) > 0]
         peaks, grid = peaks[highest], np.delete(grid, place[highest])
-    return np.union1d(grid, peaks), set(peaks.tolist())
+    times = np.union1d(grid, peaks)
+    return times[times < situation.history.time[-1]], set(peaks.tolist())  # a run that ends at td is no use
 
 
 def error_of(situation: Situation, best: Candidate | None) -> float | None:

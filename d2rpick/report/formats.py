@@ -51,7 +51,7 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
     "plan": {**PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
     "trade_off": {
         **PLAIN,
-        "markdown": lambda report, answer, shown: report.as_markdown(answer, shown.limit),
+        "markdown": lambda report, answer, shown: report.as_markdown(answer, shown),
     },
     "parts": {**PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
     "calibration": {**PLAIN, "toml": lambda report, answer, _: report.as_toml(answer)},

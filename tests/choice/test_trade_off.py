@@ -137,8 +137,7 @@ def test_the_basis_is_that_of_the_recommended_pair() -> None:
     reference = read(["sample_data/rollover_box.matsum"], Selection(parts=("box",)))
     found = explore_of(reference, Settings(), steps=20)
     refused = [of.situation.vibration.unknown for of in (found, found.suggestion)]
-    assert refused[0] == refused[1]
-    assert refused[0]
+    assert all("deviates systematically" in sure(why) for why in refused)
 
 
 @pytest.mark.parametrize("steps", [200, 37])
