@@ -11,6 +11,7 @@ from d2rpick.report.html import document, drawings, pairs, remarks, section, tab
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from d2rpick.report.formats import Shown
     from d2rpick.report.html import Markup
     from d2rpick.running.drive import Driven
 
@@ -37,9 +38,12 @@ DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in
 _NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps of the vibration is an expectation"
 
 
-def as_table(found: Driven) -> str:
+def as_table(found: Driven, shown: Shown) -> str:
     """The windows, what the legs took, and what was saved."""
-    parts = [tables.as_text(*_windows(found)) if found.windows else "no window", tables.as_text(*_legs(found))]
+    parts = [
+        tables.as_text(*_windows(found), shown.width) if found.windows else "no window",
+        tables.as_text(*_legs(found), shown.width),
+    ]
     return "\n\n".join([*parts, "\n".join(tables.in_line(_outlook(found), 9))])
 
 

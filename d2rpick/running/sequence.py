@@ -149,8 +149,6 @@ def _after_search(legs: Sequence[Leg], limits: Limits) -> Order | None:
     last, seen = legs[-1], legs[-1].seen
     if last.cut or last.seen.contact is not None or seen.peak is None:
         return _following(last, LOAD, limits.end) if seen.time < limits.end - limits.same else None
-    if not (last.whole(limits) or _passed(last.order, seen, limits)):
-        return last.order
     if seen.peak <= last.order.start + limits.same:
         return last.order._replace(kind=PROBE, until=limits.end)
     if seen.peak >= seen.time - limits.same:

@@ -79,6 +79,9 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(tmp_path: Path) -> No
     restarts = {int(path.name[6:10]) for path in (tmp_path / "run").glob("*.rst")}
     assert max(restarts) - min(restarts) <= 2
     assert not list((tmp_path / "run").glob("*.ctl"))
+    shown = run(*asked(tmp_path, "--resume", "-q", "-f", "table")).stdout
+    assert "switched" in shown
+    assert "no level at td is matched" in shown
     again = run(*asked(tmp_path))
     assert again.exit_code == 2
     assert "--resume" in again.stderr
