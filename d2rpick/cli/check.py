@@ -37,10 +37,12 @@ Examples:
 @click.argument("deck", metavar="DECK...", nargs=-1, required=True, type=click_type("file"))
 @options.takes(*REFERENCE)
 @click.option(
-    "--select", metavar="IDS", multiple=True,
+    "--select", metavar="IDS", multiple=True, type=click_type("rules"),
     help="Check only these rules, by id or its beginning: D2R101,D2R2.  [default: by d2rpick.toml or pyproject.toml]",
 )  # fmt: skip
-@click.option("--ignore", metavar="IDS", multiple=True, help="Skip these rules; overrules --select.")
+@click.option(
+    "--ignore", metavar="IDS", multiple=True, type=click_type("rules"), help="Skip these rules; overrules --select."
+)
 @click.option(
     "--fail-on", type=click.Choice(["error", "warning"]), default="error", show_default=True,
     help="Least severe finding that sets exit code 1.",
@@ -168,7 +170,7 @@ Examples:
 
 
 @options.command("rule", RULE)
-@click.argument("id", metavar="[ID]...", nargs=-1)
+@click.argument("id", metavar="[ID]...", nargs=-1, type=click_type("rules"))
 @options.takes(*FILES)
 def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name is that of the argument in usage
     """Explain a rule of `d2rpick check`, with decks that pass and fail; without ID, list all rules."""

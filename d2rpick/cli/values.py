@@ -91,6 +91,16 @@ class PartNames(Names):
         return _completed(offered, incomplete)
 
 
+class RuleIds(click.types.StringParamType):
+    """Ids of the rules of check."""
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        """Offer the rules that begin so, with what they say."""
+        from d2rpick.rules import RULES
+
+        return _completed([(rule.id, rule.summary) for rule in RULES.values()], incomplete.upper())
+
+
 class ChannelNames(Names):
     """Names of channels, for the shell to complete from the history that was typed before."""
 
@@ -158,6 +168,7 @@ _NAMED: Final = {
     "parts": PartNames(),
     "channels": ChannelNames(),
     "solver": SolverName(),
+    "rules": RuleIds(),
 }
 
 

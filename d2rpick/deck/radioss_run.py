@@ -36,7 +36,7 @@ LEFT_RIGID: Final = "body-left-rigid"
 RUINS: Final = {
     THROUGH_WALL: "the deck lets rigid bodies go through a wall (D2R406)",
     AT_REST: "the deck lets rigid bodies begin at rest (D2R407)",
-    LEFT_RIGID: "the deck keeps parts rigid that deform (D2R408)",
+    LEFT_RIGID: "the deck keeps parts rigid that deform (D2R409)",
 }
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 # Gravity on earth in m, inches and feet per second squared; in other units of length and time a power of ten of these.
 # Decks have what stands below it; a load that is so close to one of them by chance is one in two hundred.
-_GRAVITY, _ALIKE = (9.80665, 3.86089, 3.21740), 0.002
+_GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
 # Digits that hide so much of the momentum leave so many times that open in its change: damping is fitted, too.
 _REACH_OF_DIGITS = 10.0
@@ -49,6 +49,8 @@ _ENOUGH = 3e-3
 _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
 # There, what acts beside gravity falls to this share from the first third to the last, and to that of the weight.
 _FADED, _LITTLE = 0.6, 0.02
+# What moves straight has so little momentum across its way.
+_STRAIGHT = 0.01
 # A change of momentum that no gravity explains is none up to so many times what a window leaves open.
 _UNSEEN = 2.0
 # What the work of gravity leaves open of the energies: samples are far apart, and a solver adds up by steps.
@@ -149,6 +151,8 @@ class Laws:
                 enough = self._enough if across else TOLERANCE
                 window = self._lasting(law, td, enough)
                 window = window if window and (across or self._fades_out(window, weight)) else None
+            if window and self._slowed(window, weight):
+                return None, None
             found.append((window, float(np.linalg.norm(weight)) / self.mass))
         windows = [(one, gravity) for one, gravity in found if one]
         return max(windows, key=lambda one: float(np.ptp(time[[*one[0]]])), default=(None, None))
@@ -207,13 +211,29 @@ class Laws:
         if force * (end - start) <= _UNSEEN * (TOLERANCE * self.extent + self.noise):
             return None if self._carried else 0.0
         if self._is_gravity(force / mass, _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start))):
-            return force / mass
+            return None if self._slowed(window, vector) else force / mass
         found = None
         if self.balance is not None:
             found = acceleration_by_work(self.balance, self.fit.time, self.fit.momentum @ (vector / force), start, end)
         if found is None:
             return float("nan") if self._may_fall and (self.velocity or np.isnan(mass)) else None
         return found if self._is_gravity(found) or (self._may_fall and self.velocity and found > 0) else None
+
+    def _slowed(self, window: tuple[int, int], force: Samples) -> bool:
+        """Whether a constant force (3,) is rather friction than gravity: all it does is to slow down.
+
+        Its size may be that of gravity by chance, or since the coefficient of friction is a tenth.  So it is along an
+        axis, and of a straight motion its acceleration is that of gravity in m, mm, s or ms.
+        """
+        size = float(np.linalg.norm(force))
+        along, momentum = force / size, self.fit.momentum[[*window]]
+        forward = momentum @ along
+        if self.gravities is not None or (forward >= 0).any():
+            return False
+        across = float(np.linalg.norm(momentum - np.outer(forward, along), axis=1).max())
+        straight = across <= _STRAIGHT * float(np.abs(forward).max())
+        usual = is_gravity(size / self.mass, _ROUGHLY, decades=3)
+        return float(np.abs(along).max()) < _ALONG_AXIS or (straight and not usual)
 
     @property
     def _may_fall(self) -> bool:
@@ -248,8 +268,10 @@ def _gravities_near(acceleration: float, known: tuple[float, ...] | None) -> Ite
             yield gravity
 
 
-def is_gravity(acceleration: float, error: float = _ALIKE) -> bool:
+def is_gravity(acceleration: float, error: float = _ALIKE, decades: int = 1) -> bool:
     """Whether an acceleration [length/time^2], known with a relative error, is gravity on earth in consistent units.
+
+    Units of length and time make it larger or smaller by so many ``decades`` at a time.
 
     Examples
     --------
@@ -259,7 +281,7 @@ def is_gravity(acceleration: float, error: float = _ALIKE) -> bool:
     if not acceleration > 0:
         return False
     powers = np.log10(acceleration / np.array(_GRAVITY))
-    return bool(np.abs(powers - np.round(powers)).min() <= np.log10(1 + error))
+    return bool(np.abs(powers - decades * np.round(powers / decades)).min() <= np.log10(1 + error))
 
 
 def acceleration_by_work(balance: Balance, time: Samples, momentum: Samples, start: float, end: float) -> float | None:

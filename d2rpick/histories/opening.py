@@ -30,6 +30,18 @@ _HEAD = 8192
 _DEFAULT = Selection()
 # A keyword of LS-DYNA at the start of a line, or the first line of a Radioss deck; compiled where it is needed.
 _DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN"
+# What is often given instead of a history: how it begins, what it is, and the way out.
+_OTHERS: Final = (
+    (
+        rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])",
+        "an Excel workbook",
+        "save the sheet as csv, with a line of headings",
+    ),
+    (rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook", "save the sheet as csv, with a line of headings"),
+    (rb"PK\x03\x04", "a zip archive", "unpack it and name the history in it"),
+    (rb"7z\xbc\xaf|BZh[1-9]1AY|\xfd7zXZ", "a packed file", "unpack it first: only gzip is read as it is"),
+    (rb"PAR1", "a parquet file", "write it as csv: pandas.read_parquet(...).to_csv(...)"),
+)
 
 
 class Reader(Protocol):
@@ -133,9 +145,15 @@ def _format(source: Source) -> str:
             f"{source.name}: this is a deck, an energy history was expected; name the glstat, matsum, binout or T01 of "
             "its run"
         )
+    for begins, what, way_out in _OTHERS:
+        if re.match(begins, head, re.DOTALL):
+            raise FormatError(f"{source.name}: this is {what}, an energy history was expected; {way_out}")
     for kind, listed in READERS.items():
         if any(hint in head for hint in listed.hints) and reader(kind).recognises(head):
             return kind
+    if re.search(r"(^|[/\\])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
+        what = "this is a file of LS-DYNA's d3 family, which holds no energies that are read"
+        raise FormatError(f"{source.name}: {what}; name the glstat, matsum or binout of the run")
     raise FormatError(
         f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected; "
         "export the energy history as text"

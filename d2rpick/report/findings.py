@@ -16,7 +16,7 @@ from d2rpick.base.version import __version__
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.source import STDIN
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import Document, Field, kind_of, many, one_of, row
+from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
 from d2rpick.rules import RULES, Example, Severity
 
 if TYPE_CHECKING:
@@ -83,13 +83,23 @@ def as_table(checks: Checks) -> str:
         lines += [
             f"  {_shown(f.file, root)}:{f.line}:{f.column}: {f.severity} {f.rule} {f.message}" for f in result.findings
         ]
-    left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
-    return "\n".join([*map(printable, lines), "", _summary_line(checks.results) + left_out])
+    return "\n".join([*map(printable, lines), "", _last_line(checks)])
 
 
 def as_ndjson(checks: Checks, command: Sequence[str]) -> str:
     """Give a line for each deck, by the same schema as the JSON of all."""
     return "\n".join(DOCUMENT.as_line(replace(checks, results=[result]), command) for result in checks.results)
+
+
+def as_csv(checks: Checks) -> str:
+    """A row per finding, a column for each key of ``findings`` in the JSON output."""
+    return csv_of(FINDING.keys, map(FINDING.plain, _findings(checks)))
+
+
+def as_markdown(checks: Checks) -> str:
+    """The findings as a Markdown table, and how many there are."""
+    found = [list(FINDING.plain(one).values()) for one in _findings(checks)]
+    return "\n\n".join([*([tables.as_markdown(FINDING.keys, found)] if found else []), _last_line(checks)])
 
 
 def as_github(checks: Checks) -> str:
@@ -254,10 +264,14 @@ def _counts(results: Sequence[Checked]) -> dict[str, int]:
     return {f"{severity}s": counted[severity] for severity in Severity}
 
 
-def _summary_line(results: Sequence[Checked]) -> str:
+def _last_line(checks: Checks) -> str:
+    """How many findings and decks there are, and what was not judged."""
+    results = checks.results
     found = [f"{count} {name if count != 1 else name[:-1]}" for name, count in _counts(results).items()]
     decks = "1 deck" if len(results) == 1 else f"{len(results)} decks"
-    return f"{', '.join(found)} in {decks}"
+    left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
+    unjudged = checks.history is None and any(result.windows for result in results)
+    return f"{', '.join(found)} in {decks}{left_out}{'; times not judged: no `history`' * unjudged}"
 
 
 def _shown(path: str, root: Path) -> str:

@@ -39,19 +39,23 @@ PLAIN: Final[Mapping[str, Writer]] = {
     "csv": lambda report, answer, _: report.as_csv(answer),
     "markdown": lambda report, answer, _: report.as_markdown(answer),
 }
+_LINE: Final[Mapping[str, Writer]] = {
+    "ndjson": lambda report, answer, shown: report.DOCUMENT.as_line(answer, shown.command)
+}
 
 # The first form of each is the default.
 FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
     "suggestion": {
         **PLAIN,
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown),
-        "ndjson": lambda report, answer, shown: report.DOCUMENT.as_line(answer, shown.command),
+        **_LINE,
         "value": lambda report, answer, _: report.as_value(answer),
     },
-    "plan": {**PLAIN, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
+    "plan": {**PLAIN, **_LINE, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
     "trade_off": {
         **PLAIN,
         "markdown": lambda report, answer, shown: report.as_markdown(answer, shown),
+        **_LINE,
     },
     "parts": {**PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
     "calibration": {**PLAIN, "toml": lambda report, answer, _: report.as_toml(answer)},
@@ -68,8 +72,7 @@ FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
         "csv": lambda report, answer, _: report.as_csv(answer.outcomes),
     },
     "findings": {
-        "table": lambda report, answer, _: report.as_table(answer),
-        "json": lambda report, answer, shown: report.DOCUMENT.as_json(answer, shown.command),
+        **PLAIN,
         "ndjson": lambda report, answer, shown: report.as_ndjson(answer, shown.command),
         "github": lambda report, answer, _: report.as_github(answer),
         "junit": lambda report, answer, _: report.as_junit(answer),

@@ -200,10 +200,10 @@ def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
     for rule in RULES.values():
         if not configuration.selects(rule.id) or case.solver not in rule.solvers:
             continue
-        for place, message, *weight in rule.check(case):
+        for place, message in rule.check(case):
             if case.deck.silences(rule.id, place.file, place.line):
                 continue
-            severity = Severity(configuration.severity.get(rule.id, weight[0] if weight else rule.severity))
+            severity = Severity(configuration.severity.get(rule.id, rule.severity))
             yield Finding(rule.id, severity, message, case.deck.path, place.file, place.line, place.column)
 
 

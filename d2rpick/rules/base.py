@@ -269,8 +269,8 @@ class RunCase(Case):
         return found
 
 
-Objection = tuple["Field", str] | tuple["Field", str, Severity]
-"""Where, what is wrong there, and how much it weighs where that is more than the rule says."""
+Objection = tuple["Field", str]
+"""Where, and what is wrong there."""
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,12 @@ Bodies may go through walls, begin at rest, or be rigid all along.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
-from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, left_rigid
+from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, LeftRigid, left_rigid
 from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Example, RunCase, rule
 from d2rpick.rules.examples import GOOD_RUN, WINDOW, engine_files, run_of, starter_deck
 
@@ -61,11 +62,14 @@ def _start(state: str, *nodes: int) -> Example:
     return run_of(files, starter_deck(_NODES.replace("NODE/8", "NODE/7")))
 
 
-def _wheel(named: str = "", members: tuple[int, ...] = (5, 6, 7, 8)) -> Example:
+# A matsum in which the third part deforms, and no other.
+_SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
+
+
+def _wheel(named: str = "", members: tuple[int, ...] = (5, 6, 7, 8), part: int = 2) -> Example:
     """Add a wheel that is a rigid body of its own; ``named`` stands in the /RBODY/OFF of the first leg too."""
-    wheel = (
-        "/PART/2\nwheel\n" + _row(1, 1) + "/SHELL/2\n" + _row(2, 5, 6, 7, 8) + "/GRNOD/NODE/6\nwheel\n" + _row(*members)
-    )
+    mesh = f"/PART/{part}\nwheel\n{_row(1, 1)}/SHELL/{part}\n{_row(2, 5, 6, 7, 8)}"
+    wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{_row(*members)}"
     body = "/RBODY/2\nwheel\n" + _row(1809, 0, 0, 0, "", 0, 6)
     files = {**_LEGS, "box_0001.rad": _LEGS["box_0001.rad"].replace("1808\n", f"1808 {named}\n")}
     return run_of(files, starter_deck(more=wheel + body))
@@ -225,18 +229,36 @@ def _flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
 )
 def _left_rigid(case: RunCase) -> Iterator[Objection]:
     """A body is on from time 0 unless the first leg says /RBODY/OFF, and what it holds is rigid to the end: the
-    wheels of a car whose legs name its body alone. Reported where the body holds whole parts. With a history it is
-    an error if these parts have internal energy there, and nothing if they have none; without one it may be meant: a
-    comment silences it. Source: Altair's help for /RBODY in engine files, and runs computed with OpenRadioss.
+    wheels of a car whose legs name its body alone. Reported where the body holds whole parts, and no history tells
+    whether these deform: it may be meant, and a comment silences it; D2R409 is for what a history tells. Source:
+    Altair's help for /RBODY in engine files, and runs computed with OpenRadioss.
     """
-    left = left_rigid(case.run, case.windows.windows)
-    deforming = case.judge.deforming(left.parts) if left and case.judge else None
-    if left is None or deforming == ():
-        return
-    if deforming:
-        yield left.place, f"{left.found}, which deform in the history; {left.way_out}", ERROR
-    else:
+    left, deforming = _left_rigid_parts(case)
+    if left and deforming is None:
         yield left.place, f"{left.found}; where the run without switching keeps the bodies off, {left.way_out}"
+
+
+@rule(
+    "D2R409",
+    ERROR,
+    "a rigid body that no leg switches, though its parts deform in the history",
+    (GOOD_RUN, _wheel(), replace(_wheel(), history=_SPRING)),
+    (replace(_wheel(part=3), history=_SPRING),),
+    (RADIOSS,),
+)
+def _left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
+    """As D2R408, where a history has internal energy of the parts of that body: they deform in the run without
+    switching, and cannot in this one. Where the history has their energy and it is zero, they are meant to be rigid.
+    """
+    left, deforming = _left_rigid_parts(case)
+    if left and deforming:
+        yield left.place, f"{left.found}, which deform in the history; {left.way_out}"
+
+
+def _left_rigid_parts(case: RunCase) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
+    """What no leg switches, and which of its parts deform; None where no history tells."""
+    left = left_rigid(case.run, case.windows.windows)
+    return left, case.judge.deforming(left.parts) if left and case.judge else None
 
 
 @rule(

@@ -75,7 +75,7 @@ def _unique(case: Case) -> Iterator[Objection]:
 
 @rule(
     "D2R005",
-    WARNING,
+    ERROR,
     "RELSW/PAIRED not mutual, not of opposite sign, or CODEs of different families",
     (_pair((2, 4)), _pair((1, 3))),
     (_pair((2, 4), back=7), _pair((2, 4), signs=(1, 1)), _pair((1, 4))),
@@ -84,8 +84,8 @@ def _mutual(case: Case) -> Iterator[Objection]:
     """Paired sets alternate as a contact or wall force comes and goes: each names the other in RELSW, PAIRED is 1
     for the one that acts first and -1 for the other, and their CODEs are 1 and 3 (wall) or 2 and 4 (contact). Sets,
     paired or not, that are rigid under force (CODE 3 or 4 on the D2R side, 1 or 2 on the other) are the wrong way
-    round, rigid during the impact and deformable in flight: that finding is an error. Source: vendor keyword data
-    for the codes; a public drop tool wrote decks with 2 and 4 exchanged for months.
+    round, rigid during the impact and deformable in flight. Source: vendor keyword data for the codes; a public
+    drop tool wrote decks with 2 and 4 exchanged for months.
     """
     by_id = {header.swset.value: header for _, header in reversed(case.headers)}
     for _, header in case.headers:
@@ -99,7 +99,7 @@ def _mutual(case: Case) -> Iterator[Objection]:
         if problem:
             yield header.relsw.field, f"{problem}; check RELSW, PAIRED and CODE of both sets"
     for header, problem in _swapped(case):
-        yield header.code.field, f"{problem}; exchange the CODEs", ERROR
+        yield header.code.field, f"{problem}; exchange the CODEs"
 
 
 def _swapped(case: Case) -> Iterator[tuple[Header, str]]:

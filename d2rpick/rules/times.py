@@ -195,7 +195,7 @@ def _mixed(times: list[float], end: float, what: str) -> str | None:
 
 @rule(
     "D2R115",
-    WARNING,
+    ERROR,
     "the switching times are about 1000 times the termination time, or a thousandth of it",
     (PASSES, Example(THERE + BACK), window("-0.01", "0.07"), window("-0.02", "-0.01"), window("0.0", "0.07")),
     (window("20.0", "90.0"), window("2.0e-5", "9.0e-5")),
@@ -267,7 +267,7 @@ def _units(case: Case) -> Iterator[Objection]:
 
 @rule(
     "D2R207",
-    WARNING,
+    ERROR,
     "the switching times are about 1000 times those of the history, or a thousandth of them",
     (*_PASSING, PASSES),
     (_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")), _pair("1.0e-5", "6.0e-5")),

@@ -111,7 +111,7 @@ def test_an_engine_with_wrong_energies_is_told_with_every_answer(tmp_path: Path)
 
 @pytest.mark.parametrize(
     ("part", "found"),
-    [(3, ["D2R408 error"]), (2, []), (13, ["D2R408 warning"])],
+    [(3, ["D2R409 error"]), (2, []), (13, ["D2R408 warning"])],
     ids=["it deforms in the history", "it has no energy there", "it is not there"],
 )
 def test_a_body_that_no_leg_switches_is_judged_by_the_energy_of_its_parts(
@@ -122,7 +122,7 @@ def test_a_body_that_no_leg_switches_is_judged_by_the_energy_of_its_parts(
     deck = write(tmp_path, text, example.files, example.name)
     history = str(tmp_path / "matsum")
     assert run("replay", *OSCILLATOR, "--t-end", "0.3", "--dt", "1e-4", "-o", history).exit_code == 0
-    listed = answer("check", deck, "--history", history, "--select", "D2R408")["findings"]
+    listed = answer("check", deck, "--history", history, "--select", "D2R408,D2R409")["findings"]
     assert [f"{one['rule']} {one['severity']}" for one in listed] == found
 
 
@@ -363,9 +363,9 @@ def test_parts_that_a_deck_keeps_rigid_although_they_deform_make_a_pair_poor(fol
     history = str(folder / "MADET01")
     found = answer("suggest", "--part", "1-6", "--td", "0.12", "--deck", deck, history)
     assert found["quality"] == "poor"
-    assert "D2R408" in found["quality_reasons"][0]
+    assert "D2R409" in found["quality_reasons"][0]
     (told,) = [one["message"] for one in found["warnings"] if one["code"] == "body-left-rigid"]
-    (error,) = [one for one in answer("check", deck, "--history", history)["findings"] if one["rule"] == "D2R408"]
+    (error,) = [one for one in answer("check", deck, "--history", history)["findings"] if one["rule"] == "D2R409"]
     assert error["severity"] == "error"
     assert error["message"] in told
 

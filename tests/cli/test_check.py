@@ -4,6 +4,7 @@ import json
 import os
 import tomllib
 from collections.abc import Callable
+from csv import DictReader
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -143,7 +144,7 @@ def test_an_unreadable_deck_is_an_error_of_its_own_in_reports() -> None:
     assert "absent.k" in error.attrib["message"]
     (sarif,) = json.loads(run("check", "absent.k", "a.k", "-f", "sarif").stdout)["runs"]
     assert [one["executionSuccessful"] for one in sarif["invocations"]] == [False]
-    assert run("check", "absent.k", "a.k").stdout.endswith("in 1 deck, 1 not checked\n")
+    assert run("check", "absent.k", "a.k").stdout.endswith("in 1 deck, 1 not checked; times not judged: no --history\n")
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -276,7 +277,7 @@ def test_a_comment_silences_a_rule_of_the_history_too() -> None:
         (("--history", "absent.csv"), "absent.csv"),
         (("--history", ENERGY, "--after", "7"), "--after 7 lies outside the record"),
         (("--fail-on", "info"), "info"),
-        (("-f", "csv"), "csv"),
+        (("-f", "toml"), "toml"),
     ],
 )
 def test_what_cannot_run_says_why(args: tuple[str, ...], message: str) -> None:
@@ -519,3 +520,19 @@ def test_an_energy_of_several_parts_is_not_called_that_of_one(tmp_path: Path) ->
     lines = run("check", str(deck), "--history", BOX, "--tolerance", "0.001").stdout.splitlines()
     (found,) = [line for line in lines if "D2R201" in line]
     assert "the energy of the 2 parts that are switched together is" in found
+
+
+def test_a_check_without_a_history_says_that_it_has_judged_no_times() -> None:
+    told = "; times not judged: no --history"
+    assert run("check", DECK).stdout.splitlines()[-1].endswith(told)
+    assert told not in run("check", DECK, "--history", GLSTAT).stdout
+    place("none.k", HEAD + END)
+    assert told not in run("check", "none.k").stdout
+
+
+def test_findings_are_rows_of_csv_and_markdown_too() -> None:
+    found = answer("check", DECK, "--history", GLSTAT)["findings"]
+    csv, markdown = (run("check", DECK, "--history", GLSTAT, "-f", form).stdout for form in ("csv", "markdown"))
+    assert [row["rule"] for row in DictReader(csv.splitlines())] == [one["rule"] for one in found]
+    rows = [line.split(" | ") for line in markdown.splitlines() if "D2R" in line]
+    assert [row[0].strip("| ") for row in rows] == [one["rule"] for one in found]

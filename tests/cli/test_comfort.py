@@ -12,6 +12,7 @@ import pytest
 from d2rpick.base.version import __version__
 from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.manual import manual
+from d2rpick.rules import RULES
 from tests.command import ENERGY, GLSTAT, ROLLOVER, ROOT, TIME_LIMIT, answer, run
 
 MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
@@ -70,6 +71,11 @@ def test_parts_are_completed_from_the_history_that_was_typed() -> None:
     assert complete("suggest", MATSUM, "--part", "b") == ["box"]
     assert complete("suggest", "--part", "f") == ["flying"]
     assert complete("suggest", "absent", "--part", "a") == ["all"]
+
+
+def test_rules_are_completed() -> None:
+    assert complete("rule", "d2r00") == [rule for rule in RULES if rule < "D2R01"]
+    assert complete("check", "--select", "D2R105") == ["D2R105"]
 
 
 def test_channels_are_completed_from_the_history_that_was_typed() -> None:

@@ -1,5 +1,7 @@
 """No flight is claimed where forces act: walls that do no work, loads that fade, friction, supports, other bodies."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,27 @@ def test_the_flight_behind_a_load_that_fades_is_found(gravity: float, fade: np.u
     assert impulse[-1] - impulse[start] < 0.01 * np.abs(impulse).max()
     assert found.start < 0.6
     assert found.end == 1.0
+
+
+@pytest.mark.parametrize(
+    ("acceleration", "direction", "flies"),
+    [
+        (0.981, (1, 0, 0), False),  # friction with a coefficient of a tenth
+        (9.81, (1, 1, 0), False),  # on its way to no axis
+        (9.81, (0, 0, 1), True),  # as thrown straight up
+        (9810.0, (0, 0, 1), True),
+    ],
+)
+def test_what_only_slows_down_flies_where_its_acceleration_is_that_of_gravity_along_an_axis(
+    acceleration: float, direction: tuple[int, int, int], flies: bool
+) -> None:
+    along = np.array(direction) / np.linalg.norm(direction)
+    values = (20.0 * acceleration * (1 - 0.5 * TIME))[:, np.newaxis, np.newaxis] * along
+    one = Momenta(TIME, values, PARTS[:1], Precision(7), (0,), masses=np.array([10.0]))
+    found = flight_around(one, 0.5)
+    assert (found is not None) is flies
+    falling = replace(one, values=one.values - values[-1] * 1.5)  # it stands, and goes back
+    assert flight_around(falling, 0.5) is not None
 
 
 def impulse_of(force: Samples) -> Samples:

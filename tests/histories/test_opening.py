@@ -3,7 +3,9 @@
 import gzip
 import hashlib
 import io
+import lzma
 import re
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -99,6 +101,21 @@ def test_a_given_format_is_not_second_guessed(file: Write) -> None:
         read_history([file(b"\x00\x01\x02" * 99)], input_format="csv")
 
 
+def zipped(*names: str) -> bytes:
+    """An archive of files."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for name in names:
+            archive.writestr(name, CSV)
+    return packed.getvalue()
+
+
+def test_what_ls_dyna_draws_is_no_history(tmp_path: Path) -> None:
+    (tmp_path / "d3plot01").write_bytes(bytes(range(256)))
+    with pytest.raises(FormatError, match=r"d3 family, .*; name the glstat, matsum or binout"):
+        read_history([str(tmp_path / "d3plot01")])
+
+
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
@@ -111,6 +128,11 @@ def test_a_given_format_is_not_second_guessed(file: Write) -> None:
         (b"Curveplot\ntitle\nTime\nEnergy\nComponent\n", "no curve was found"),
         (gzip.compress(CSV, mtime=0)[:10] + b"\xff" * 20, "gzip"),
         (gzip.compress(b"", mtime=0), "empty"),
+        (zipped("[Content_Types].xml", "xl/workbook.xml"), "an Excel workbook, .*; save the sheet as csv"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(99), "an Excel workbook"),
+        (zipped("glstat"), "a zip archive, .*; unpack it"),
+        (lzma.compress(CSV), "a packed file, .*; unpack it"),
+        (b"PAR1" + bytes(99), "a parquet file, .*to_csv"),
     ],
 )
 def test_what_is_no_history_is_refused_in_one_line(file: Write, data: bytes, reason: str) -> None:
