@@ -158,5 +158,5 @@ def _write_and_check(card: PrintedCard, plan: Plan, folder: str, output: Output)
     judge = HistoryJudge(plan.question.reference.run, request.selection(parts=False), plan.settings, done)
     checked = check_deck(written[0], configuration_for(written[0], Configuration(), SETTINGS), judge)
     listed = [f"written  {printable(name)}" for name in written]
-    text = "\n".join([*listed, "", as_table(Checks([checked], history=judge.run.sources))])
+    text = "\n".join([*listed, "", as_table(Checks([checked], history=judge.run.sources), output.shown())])
     return text, all(one.severity is not Severity.ERROR for one in checked.findings)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.deck import Window
+    from d2rpick.report.formats import Shown
     from d2rpick.rules import Checked, Rule, Unreadable
 
 
@@ -69,7 +70,7 @@ _WINDOW: Final = row(
 )
 
 
-def as_table(checks: Checks) -> str:
+def as_table(checks: Checks, _: Shown) -> str:
     """Findings and windows of each deck, one per line, and how many there are; decks that failed are counted."""
     root = checks.root
     lines: list[str] = []

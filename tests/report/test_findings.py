@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.report import findings as report
+from d2rpick.report.formats import Shown
 from d2rpick.rules import RULES, Checked, Finding, Severity, check_deck
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, automatic
 from tests.deck.test_radioss_run import place
@@ -28,7 +29,7 @@ def results(tmp_path: Path) -> list[Checked]:
 
 
 def test_table(results: list[Checked], tmp_path: Path) -> None:
-    lines = report.as_table(report.Checks(results, tmp_path)).split("\n")
+    lines = report.as_table(report.Checks(results, tmp_path), Shown()).split("\n")
     assert lines[0] == "main.k"
     assert "  part 1: rigid from 0.02 to 0.5 (main.k:14)" in lines
     assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
@@ -38,7 +39,7 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
 
 def test_a_card_without_a_window_is_not_passed_over(tmp_path: Path) -> None:
     deck = place(tmp_path, legs=(("0.2", "/RBODY/ON\n0\n"),))  # without a main node
-    lines = report.as_table(report.Checks([check_deck(deck)], tmp_path)).split("\n")
+    lines = report.as_table(report.Checks([check_deck(deck)], tmp_path), Shown()).split("\n")
     assert lines[:2] == ["box_0000.rad", "  switching cards that switch nothing"]
 
 

@@ -15,6 +15,7 @@ from validation.published.values import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, p
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.report.formats import Shown
     from validation.published.exhibits import Exhibit
     from validation.published.values import PublishedValue
 
@@ -68,9 +69,9 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Reproduction) -> str:
+def as_table(answer: Reproduction, _: Shown) -> str:
     """Published numbers and reference values beside those here, the pairs, the figures, the misprints."""
-    rows, exhibits, _ = answer
+    rows, exhibits = answer[:2]
     lines = [tables.as_text(HEAD, [cells(row) for row in rows]), "", *pairs_of(), ""]
     for one in exhibits:
         lines += [f"{heading(one)}: {verdict(one)}", f"  paper  {one.paper}", f"  here   {one.found}"]
