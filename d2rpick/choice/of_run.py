@@ -179,7 +179,8 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
 
 
 def _comparison(verdict: Verdict, run: Run, switched: Reference, min_mean: float) -> Comparison:
-    from d2rpick.choice.comparison import compare_runs, judged_parts
+    from d2rpick.choice.comparison import compare_runs
+    from d2rpick.choice.judged_parts import judged_parts
 
     situation = verdict.situation
     flight, parts = situation.flight, situation.history.parts

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError, if_written, listing
-from d2rpick.choice.comparison import rigid_parts, stretches, with_energy
+from d2rpick.choice.comparison import stretches
+from d2rpick.choice.judged_parts import rigid_parts, with_energy
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import believed

@@ -11,7 +11,8 @@ import click
 
 from d2rpick.api.request import POSITIVE
 from d2rpick.cli import options
-from d2rpick.cli.output import tell, telling
+from d2rpick.cli.output import tell
+from d2rpick.cli.progress import telling
 from d2rpick.cli.values import click_type
 from d2rpick.report.formats import FORMATS
 

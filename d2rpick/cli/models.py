@@ -10,7 +10,7 @@ import click
 from d2rpick.api.request import NOT_NEGATIVE, OPTIONS, POSITIVE, TIME, UNLIMITED, Request, dashed, option
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES
-from d2rpick.cli.output import counting
+from d2rpick.cli.progress import counting
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:

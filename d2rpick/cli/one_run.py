@@ -10,7 +10,8 @@ from d2rpick.api.request import FRACTION, LIMITS, MIN_MEAN_ENERGY, READING, Opti
 from d2rpick.base.errors import ArgumentError
 from d2rpick.cli import options
 from d2rpick.cli.options import ANSWER, DECK, DECK_OF_PARTS, HISTORY, ONE_RUN, RESULT, WINDOW
-from d2rpick.cli.output import IN_WORDS, opened, reading
+from d2rpick.cli.output import IN_WORDS, opened
+from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from d2rpick.api.request import LIMITS, READING, needed_time, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, D2RPickError, FormatError
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
-from d2rpick.cli.output import counting, tell
+from d2rpick.cli.output import tell
+from d2rpick.cli.progress import counting
 from d2rpick.cli.values import click_type
 from d2rpick.report.formats import FORMATS
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs, rigid_parts
+from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
+from d2rpick.choice.judged_parts import rigid_parts
 from d2rpick.choice.of_run import Reference, compare_with, read, verify_of
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.switched_run import switched_history

@@ -23,7 +23,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick import __version__
-from d2rpick.cli import output
+from d2rpick.cli import progress
 from tests.command import DECK, ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, ROOT, answer, run, started
 from tests.json_schemas import check_by_schema
 
@@ -365,7 +365,7 @@ def shown(stream: io.StringIO, names: Sequence[str], *, periods: float, quiet: b
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stderr", stream)
         patch.setenv("COLUMNS", "40")
-        with output.reading(names, quiet=quiet, period=PERIOD):
+        with progress.reading(names, quiet=quiet, period=PERIOD):
             time.sleep(periods * PERIOD)
     return stream.getvalue()
 
@@ -395,7 +395,7 @@ def test_an_error_is_shown_on_a_clean_line(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(sys, "stderr", stream)
 
     def fail() -> None:
-        with output.reading(["glstat"], quiet=False, period=PERIOD):
+        with progress.reading(["glstat"], quiet=False, period=PERIOD):
             time.sleep(5 * PERIOD)
             raise ValueError("broken")
 
@@ -440,7 +440,7 @@ def test_the_runs_of_a_scan_are_counted_until_it_is_interrupted(quiet: bool) -> 
 def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
-    with output.counting(9, quiet=False, period=PERIOD) as count:
+    with progress.counting(9, quiet=False, period=PERIOD) as count:
         count.done = count.taken = 3
         time.sleep(5 * PERIOD)
         count.done = 5
@@ -449,7 +449,7 @@ def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyP
     assert "\r5 of 9 runs, 0:00 left\r" in stream.getvalue()
     assert stream.getvalue().endswith(" \r")
     # two runs took 60 s, so do the next two
-    count = output.Count(total=9)
+    count = progress.Count(total=9)
     count.tell(3)
     count.tell(5)
     assert count.told(60) == "5 of 9 runs, 2:00 left"

@@ -1,10 +1,10 @@
-"""Tables: columns meant by name, by number or by what they are called, and their values."""
+"""Tables: columns meant by name, by number or by what they are called."""
 
 from __future__ import annotations
 
 from collections import Counter
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,19 +12,17 @@ from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.curves import Curves, find_curves
-from d2rpick.histories.formats.layout import UTF16, Layout, Text, as_number, find_layout, is_skipped, split
+from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, split
+from d2rpick.histories.formats.table_values import checked_values, line_of, plain_values
+from d2rpick.histories.formats.text import UTF16, Text
 from d2rpick.histories.names import internal_energies, is_time, meant, near_miss, quantity_of, refuse_other_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from numpy.typing import NDArray
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
-
-    Cuts = tuple[NDArray[np.intp], NDArray[np.intp]]  # from where to where rows are looked at
 
 
 def labelled(layout: Layout, time: int) -> dict[str, int]:
@@ -246,183 +244,3 @@ def write(columns: Mapping[str, Samples]) -> bytes:
     csv.writer(head, lineterminator="\n").writerow(columns)
     rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)
     return "\n".join([head.getvalue().removesuffix("\n"), *map(",".join, rows), ""]).encode()
-
-
-def plain_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> list[Samples] | None:
-    """Columns ``used`` of the rows from byte ``begin`` on, each of shape (rows,).
-
-    None unless each row has its number of cells and no line stands between them.
-    """
-    tables = []
-    for piece in text.pieces(begin):
-        values = _plain_piece(text, piece, layout, used)
-        if values is None:
-            return None
-        tables.append(values)
-    return [np.concatenate([table[:, place] for table in tables]) for place in range(len(used))] if tables else None
-
-
-def _plain_piece(text: Text, piece: bytes, layout: Layout, used: Sequence[int]) -> Samples | None:
-    if layout.decimal == ",":
-        if b"." in piece:
-            return None
-        piece = piece.replace(b",", b".")
-    if b'"' in piece:
-        return None  # a separator in quotes is none
-    taken, chosen, cuts = [*range(layout.columns)], None, None
-    closed = piece[: piece.index(b"\n")].endswith((layout.separator or "\n").encode("latin-1"))
-    if layout.separator and (closed or sorted(used) != taken):
-        # otherwise the parser sees to it that each row has its cells
-        rows = _separators(piece, layout)
-        if rows is None:
-            return None
-        starts, marks = rows
-        taken = sorted({0, *used})  # a comment would show in the first column
-        chosen = taken if closed or len(taken) < layout.columns else None
-        if taken[-1] < layout.columns - 1:  # what follows is not taken apart
-            cuts = starts, marks[:, taken[-1]]
-    try:
-        # to import pandas pays in large texts alone
-        table = _by_pandas(piece, layout, chosen) if text.is_large else _by_numpy(piece, layout, chosen, cuts)
-    except ValueError:
-        return None
-    if table.shape != (piece.count(b"\n"), len(taken)):
-        return None  # blank lines were passed over
-    return table if taken == [*used] else table[:, np.searchsorted(taken, used)]
-
-
-def _by_numpy(piece: bytes, layout: Layout, columns: Sequence[int] | None, cuts: Cuts | None) -> Samples:
-    """Columns of rows of numbers, all unless some are chosen; ValueError where there is something else."""
-    whole = piece.decode("latin-1")  # no other character than those of latin-1 belongs to a number
-    if cuts:
-        lines = [whole[start:cut] for start, cut in zip(*(places.tolist() for places in cuts), strict=True)]
-    else:
-        lines = whole.split("\n")[:-1]
-    if not lines[0].strip():
-        raise ValueError  # numpy passes over it, and warns where there is no other
-    return np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=columns)
-
-
-def _by_pandas(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> Samples:
-    """The same, five times as fast."""
-    from csv import QUOTE_NONE
-    from io import BytesIO
-
-    import pandas as pd
-
-    options: dict[str, Any] = {
-        "low_memory": False,
-        "quoting": QUOTE_NONE,
-        "skip_blank_lines": False,
-        "na_filter": False,
-    }
-    if [*map(int, pd.__version__.split(".")[:2])] < [3, 1]:  # from there on always exact, as `float` is
-        options["float_precision"] = "round_trip"
-    options |= {"header": None, "usecols": columns, "dtype": np.float64}
-    table: Samples = pd.read_csv(BytesIO(piece), sep=layout.separator or r"\s+", **options).to_numpy()
-    return table
-
-
-def _separators(piece: bytes, layout: Layout) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
-    """Places of the rows (n,) and of their separators (n, k); None unless all rows have their number of cells."""
-    assert layout.separator
-    signs = np.frombuffer(piece, np.uint8)
-    ends = signs == ord("\n")
-    closed = piece.startswith(layout.separator.encode("latin-1"), piece.index(b"\n") - 1)  # rows end with a separator
-    each, rows = layout.columns + closed, np.count_nonzero(ends)
-    marks = np.flatnonzero(ends | (signs == ord(layout.separator)))
-    if marks.size != rows * each:
-        return None
-    table = marks.reshape(rows, each)
-    whole = np.all(ends[table[:, -1]]) and (not closed or np.all(np.diff(table[:, -2:]) == 1))
-    return (np.append(0, table[:-1, -1] + 1), table[:, :-1]) if whole else None
-
-
-def checked_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Samples:
-    """Values with comments and blank lines between the rows, shape (rows, len(used)).
-
-    Where all cells are empty the curve has ended: another one beside it goes on.  FormatError with the line that is
-    wrong.
-    """
-    tables = [table for _, table in _tables(text, begin, layout, used)]
-    return np.concatenate(tables) if tables else np.empty((0, len(used)))
-
-
-def line_of(text: Text, begin: int, layout: Layout, time: int, state: int) -> int:
-    """Give the number of the line in which a state stands, counted from 0."""
-    for numbers, _ in _tables(text, begin, layout, [time]):
-        if state < len(numbers):
-            return numbers[state]
-        state -= len(numbers)
-    raise AssertionError("there is such a state")
-
-
-def _tables(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Iterator[tuple[Sequence[int], Samples]]:
-    """Numbers of lines and their values piece by piece: line by line only where they are not all alike."""
-    curve = _Curve(text.name, layout, used)
-    number = layout.start + 1
-    for piece in text.pieces(begin):
-        table = _plain_piece(text, piece, layout, used)
-        if table is not None and np.isfinite(table).all() and not curve.stops_before(float(table[0, 0])):
-            yield range(number, number + len(table)), table
-            curve.before, curve.gap = float(table[-1, 0]), False
-        else:
-            states = list(curve.states(text.rows(piece), number))
-            if states:
-                yield [line for line, _ in states], np.array([state for _, state in states])
-        number += piece.count(b"\n")
-
-
-class _Curve:
-    """What of a table was seen so far, where it is taken line by line."""
-
-    def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
-        self._name, self._layout, self._used = name, layout, used
-        self.before: float | None = None  # time of the last state
-        self.gap = self._ended = False
-
-    def stops_before(self, time: float) -> bool:
-        """Whether a state of this time is one of another curve."""
-        return self._ended or (self.gap and self.before is not None and time <= self.before)
-
-    def states(self, rows: Sequence[str], first: int) -> Iterator[tuple[int, list[float]]]:
-        """Give line and values of each state in rows of which ``first`` is the number of the first."""
-        layout, used = self._layout, self._used
-        for number, row in enumerate(rows, first):
-            if is_skipped(row):
-                self.gap = True
-                continue
-            where = f"{self._name}:{number}"
-            cells = _cells(where, row, layout)
-            if not any(cells[column] for column in used) and self.before is not None:
-                self._ended = True
-                continue
-            state = [_value(where, layout, column, cells[column]) for column in used]
-            if self.stops_before(state[0]):
-                found = "a curve continues after empty cells" if self._ended else "the time starts again after a gap"
-                raise FormatError(
-                    f"{where}: {found}, one curve was expected; repair it or put each curve into its own file"
-                )
-            self.gap, self.before = False, state[0]
-            yield number, state
-
-
-def _cells(where: str, row: str, layout: Layout) -> list[str]:
-    cells = split(row, layout.separator)
-    if len(cells) == layout.columns + 1 and not cells[-1]:
-        cells.pop()
-    if layout.names and is_time(cells[0]) and is_time(layout.names[0]):
-        raise FormatError(f"{where}: a second header, another curve begins here; put each curve into its own file")
-    if len(cells) != layout.columns:
-        found = "1 value" if len(cells) == 1 else f"{len(cells)} values"
-        raise FormatError(f"{where}: {found}, {layout.columns} were expected as in the other rows; repair the line")
-    return cells
-
-
-def _value(where: str, layout: Layout, column: int, cell: str) -> float:
-    value = as_number(cell, layout.decimal)
-    if value is None or not np.isfinite(value):
-        raise FormatError(
-            f"{where}: {layout.name(column)!r} is {cell[:60]!r}, a number was expected; repair or delete the line"
-        )
-    return value

@@ -26,7 +26,7 @@ from d2rpick.histories.names import internal_energies, is_time, refuse_other_qua
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.histories.formats.layout import Text
+    from d2rpick.histories.formats.text import Text
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Selection
 

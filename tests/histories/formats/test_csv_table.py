@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import OnDisk
 from d2rpick.histories.formats import csv_table
-from d2rpick.histories.formats.layout import Portions, Text
+from d2rpick.histories.formats.text import Portions, Text
 from d2rpick.histories.history import EXACT, History, Precision
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source

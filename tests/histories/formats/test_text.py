@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from d2rpick.base.errors import ChangedError
 from d2rpick.histories import content
 from d2rpick.histories.content import OnDisk
-from d2rpick.histories.formats.layout import Portions, Text
+from d2rpick.histories.formats.text import Portions, Text
 from d2rpick.histories.source import Source
 from tests.reading import on_disk
 
