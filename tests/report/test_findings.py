@@ -34,7 +34,7 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
     assert "  part 1: rigid from 0.02 to 0.5 (main.k:14)" in lines
     assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
     assert any(line.startswith("  main.k:23:28: error D2R101 TIME1 is 0.5") for line in lines)
-    assert lines[-1] == "1 error, 0 warnings, 1 info in 2 decks"
+    assert lines[-1] == "1 error, 0 warnings, 1 info in 2 decks; times not judged: no `history`"
 
 
 def test_a_card_without_a_window_is_not_passed_over(tmp_path: Path) -> None:
