@@ -80,7 +80,19 @@ class Answer:
 
 
 class Paged(Answer):
-    """An answer that has a page, and mostly a figure."""
+    """An answer that has a page, and mostly a figure; a notebook shows it in short."""
+
+    drawn: ClassVar[bool] = True
+
+    def __repr__(self) -> str:
+        from d2rpick.report.glance import sentence
+
+        return f"{type(self).__name__}({sentence(self.kind, self)})"
+
+    def _repr_html_(self) -> str:
+        from d2rpick.report.glance import glance
+
+        return glance(self.kind, self, self.plot() if self.drawn else None)
 
     def plot(self) -> Figure:
         """Draw the answer as a matplotlib Figure."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any, NoReturn, TypedDict
 
 from d2rpick.api.request import OPTIONS, Number
 
@@ -168,14 +168,25 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
 def check_run(name: str, run: object) -> None:
     """Raise TypeError for what is not a run that was read."""
     if not hasattr(run, "files"):
-        raise TypeError(f"{name} is {run!r}, what read() or from_frame() gives was expected")
+        found = repr(run) if isinstance(run, str | os.PathLike) else f"of type {type(run).__name__}"
+        made = "from_frame(...)" if hasattr(run, "to_frame") or hasattr(run, "columns") else "read(...)"
+        raise TypeError(f"{name} is {found}; give what d2rpick.{made} makes of it")
+
+
+def refuse_unknown(name: str, known: Iterable[str], others: Iterable[str] = ()) -> NoReturn:
+    """Raise the TypeError of an argument that does not exist, with the one of all that may be meant."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, {*known, *others} - {name}, 1)
+    meant = f"is {near[0]!r} meant?" if near else f"expected one of {', '.join(known)}"
+    raise TypeError(f"there is no argument {name!r}; {meant}")
 
 
 def chosen(choosing: Choosing) -> dict[str, Any]:
     """Give the fields of a request that say how to choose."""
     known = Choosing.__annotations__
     if unknown := [name for name in choosing if name not in known]:
-        raise TypeError(f"there is no argument {unknown[0]!r}; expected one of {', '.join(known)}")
+        refuse_unknown(unknown[0], known, ("parts", "flying", "deck", "weights", "td_window"))
     given: dict[str, Any] = dict(choosing)
     oscillator = given.pop("oscillator", None)
     if (oscillator is None) != (given.get("v0") is None):

@@ -14,6 +14,7 @@ from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import of_run
 from d2rpick.choice import suggest as choice
 from d2rpick.choice import verify as judgement
+from d2rpick.histories.digits import as_read
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.situation import Situation
+    from d2rpick.choice.suggest import Pair
     from d2rpick.flight.flight import Flight
 
 
@@ -65,13 +67,12 @@ class Suggestion(Judged, choice.Suggestion):
     """Answer of `suggest`; nothing of it changes.
 
     ``candidates`` are ranked, best first; ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
-    are None, with the reason in ``warnings``; ``quality`` of the recommended pair has ``grade`` good, fair or poor and
-    ``reasons``.
+    are None, with the reason in ``warnings``; a better pair also where it is the recommended one; ``quality`` of the
+    recommended pair has ``grade`` good, fair or poor and ``reasons``.
     """
 
     kind = "suggestion"
     name = "suggest"
-    said = ("recommended", "better_pair")
 
     def to_frame(self) -> pd.DataFrame:
         """Give the candidates as a table at full precision.
@@ -129,7 +130,6 @@ class Verdict(Judged, judgement.Verdict):
     compared: Run | None = None
     kind = "verdict"
     name = "verify"
-    said = ("verified", "reasons", "tr_ok", "td_ok")
 
     @property
     def tr(self) -> float:
@@ -230,8 +230,14 @@ def suggest(
 def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window or, for None, in the longest flight."""
     found = of_run.suggest_of(asked.reference, td, asked.settings)
+    if found.better_pair and found.recommended and _read(found.better_pair) == _read(found.recommended):
+        found = replace(found, better_pair=None)
     times = ("--td-window", *map(repr, td)) if isinstance(td, tuple) else () if td is None else ("--td", repr(td))
     return Suggestion.about(asked, found, *times)
+
+
+def _read(pair: Pair) -> tuple[float, float]:
+    return as_read(pair.tr), as_read(pair.td)
 
 
 def verify(

@@ -38,7 +38,7 @@ class PartTable(Paged, sets_of_parts.Parts):
     run: Run
     command: tuple[str, ...]
     kind = "parts"
-    said = ("sets", "recommended")
+    drawn = False
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per part.

@@ -39,7 +39,6 @@ class Exploration(RunAnswer, trade_off.TradeOff):
 
     kind = "trade_off"
     name = "explore"
-    said = ("recommended", "step")
 
     @property
     def answer(self) -> str:
@@ -149,7 +148,6 @@ class Plan(RunAnswer, planning.Plan):
     """
 
     kind = name = "plan"
-    said = ("windows", "all_windows", "next_run")
 
     @property
     def flights(self) -> tuple[planning.Planned, ...]:

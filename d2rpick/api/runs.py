@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
 from d2rpick.api import arguments
+from d2rpick.base.errors import if_written
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -33,7 +34,21 @@ class Run:
     input_format: str = "auto"
 
     def __repr__(self) -> str:
-        return f"Run({', '.join(map(repr, self.sources))})"
+        from d2rpick.report.glance import of_run
+
+        return f"Run({of_run(self.files)})"
+
+    def _repr_html_(self) -> str | None:
+        from d2rpick.report.glance import glance
+
+        overview = if_written(self.overview)
+        history = if_written(lambda: self.files.history(self.chosen))
+        if overview is None or history is None:
+            return glance("overview", overview, None) if overview else None
+        from d2rpick.report.figures_choice import draw_run
+
+        flights = [(flight.start, flight.end) for _, flight in overview.flights]
+        return glance("overview", overview, draw_run(history, flights))
 
     @property
     def sources(self) -> tuple[str, ...]:
@@ -156,7 +171,7 @@ def read(
 
 
 def from_frame(
-    frame: pd.DataFrame,
+    frame: pd.DataFrame | pd.Series[Any],
     *,
     time: str | int | None = None,
     energy: str | int | Iterable[str | int] | None = None,
@@ -169,8 +184,9 @@ def from_frame(
 
     Parameters
     ----------
-    frame : pandas.DataFrame
-        A row per state; the times are a column named so, or the index.
+    frame : pandas.DataFrame or Series
+        A row per state.  The times are a column or the index, by a name such as ``time`` or that of ``time``, never the
+        numbers of the rows; timedeltas are seconds.  A Series is the internal energy.
     time, energy, channels : optional
         Columns as for ``read``.
     name : str
@@ -184,8 +200,8 @@ def from_frame(
     ------
     D2RPickError
         If it is not the history of a run.
-    TypeError
-        If ``frame`` is not a pandas.DataFrame.
+    TypeError, ValueError
+        If ``frame`` is neither a pandas.DataFrame nor a Series, or nothing of it is named as the time.
 
     Examples
     --------
@@ -196,14 +212,36 @@ def from_frame(
     """
     import pandas as pd
 
-    from d2rpick.histories.names import is_time
     from d2rpick.histories.source import Source
 
+    if isinstance(frame, pd.Series):
+        frame = frame.to_frame("internal_energy")
     if not isinstance(frame, pd.DataFrame):
-        raise TypeError(f"frame is of type {type(frame).__name__}, a pandas.DataFrame was expected")
-    has_time = time is not None or any(is_time(str(column)) for column in frame.columns)
-    text = frame.to_csv(index=not has_time, index_label="time")
-    return _opened([Source(name, text.encode())], selection_of(time, energy, channels), "csv")
+        raise TypeError(f"frame is of type {type(frame).__name__}, a pandas.DataFrame or Series was expected")
+    chosen = selection_of(time, energy, channels)
+    text = _timed(frame, time).apply(_seconds).to_csv(index=False)
+    return _opened([Source(name, text.encode())], chosen, "csv")
+
+
+def _timed(frame: pd.DataFrame, time: str | int | None) -> pd.DataFrame:
+    """Make the index a column where it is the time; ValueError where nothing is."""
+    from d2rpick.histories.names import is_time
+
+    index = frame.index
+    if time in (known := list(map(str, frame.columns))) or isinstance(time, int) or any(map(is_time, known)):
+        return frame
+    if index.inferred_type.startswith("timedelta") or time == index.name is not None or is_time(str(index.name)):
+        return frame.reset_index(names=time or "time")
+    named = "no name" if index.name is None else f"the name {index.name!r}"
+    raise ValueError(
+        f"frame has no time{'' if time is None else f' {time!r}'}: its index has {named}, its columns are "
+        f"{', '.join(map(repr, known))}; name it by frame.rename_axis('time'), or a column of these as `time`"
+    )
+
+
+def _seconds(column: pd.Series[Any]) -> pd.Series[Any]:
+    """Give timedeltas in seconds, other values as they are."""
+    return column.dt.total_seconds() if column.dtype.kind == "m" else column
 
 
 def _in_memory(file: Any) -> Source:

@@ -174,7 +174,6 @@ class Study(Paged, core.Study):
 
     command: tuple[str, ...]
     kind = "study"
-    said = ("td", "agree", "common")
 
     @property
     def runs(self) -> tuple[StudyRow, ...]:

@@ -83,7 +83,7 @@ def drive_page(found: Driven, command: Sequence[str]) -> str:
 def _sections(found: Driven, command: Sequence[str]) -> Iterator[Markup]:
     from d2rpick.histories.names import Selection
     from d2rpick.report.figures import svg_element
-    from d2rpick.report.figures_choice import draw_driven
+    from d2rpick.report.figures_choice import draw_run
 
     history = found.run.history(Selection(parts=tuple(map(str, found.deck.parts))))
     switched = [one for one in found.windows if not one.reason]
@@ -96,7 +96,8 @@ def _sections(found: Driven, command: Sequence[str]) -> Iterator[Markup]:
     ]
     yield page.front(cards or [tag("p", "No flight was switched.")], remarks(found.cautions), pairs(_outlook(found)))
     caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
-    yield drawings({caption: svg_element(draw_driven(history, switched), "driven-")})
+    flights, rigid = [(one.free, one.contact or one.td) for one in switched], [(one.tr, one.td) for one in switched]
+    yield drawings({caption: svg_element(draw_run(history, flights, rigid), "driven-")})
     yield section("Evidence", table("Windows", *_windows(found)))
     yield section("Cost", table("Legs", *_legs(found)))
     yield section("What was read", pairs(page.digests(found.run.files)))

@@ -11,6 +11,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
+from matplotlib import figure as figures
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.ticker import LogFormatter, NullLocator
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from d2rpick.report.view import Scale
 
@@ -41,6 +41,13 @@ STRETCHES: Final = 400
 _LONGEST_NAME = 28
 
 
+class Figure(figures.Figure):
+    """A figure that a notebook shows, whatever its backend is."""
+
+    def _repr_png_(self) -> bytes:
+        return render(self, "figure.png")
+
+
 def picture_format(name: str) -> str:
     """Tell the format that the suffix of ``name`` asks for; FormatError unless it is png, svg or pdf."""
     form = PurePath(name).suffix.lower().lstrip(".")
@@ -49,7 +56,7 @@ def picture_format(name: str) -> str:
     return form
 
 
-def render(figure: Figure, name: str) -> bytes:
+def render(figure: figures.Figure, name: str) -> bytes:
     """Turn a figure into the bytes of the file ``name``, in the format that its suffix asks for, always the same."""
     content, form = io.BytesIO(), picture_format(name)
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
@@ -173,7 +180,7 @@ _COLUMNS: Final = 2
 _NUMBERS: Final = 5
 
 
-def arrange(figure: Figure, panels: Sequence[Axes], height: float) -> None:
+def arrange(figure: figures.Figure, panels: Sequence[Axes], height: float) -> None:
     """Put panels of one ``height`` [inch] below each other, and one legend of all of them below the last.
 
     Margins are measured once, by the numbers of the vertical axes; an engine for layouts draws a figure three times.
@@ -202,7 +209,7 @@ def _place(panels: Sequence[Axes], left: float, height: float, full: float) -> N
         panel.set_position((left / PAGE_WIDTH, bottom / full, 1 - (left + _RIGHT) / PAGE_WIDTH, height / full))
 
 
-def svg_element(figure: Figure, prefix: str) -> str:
+def svg_element(figure: figures.Figure, prefix: str) -> str:
     """Turn a figure into an SVG element for a page, whose ids all begin with ``prefix``; letters stay letters.
 
     It has no style sheet of its own: that of the page holds what matplotlib writes into it.

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
 from d2rpick.choice.study import outliers, runs_of, short_names
 from d2rpick.histories.samples import outline
@@ -19,6 +18,7 @@ from d2rpick.report.figures import (
     STRETCHES,
     SWITCHED,
     WIDTH,
+    Figure,
     arrange,
     entries,
     finish,
@@ -40,11 +40,11 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.study import Study, StudyRow
     from d2rpick.choice.suggest import Pair, Suggestion
+    from d2rpick.choice.switched_run import Times
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.choice.verify import Verdict
     from d2rpick.histories.history import History, Samples
     from d2rpick.report.view import Motion, View
-    from d2rpick.running.sequence import Window
 
 
 # Height of a file's figure of the energy alone, and with the motion; on a page, that of a panel [inch].
@@ -195,15 +195,16 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
     return figure
 
 
-def draw_driven(history: History, windows: Sequence[Window]) -> Figure:
-    """Draw the energy of a run that was driven, as far as it is believed, and its rigid windows."""
+def draw_run(history: History, flights: Sequence[Times], windows: Sequence[Times] = ()) -> Figure:
+    """Draw the energy of a run, as far as it is believed, its flights and the windows in which parts were rigid."""
     figure = Figure()
     axes = figure.subplots()
-    rigid = np.any([(history.time > one.tr) & (history.time < one.td) for one in windows], axis=0)
+    rigid = np.any([(history.time > tr) & (history.time < td) for tr, td in windows], axis=0)
     axes.plot(history.time, np.where(rigid, np.nan, history.energy), color=REFERENCE, linewidth=1, label="energy")
-    for one in windows:
-        axes.axvspan(one.free, one.contact or one.td, color=FLIGHT, alpha=0.15, linewidth=0, label="flight")
-        axes.axvspan(one.tr, one.td, ymax=_STRIP, color=GOOD, linewidth=0, label="rigid")
+    for start, end in flights:
+        axes.axvspan(start, end, color=FLIGHT, alpha=0.15, linewidth=0, label="flight")
+    for tr, td in windows:
+        axes.axvspan(tr, td, ymax=_STRIP, color=GOOD, linewidth=0, label="rigid")
     axes.set(xlabel=with_unit("time", history.time_unit), ylabel="internal energy")
     finish(axes, legend=False)
     arrange(figure, [axes], _PLAN_PANEL)

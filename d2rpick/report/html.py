@@ -115,10 +115,16 @@ def resource(name: str) -> Markup:
 
 
 def table(title: str, head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None) -> Markup:
-    """Give a table in a box that scrolls sideways where it is too wide; the row ``marked`` stands out.
+    """Give a table in a box that scrolls sideways where it is too wide; ``title`` is what a keyboard reaches it by."""
+    box = tag("div", grid(head, rows, marked), class_="scroll", role="region", aria_label=title, tabindex="0")
+    return join([tag("p", _HINT, class_="hint"), box]) if len(head) > _FIT else box
+
+
+def grid(head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None = None) -> Markup:
+    """Give a table alone; the row ``marked`` stands out.
 
     Columns of numbers, and of what is not known, are set to the right.  Lines break at blanks alone, never within a
-    number.  ``title`` is what the box is called when it is reached by keyboard.
+    number.
     """
     body = [list(row) for row in rows]
     right = [all(row[i] is None or isinstance(row[i], (int, float)) for row in body) for i in range(len(head))]
@@ -132,9 +138,7 @@ def table(title: str, head: Sequence[str], rows: Iterable[Sequence[Cell]], marke
         )
         for i, row in enumerate(body)
     ]
-    content = tag("table", tag("thead", tag("tr", *top)), tag("tbody", *lines))
-    box = tag("div", content, class_="scroll", role="region", aria_label=title, tabindex="0")
-    return join([tag("p", _HINT, class_="hint"), box]) if len(head) > _FIT else box
+    return tag("table", tag("thead", tag("tr", *top)), tag("tbody", *lines))
 
 
 def _cell(text: str, own: Mapping[str, str]) -> Markup:

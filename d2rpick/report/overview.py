@@ -56,7 +56,7 @@ _PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "tim
 
 def as_table(overview: Overview, shown: Shown) -> str:
     """One line per fact, the channels, and a table of the parts."""
-    lines = tables.in_line(_rows(overview))
+    lines = tables.in_line(facts(overview))
     if overview.parts:
         lines += ["", tables.as_text(_PARTS_HEAD, _parts(overview), shown.width)]
     if overview.health and (health := _health(overview)):
@@ -66,11 +66,11 @@ def as_table(overview: Overview, shown: Shown) -> str:
 
 def as_markdown(overview: Overview) -> str:
     """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
-    facts = tables.as_markdown(("what", "value"), _rows(overview))
+    told = tables.as_markdown(("what", "value"), facts(overview))
     parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
     listed = _health(overview)
     health = [tables.as_markdown(head(overview.health), listed)] if overview.health and listed else []
-    return "\n\n".join([facts, *parts, *health, *(f"* {tables.in_markdown(note)}" for note in overview.notes)])
+    return "\n\n".join([told, *parts, *health, *(f"* {tables.in_markdown(note)}" for note in overview.notes)])
 
 
 def as_csv(overview: Overview) -> str:
@@ -90,7 +90,8 @@ def as_csv(overview: Overview) -> str:
     return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
 
 
-def _rows(overview: Overview) -> list[tuple[str, tables.Cell]]:
+def facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
+    """Name each fact, and give it."""
     sampling = overview.sampling
     rows: list[tuple[str, tables.Cell]] = [
         ("source", ", ".join(overview.source)),

@@ -48,7 +48,8 @@ DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; time
     *keys.QUALITY,
     keys.HEALTH,
     keys.EXPECTED,
-    Field("better_td", maybe(keys.PAIR), get=lambda answer: answer.better_pair),
+    Field("better_td", maybe(keys.PAIR), "null where there is none, or it is the recommended one",
+          lambda answer: answer.better_pair),
     later=("health", "kinetic_share_estimated", "modes", "unsigned_parts", "td_window", "expected", "quality",
            "quality_reasons"),
 ))  # fmt: skip

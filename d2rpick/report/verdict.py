@@ -60,8 +60,8 @@ def as_table(answer: Verdict, shown: Shown) -> str:
     reasons = [f"  {printable(reason)}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
-    told = [f"verdict  {_told(answer)}", *([f"quality  {answer.quality.told}"] if answer.quality else [])]
-    return "\n".join([*told, *reasons, "", *heading(answer.situation, verbose=shown.verbose), "", *lines])
+    head = [f"verdict  {told(answer)}", *([f"quality  {answer.quality.told}"] if answer.quality else [])]
+    return "\n".join([*head, *reasons, "", *heading(answer.situation, verbose=shown.verbose), "", *lines])
 
 
 def as_markdown(answer: Verdict) -> str:
@@ -83,7 +83,7 @@ def as_csv(answer: Verdict) -> str:
     return tables.as_csv(list(found), [list(found.values())]).rstrip("\n")
 
 
-def _told(answer: Verdict) -> str:
+def told(answer: Verdict) -> str:
     """The verdict, and what a pair that verifies keeps."""
     if not answer.verified:
         return answer.word

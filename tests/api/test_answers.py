@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,8 @@ from hypothesis import strategies as st
 import d2rpick as d2
 from d2rpick.api.answer import written
 from d2rpick.report.keys import MEASURES
-from tests.command import BOX, DECK, ENERGY, GLSTAT, ROLLOVER, answer, run
+from d2rpick.report.plan import sentence as plan_sentence
+from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, answer, run
 from tests.sample_deck import DECK as SAMPLE_DECK
 
 TD = "0.0687534"
@@ -180,6 +182,47 @@ def test_a_frame_is_the_file_it_would_be() -> None:
         d2.suggest(d2.from_frame(pd.DataFrame({"time": [0, 2, 1.0], "internal_energy": [1.0, 2.0, 2.0]})), 1.0)
 
 
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda table: table["internal_energy"],
+        lambda table: table["internal_energy"].rename(None),
+        lambda table: table.rename_axis("cycle").set_index(pd.to_timedelta(table.index, unit="s")),
+        lambda table: table.reset_index().assign(time=lambda one: pd.to_timedelta(one["time"], unit="s")),
+        lambda table: table.reset_index(drop=False).set_index("time", drop=False),
+    ],
+)
+def test_the_time_of_a_frame_is_what_is_named_so_and_timedeltas_are_seconds(made: Callable[[Any], Any]) -> None:
+    table = pd.read_csv(ENERGY, index_col="time").head(300)
+    found = d2.from_frame(made(table)).to_frame()
+    assert found.index.to_numpy() == pytest.approx(table.index.to_numpy(), abs=1e-9)
+    assert found["internal_energy"].tolist() == table["internal_energy"].tolist()
+
+
+def test_an_index_is_the_time_where_its_name_is_given() -> None:
+    table = pd.read_csv(ENERGY, index_col="time").head(300).rename_axis("x")
+    assert d2.from_frame(table, time="x").to_frame().index.tolist() == table.index.tolist()
+
+
+@pytest.mark.parametrize("name", [None, "cycle", "internal_energy"])
+def test_numbers_of_rows_are_no_time(name: str | None) -> None:
+    table = pd.DataFrame({"internal_energy": [0.0, 4.0, 1.0], "box": [0.0, 4.0, 1.0]}).rename_axis(name)
+    named = "no name" if name is None else f"the name '{name}'"
+    with pytest.raises(ValueError, match=f"no time: its index has {named}, its columns are 'internal_energy', 'box'"):
+        d2.from_frame(table)
+    with pytest.raises(ValueError, match="frame has no time 'tau'"):
+        d2.from_frame(table, time="tau")
+
+
+def test_the_recommended_pair_is_no_better_pair() -> None:
+    chosen, bad = (d2.suggest(d2.read(ENERGY), **asked) for asked in ({"td_window": (0.06, 0.07)}, {"td": 0.064}))
+    assert chosen.better_pair is None
+    assert chosen.recommended is not None
+    assert bad.better_pair is not None
+    assert bad.better_pair.td == pytest.approx(chosen.recommended.td)
+    assert "no-better-td" not in [warning.code for warning in chosen.warnings]
+
+
 def test_an_open_file_is_read() -> None:
     with Path(ENERGY).open("rb") as file:
         same(d2.suggest(d2.read(file), 0.064).to_dict(), answer("suggest", "--td", "0.064", ENERGY))
@@ -256,8 +299,47 @@ def test_a_check_names_the_command_that_repeats_it(asked: dict[str, Any]) -> Non
     assert found.to_frame()["rule"].tolist() == kept
 
 
-def test_a_run_is_shown_by_its_files() -> None:
-    assert repr(d2.read(ENERGY)) == f"Run({ENERGY!r})"
+def test_a_run_is_shown_by_what_its_files_hold(tmp_path: Path) -> None:
+    assert repr(d2.read(ENERGY)) == f"Run({ENERGY!r}: csv, 1501 states, 0 to 0.15)"
+    assert repr(d2.read(MATSUM)) == f"Run({MATSUM!r}: matsum, 421 states, 0 to 0.42, 2 parts)"
+    damaged = tmp_path / "run.csv"
+    damaged.write_text("time,energy\n0,0\nx,1\n")
+    assert repr(d2.read(damaged)) == f"Run({str(damaged)!r}: csv)"
+    assert loose.read(damaged)._repr_html_() is None  # the notebook shows that instead
+
+
+def test_a_notebook_shows_a_sentence_a_small_table_and_the_picture() -> None:
+    run, energy = d2.read(MATSUM), d2.read(ENERGY)
+    chosen, plan, parts = d2.suggest(run, 0.37, parts=1), d2.plan(run, parts=1), d2.parts(run)
+    explored, verdict = d2.explore(energy, td_window=(0.06, 0.07), steps=30), d2.verify(energy, 0.01, 0.064)
+    study = d2.study([ENERGY] * 20 + ["<b>absent.csv"], 0.064)
+    answers: list[Any] = [chosen, plan, parts, explored, verdict, study]
+    for one in (run, *answers):
+        shown = one._repr_html_()
+        ET.fromstring(shown.replace("&nbsp;", " "))  # whole, with nothing of a file unescaped
+        assert ("<svg" in shown) == (one is not parts)
+        assert 0 < shown.count("<tr>") <= 13
+        assert len(repr(one)) < 250
+        assert "\n" not in repr(one)
+    assert repr(plan) == f"Plan({plan_sentence(plan)})"
+    assert plan_sentence(plan) in plan._repr_html_()
+    assert chosen.recommended is not None
+    assert f"tr = {chosen.recommended.tr:.6g}" in repr(chosen)
+    assert "... and 9 more" in study._repr_html_()
+    assert verdict.reasons[0] in verdict._repr_html_().replace("&gt;", ">")
+
+
+def test_a_table_that_no_energy_is_known_of_is_shown_without_a_picture(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    file.write_text("time,a,b\n0,0,1\n1,0,1\n")
+    shown = loose.read(file)._repr_html_()
+    assert "a, b" in shown
+    assert "<svg" not in shown
+
+
+def test_a_figure_shows_itself() -> None:
+    figure: Any = d2.plan(d2.read(MATSUM), parts=1).plot()
+    assert figure._repr_png_().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
@@ -272,14 +354,17 @@ def test_a_run_is_shown_by_its_files() -> None:
         ),
         (lambda: loose.suggest(d2.read(ENERGY), "0.064"), TypeError, "td is '0.064', a number was expected"),
         (lambda: loose.suggest(d2.read(ENERGY), td_window=(2, 1)), ValueError, "td_window is 2 to 1, which is empty"),
-        (lambda: loose.suggest(d2.read(ENERGY), 0.06, tolerence=1), TypeError, "there is no argument 'tolerence'"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, tolerence=1), TypeError, "'tolerence'; is 'tolerance' meant"),
+        (lambda: loose.suggest(d2.read(BOX), 0.06, part=1), TypeError, "no argument 'part'; is 'parts' meant"),
+        (lambda: loose.plan(d2.read(BOX), colour=1), TypeError, "no argument 'colour'; expected one of after, "),
+        (lambda: loose.suggest(pd.DataFrame({"t": [1.0]}), 0.06), TypeError, r"DataFrame; give .* d2rpick.from_frame"),
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, margin=-1), ValueError, "margin is -1, a number of at least 0"),
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, tolerance=None), TypeError, "tolerance is None"),
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, v0=6.0), ValueError, "oscillator and v0 go together"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[]), ValueError, "parts is empty"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[1.5]), TypeError, "parts holds 1.5"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=d2.read(BOX).parts[0]), TypeError, r"parts holds Part\(id=1,"),
-        (lambda: loose.suggest(ENERGY, 0.06), TypeError, "run is .*, what read"),
+        (lambda: loose.suggest(ENERGY, 0.06), TypeError, r"run is .*; give what d2rpick.read"),
         (lambda: loose.suggest(d2.read(ROLLOVER, energy="boxIE_J"), 0.3, parts=1), ValueError, "exclude each other"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, weights="a.toml"), ValueError, "`weights` needs `deck`"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, deck=3), TypeError, "deck is 3"),
@@ -300,7 +385,7 @@ def test_a_run_is_shown_by_its_files() -> None:
         (lambda: loose.study([ENERGY], 0.06, jobs=1.5), TypeError, "jobs is 1.5, a whole number was expected"),
         (lambda: loose.explore(d2.read(ENERGY), steps=2.5), TypeError, "steps is 2.5, a whole number was expected"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=1.5), TypeError, "parts is 1.5; a number, a title or several"),
-        (lambda: loose.check(DECK, history=ENERGY), TypeError, "history is .*, what read"),
+        (lambda: loose.check(DECK, history=ENERGY), TypeError, r"history is .*; give what d2rpick.read"),
         (lambda: loose.check(DECK, select=5), TypeError, "select is 5; ids of rules were expected"),
         (lambda: loose.suggest(d2.read(ENERGY), 9), d2.RangeError, "lies outside the record"),
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, parts=1), d2.D2RPickError, "a table has no parts"),
