@@ -69,6 +69,11 @@ def _files(args: Sequence[str]) -> frozenset[tuple[str, int, int, int]]:
     return frozenset(found)
 
 
+def unwrapped(text: str) -> str:
+    """A text in one line, however it was wrapped."""
+    return " ".join(text.split())
+
+
 @contextmanager
 def started(*args: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
     """Start the program in a session of its own; what is left of it after the block, or the time limit, is ended.

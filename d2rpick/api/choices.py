@@ -292,6 +292,14 @@ def verify(
     return judged(asked, *pair, switched, least)
 
 
+def check_pair(tr: float | None, td: float | None, switched: object) -> None:
+    """Refuse to judge no pair: without a switched run both times are needed."""
+    if not switched and (tr is None or td is None):
+        raise ArgumentError(
+            f"give the time of the switch as `{'tr' if tr is None else 'td'}`, or a finished run with it"
+        )
+
+
 def judged(
     asked: Asked,
     tr: float | None,
@@ -300,10 +308,7 @@ def judged(
     min_mean_energy: float = MIN_MEAN_ENERGY,
 ) -> Verdict:
     """Judge a pair, also by a finished switched run, of which its times are read where they are not given."""
-    if switched is None and (tr is None or td is None):
-        raise ArgumentError(
-            f"give the time of the switch as `{'tr' if tr is None else 'td'}`, or a finished run with it"
-        )
+    check_pair(tr, td, switched)
     other = switched and asked.reference.like(switched.files, asked.selection)
     if other and (tr is None or td is None):
         from d2rpick.choice.comparison import times_of

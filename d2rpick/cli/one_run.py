@@ -144,8 +144,9 @@ def verify(
 ) -> None:
     """Judge one pair of switch times against the HISTORY of a run without switching."""
     from d2rpick.api.asked import ask, open_run
-    from d2rpick.api.choices import judged
+    from d2rpick.api.choices import check_pair, judged
 
+    check_pair(tr, td, switched)
     output.check(cards)
     with opened(request, output) as (run, output):
         asked = ask(run, request, merge=cards.merge)

@@ -313,6 +313,7 @@ def opened(request: Request, output: Output, *inputs: str | None) -> Iterator[tu
     """
     from d2rpick.api.asked import open_run
 
+    request.selection()  # refuses what makes no sense together, before a file is opened
     with reading(request.history, quiet=output.quiet):
         run = open_run(request)
         weights = request.weights if isinstance(request.weights, str) else None

@@ -143,9 +143,11 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     ]
     graded = [(f"flight {row.number}", row.quality) for row in supported if row.quality]
     lines += [(name, quality.told) for name, quality in graded if quality.grade == "poor"]
-    if any(row.candidate and row.candidate.position_error_assumes for row in plan.rows):
+    assumed = [row for row in plan.rows if row.candidate and row.candidate.position_error_assumes]
+    if assumed:
         told = "; `deck` tells which do" if plan.settings.bodies is None else ""
-        lines.append(("place", f"out of place as listed if the parts become one rigid body{told}"))
+        listed = ", ".join(f"flight {row.number} by {_place(row)}" for row in assumed)
+        lines.append(("place", f"out of place at td if the parts become one rigid body: {listed}{told}"))
     if waiting or plan.done:
         what = "with those that are done and these" if plan.done else "with these windows"
         after = ", and plan the others from that run (--done)" if waiting else ""
@@ -177,7 +179,7 @@ def _place(row: Planned) -> str | None:
     if best is None or best.position_error is None:
         return None
     least = ">= " if best.position_error_is_lower_bound else ""
-    return f"{least}{best.position_error:.2g}{' if one body' if best.position_error_assumes else ''}"
+    return f"{least}{best.position_error:.2g}"
 
 
 _COLUMNS: Final[dict[str, Callable[[Planned], tables.Cell]]] = {

@@ -114,7 +114,7 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
     ("line", "parts"),
     [
         ("sugest --td 1 x", ["No such command 'sugest'", "Did you mean 'suggest'?", "d2rpick --help"]),
-        ("dance", ["No such command 'dance'", "info, plan, suggest"]),
+        ("dance", ["No such command 'dance'", "plan, suggest"]),
         ("suggest --tdd 1 x", ["--tdd", "Did you mean", "--td", "d2rpick suggest --help"]),
         ("verify --tolerence 1 x", ["--tolerence", "Did you mean", "--tolerance"]),
         ("suggest --td 1 --td-window 1 2 x", ["--td", "--td-window"]),
@@ -237,9 +237,9 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(
     for form in ("table", "value"):
         result = run("suggest", "--td", "0.5", *args, "-f", form, "input")
         assert result.exit_code == 1
-        assert [line.split(": ")[:2] for line in result.stderr.splitlines() if line.startswith("warning")] == [
-            ["warning", warning["code"]] for warning in found["warnings"]
-        ]
+        told = [line.split(": ")[1] for line in result.stderr.splitlines() if line.startswith("warning")]
+        in_table = {"no-candidate"} if form == "table" else {}  # the reason stands there
+        assert told == [warning["code"] for warning in found["warnings"] if warning["code"] not in in_table]
 
 
 def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(tmp_path: Path) -> None:
