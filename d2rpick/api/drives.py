@@ -14,14 +14,13 @@ from d2rpick.choice.cost import CostModel
 from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.deck import read_inventory
 from d2rpick.deck.driven import driven_deck
-from d2rpick.deck.inner_period import inner_period
 from d2rpick.histories.opening import open_run
 from d2rpick.running.drive import JOURNAL, Commands, Cost, Driven, Driver
 from d2rpick.running.engine import Solver, alone
 from d2rpick.running.journal import Journal
 from d2rpick.running.look import Looks
 from d2rpick.running.sequence import Limits, windows
-from d2rpick.running.wait import Wait, refuse_wait
+from d2rpick.running.wait import check_wait, wait_of_deck
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 
 # Of a second: where nothing vibrates so long without a force is flight, and so long before a contact td lies at least.
 _SHORTEST = 2e-3
-_EXACT = 0.9  # a period is known no better
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,10 +73,9 @@ class Driving:
         self.asked = asked
         self.deck = driven_deck(asked.deck, numbers("--part", asked.part) if asked.part else ())
         self.inventory = read_inventory(asked.deck)
-        period = inner_period(self.inventory)
-        known = period and Wait(period.least / 2, "deck", period.reason)
-        if known and asked.wait is not None and asked.wait < _EXACT * known.time:
-            refuse_wait(asked.wait, known, asked.deck)
+        known = wait_of_deck(self.inventory)
+        if asked.wait is not None:
+            check_wait(asked.wait, known, asked.deck)
         shortest = _SHORTEST * self.deck.second if self.deck.second else 0.0
         self.limits = Limits(self.deck.end, self.deck.interval, shortest, asked.margin)
         self.looks = Looks(self.deck.parts, self.inventory, asked.wait, known)
@@ -116,8 +113,8 @@ class Driving:
         names = [str(self.solver.history(number)) for number in range(1, last + 1)]
         return Drive(
             run=open_run(names), deck=self.deck, windows=tuple(windows(legs, self.limits)), costs=tuple(costs),
-            why=self.looks.why, saved=(self._by_model(costs), _by_time(costs, self.deck.end)), cautions=self.cautions,
-            command=tuple(command),
+            why=self.looks.why, saved=(self._by_model(costs), _by_time(costs, self.deck.end)),
+            cautions=(*self.cautions, *driver.out_of_place), command=tuple(command),
         )  # fmt: skip
 
     def _by_model(self, costs: Sequence[Cost]) -> float | None:

@@ -8,11 +8,11 @@ from d2rpick.base.errors import DeckError
 from d2rpick.deck.printing import EngineFile, engine_lines
 from d2rpick.deck.radioss_bodies import bodies_for
 from d2rpick.deck.radioss_deck import blocks, card_of, kept_off, keyword, numbers
-from d2rpick.deck.radioss_run import read_run, rigid_parts
+from d2rpick.deck.radioss_run import parts_off, read_run
 from d2rpick.deck.writing import copies, repeated, text_of, with_cards
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Collection, Mapping
 
     from d2rpick.deck.radioss_deck import Leg
     from d2rpick.deck.radioss_run import Run
@@ -79,7 +79,7 @@ def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
         found = "starter deck" if run.starter is None else "engine file"
         raise DeckError(f"{path}: the run has no {found}; its starter deck and an engine file were expected")
     leg = run.legs[0]
-    chosen = tuple(sorted(parts or _parts_off(run)))
+    chosen = tuple(sorted(parts)) or parts_off(run)
     if not chosen:
         raise DeckError(f"{path}: the engine file puts no rigid body off; name the parts to be switched with --part")
     bodies = bodies_for(path, chosen)
@@ -94,25 +94,9 @@ def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:
         if (words := keyword(block)) and words[0] not in _NOT_REPEATED
     )
     return DrivenDeck(
-        leg.name,
-        _end(run.legs[-1]),
-        chosen,
-        bodies.nodes,
-        others,
-        _interval(leg),
-        _second(run),
-        files,
-        further,
+        leg.name, _end(run.legs[-1]), chosen, bodies.nodes, others, _interval(leg), _second(run), files, further,
         bodies.notes,
-    )
-
-
-def _parts_off(run: Run) -> Iterator[int]:
-    """Parts of the bodies that the only leg puts off."""
-    assert run.starter
-    off = kept_off(run.legs[:1])
-    groups = {body.node.value: body.group for body in run.starter.bodies if body.node.value in off}
-    yield from set().union(*rigid_parts(run.starter, groups).values()) if groups else ()
+    )  # fmt: skip
 
 
 def _end(leg: Leg) -> float:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Value
-from d2rpick.deck.radioss_deck import Leg, Starter, blocks, card_of, keyword, read_legs
+from d2rpick.deck.radioss_deck import Leg, Starter, blocks, card_of, kept_off, keyword, read_legs
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows, follow
@@ -301,6 +301,14 @@ def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[in
         for node, parts in parts_within(starter, of_nodes).items():
             named[node] |= parts
     return named
+
+
+def parts_off(run: Run) -> tuple[int, ...]:
+    """Parts of the bodies that the first leg puts off, ascending; none without a starter deck."""
+    nodes, bodies = kept_off(run.legs[:1]), run.starter.bodies if run.starter else ()
+    groups = {body.node.value: body.group for body in bodies if body.node.value in nodes}
+    held = rigid_parts(run.starter, groups) if run.starter and groups else {}
+    return tuple(sorted(set().union(*held.values())))
 
 
 class LeftRigid(NamedTuple):

@@ -72,6 +72,7 @@ def _outlook(found: Driven) -> list[tuple[str, str]]:
     words = zip(found.saved, ("by the cost model", "by the processor time of its legs"), strict=True)
     saved = [f"{value:.0%} {by}" for value, by in words if value is not None]
     lines = [("saves", f"{', '.join(saved)}, against a deformable run")] if saved else []
+    lines += [("place", one.message) for one in found.cautions if one.code == "out-of-place"]
     return [*lines, *([("wait", found.why)] if found.why else []), ("keeps", _NOT_KNOWN)]
 
 

@@ -9,19 +9,20 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.files import write_whole
+from d2rpick.choice.warnings import Caution
 from d2rpick.deck.driven import RESTARTS
 from d2rpick.running import engine
-from d2rpick.running.sequence import LOAD, RIGID_KINDS, SEARCH, Leg, Order, Seen, control, next_order
+from d2rpick.running.sequence import LOAD, RIGID, RIGID_KINDS, SEARCH, Leg, Order, Seen, control, next_order, window_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from d2rpick.choice.warnings import Caution
     from d2rpick.deck.driven import DrivenDeck
     from d2rpick.histories.run import Run
     from d2rpick.running.engine import Left, Solver
     from d2rpick.running.journal import Journal
+    from d2rpick.running.look import Looks
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
@@ -90,7 +91,7 @@ class Driver:
         journal: Journal,
         commands: Commands,
         limits: Limits,
-        look: Callable[[Order, Sequence[Path], float], Seen | None],
+        look: Looks,
         told: Callable[[str], None],
     ) -> None:
         self.deck, self.solver, self.journal, self.commands = deck, solver, journal, commands
@@ -112,6 +113,12 @@ class Driver:
             Cost(one["order"][0], one["seen"][0] - one["order"][2], one["cycles"], one["cpu"])
             for one in self.journal.all("ended")
         ]
+
+    @property
+    def out_of_place(self) -> tuple[Caution, ...]:
+        """What was said of parts that still swung as they became rigid."""
+        said = {one["order"][1]: (one["order"][2], one["place"]) for one in self.journal.all("started")}
+        return tuple(Caution("out-of-place", f"tr = {tr:.6g}: {place}") for tr, place in said.values() if place)
 
     def prepare(self) -> None:
         """Copy the deck into the folder and run the starter, unless that is done."""
@@ -176,10 +183,21 @@ class Driver:
         self.solver.clear(number)
         text = self.deck.leg(number, order.until, restart, cap and min(self.deck.interval, cap), self._ring(order))
         write_whole(self.solver.file(number, ".rad"), text)
-        self.journal.add("started", order=order)
+        place = self._place(order)
+        self.journal.add("started", order=order, place=place)
+        if place:
+            self.told(f"warning: out-of-place: {place}")
         self.solver.start(self.commands.words("engine", self.solver.file(number, ".rad").name), number)
         self.solver.keep_two(number)
         self.told(f"leg {number}: {order.kind} from {order.start:.6g}")
+
+    def _place(self, order: Order) -> str:
+        """Say so where parts swing too much to become rigid in a leg whose end is known."""
+        if order.kind != RIGID:
+            return ""
+        legs = self.legs
+        before = next(leg.order for leg in reversed(legs) if leg.order.number == order.number - 1)
+        return self.look.swing(self._histories(before, legs), order, window_of(legs, self.limits).free)
 
     def _step(self) -> float:
         """Smallest mean step of a deformable leg, or the interval of the history where none is known yet [time]."""
@@ -223,7 +241,10 @@ class Driver:
     def _seen(self, order: Order) -> Seen | None:
         legs = self.legs
         known = max((leg.seen.wait for leg in legs if not leg.seen.idle), default=0.0)
-        return self.look(order, [self.solver.history(number) for number in _segment(order, legs)], known)
+        return self.look(order, self._histories(order, legs), known)
+
+    def _histories(self, order: Order, legs: Sequence[Leg]) -> list[Path]:
+        return [self.solver.history(number) for number in _segment(order, legs)]
 
     @contextmanager
     def _stopping(self, order: Order) -> Iterator[None]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.flight.window import FEWEST
 from d2rpick.running.evidence import contact_after, highest_energy, quiet_times, rigid_times
+from d2rpick.running.swing import swing_in
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -82,7 +83,7 @@ def _switch(history: History, one: Quiet) -> Iterator[Event]:
         if one.end is not None and now >= one.end:
             return
         if energy >= low + _HIGH * (high - low):
-            yield Event("switch", now, now, f"switch now: {where}", one.wait, tr=now)
+            yield Event("switch", now, now, f"switch now: {where}{_swings(history, one, now)}", one.wait, tr=now)
             return
         if now == one.seen:
             yield Event(
@@ -91,4 +92,11 @@ def _switch(history: History, one: Quiet) -> Iterator[Event]:
     if history.time[-1] > last and not (one.end is not None and one.end <= last):
         tr, now = highest_energy(history, one.seen, last), float(history.between(last, history.time[-1])[0][0])
         told = f"the internal energy was highest at {tr:.6g}: a restart from before can switch there"
+        told += _swings(history, one, tr)
         yield Event("switch", tr, now, told, one.wait, tr=tr)
+
+
+def _swings(history: History, one: Quiet, tr: float) -> str:
+    """Say so where parts swing by more than they may in a flight that has lasted until now."""
+    swing = swing_in(history, one.start, tr) if one.parts else None
+    return f"; {swing.told}" if swing and swing.flight > tr - one.start else ""

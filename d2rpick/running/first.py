@@ -17,8 +17,8 @@ from d2rpick.deck.printed_card import PHYSICS, PrintedCard, Printing, check_ids,
 from d2rpick.deck.printing import Waiting, capped, header, listed, off, to_deformable, to_rigid
 from d2rpick.deck.radioss_bodies import bodies_for
 from d2rpick.deck.radioss_deck import kept_off, number_of
-from d2rpick.deck.radioss_run import read_run, rigid_parts
-from d2rpick.running.wait import Wait, refuse_wait
+from d2rpick.deck.radioss_run import parts_off, read_run
+from d2rpick.running.wait import Wait, check_wait, wait_of_deck
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_deck import Starter
     from d2rpick.deck.radioss_run import Run
 
-_EXACT: Final = 0.9  # a period is known no better
 # The starter of OpenRadioss looks for /RBODY/OFF in so many engine files.  A leg behind the end of the run is one step.
 _MOST_LEGS: Final = 9
 # Largest step while rigid, of the wait: a contact is seen at most so late.
@@ -90,7 +89,7 @@ def first_card(path: str, parts: Collection[int] = (), wait: float | None = None
     inventory = read_inventory(path)
     chosen = tuple(parts)
     if inventory.solver == "radioss":
-        chosen = chosen or tuple(_kept_off(read_run(path)))
+        chosen = chosen or parts_off(read_run(path))
     if not chosen:
         raise ArgumentError(f"no parts were given, and {path} keeps no body off; name them with `parts`")
     _refuse_held(path, inventory, chosen)
@@ -101,11 +100,10 @@ def first_card(path: str, parts: Collection[int] = (), wait: float | None = None
 
 def _wait(path: str, inventory: Inventory, given: float | None) -> Wait:
     """Give the wait and its reason."""
-    known = inner_period(inventory)
     if given is not None:
-        if known and given < _EXACT * known.least / 2:
-            refuse_wait(given, Wait(known.least / 2, "deck", known.reason), path)
+        check_wait(given, wait_of_deck(inventory), path)
         return Wait(given, "given", "as given")
+    known = inner_period(inventory)
     if known is None:
         raise ArgumentError(
             f"`wait` is not given, and {path} does not tell it: no masses on springs that are followed; give the time"
@@ -124,16 +122,6 @@ def _refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> Non
 
 
 # Radioss.
-
-
-def _kept_off(run: Run) -> Iterator[int]:
-    """Parts of the bodies that the only leg puts off."""
-    nodes = kept_off(run.legs)
-    groups = (
-        {body.node.value: body.group for body in run.starter.bodies if body.node.value in nodes} if run.starter else {}
-    )
-    held = rigid_parts(run.starter, groups) if run.starter and groups else {}
-    yield from sorted(frozenset[int]().union(*held.values()))
 
 
 def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, after: float | None) -> First:

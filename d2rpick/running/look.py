@@ -11,6 +11,7 @@ from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.running.evidence import contact_after, highest_energy, quiet_times
 from d2rpick.running.sequence import LOAD, Seen
+from d2rpick.running.swing import swing_in
 from d2rpick.running.wait import InnerMotion, Wait
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from d2rpick.deck.model import Inventory
+    from d2rpick.histories.history import History
     from d2rpick.running.sequence import Order
 
 # A leg is told to stop at the end of the wait when so much of it is over.
@@ -54,8 +56,7 @@ class Looks:
         state yet.  A wait that was given is kept to where the record shows a longer one: ``why`` says so.
         """
         try:
-            run = in_deck(open_run([str(path) for path in histories]), self._inventory)
-            history = run.history(self._selection)
+            history = self._history(histories)
         except (FormatError, HistoryError, FileNotFoundError):
             return None  # the head is being written
         if not history.time.size or history.time[-1] < order.start:
@@ -77,6 +78,14 @@ class Looks:
         longer = asked is not None and asked.time > wait.time
         self.why = f"{wait.reason}, but {asked.reason}" if asked and longer else wait.reason
         return Seen(now, free, wait.time, idle=at_rest)
+
+    def swing(self, histories: Sequence[Path], order: Order, free: float) -> str:
+        """Say so where parts swing too much to be rigid in the leg that is ordered, of a flight since ``free``."""
+        found = swing_in(self._history(histories), free, order.start)
+        return found.told if found and found.flight > order.until - free else ""
+
+    def _history(self, histories: Sequence[Path]) -> History:
+        return in_deck(open_run([str(path) for path in histories]), self._inventory).history(self._selection)
 
     def _floor(self, known: float) -> Wait | None:
         """Give the longest wait that is known from the deck, or from the record of flights before."""

@@ -131,8 +131,8 @@ class InnerMotion:
         known = self.longest(now)
         if self._given is None:
             return None if self._swings_on(now) else known
-        if known and self._given < _EXACT * known.time and now - start >= self._given and not at_rest:
-            refuse_wait(self._given, known, ", ".join(self._history.source))
+        if now - start >= self._given and not at_rest:
+            check_wait(self._given, known, ", ".join(self._history.source))
         return Wait(self._given, "given", "as given")
 
     def longest(self, now: float) -> Wait | None:
@@ -186,12 +186,13 @@ def wait_of_deck(inventory: Inventory) -> Wait | None:
     return found and Wait(found.least / 2, "deck", f"half of {found.least:.3g}, the least period of {found.reason}")
 
 
-def refuse_wait(given: float, known: Wait, name: str) -> None:
-    """RangeError: a wait that was given is below half of a known period."""
-    raise RangeError(
-        f"{name}: `wait` {given:g} is below {known.time:.3g}, half of a period that is known: {known.reason}; "
-        "a gap in the load would pass for flight"
-    )
+def check_wait(given: float, known: Wait | None, name: str) -> None:
+    """RangeError where a wait that was given is below half of a known period."""
+    if known and given < _EXACT * known.time:
+        raise RangeError(
+            f"{name}: `wait` {given:g} is below {known.time:.3g}, half of a period that is known: {known.reason}; "
+            "a gap in the load would pass for flight"
+        )
 
 
 def _of_parts(history: History) -> Iterator[_Motion]:

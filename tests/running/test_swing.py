@@ -1,0 +1,54 @@
+"""What is said of parts that still swing as a body becomes rigid: by the flight so far, without td."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from d2rpick.deck import read_inventory
+from d2rpick.flight.flight import Flight
+from d2rpick.flight.position_error import drift_in_flight
+from d2rpick.histories.names import Selection
+from d2rpick.histories.opening import open_run
+from d2rpick.running.look import Looks
+from d2rpick.running.sequence import RIGID, Order
+from d2rpick.running.swing import swing_in
+from tests.command import ROOT, run
+from tests.records import known
+
+CAR = ROOT / "tests" / "data" / "carT01.gz"
+FREE, TD = 0.0385, 0.1464
+
+
+@pytest.mark.parametrize("tr", [0.0605, 0.0676, 0.075, 0.09])
+def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> None:
+    history = open_run([str(CAR)]).history(Selection())
+    (momenta,) = (one for one in history.momenta if one.parts is not None)
+    moving = tuple(known(momenta.parts)[i] for i in momenta.moving)
+    whole = known(drift_in_flight(history, Flight(FREE, TD, "momentum", moving)))
+    error = float(whole.errors(np.array([tr]), float(whole.time[-1]))[0])
+    found = known(swing_in(history, FREE, tr))
+    assert found.name == "engine"
+    assert error <= found.error <= 1.3 * error
+    # a flight of that length has a path of a hundred times the error, at the speed so far
+    mean = float(np.interp(tr, whole.time, whole.path)) / (tr - float(whole.time[0]))
+    assert found.flight * mean == pytest.approx(100 * found.error, rel=0.05)
+
+
+def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:
+    history = open_run([str(ROOT / "sample_data" / "energy.csv")]).history(Selection())
+    assert swing_in(history, 0.01, 0.03) is None
+
+
+def test_it_is_said_before_the_switch_where_the_flight_is_too_short_for_it() -> None:
+    parts = [part.id for part in open_run([str(CAR)]).parts]
+    looks = Looks(parts, read_inventory(str(ROOT / "sample_data" / "flying_box" / "BOX_0000.rad")))
+    short, long = (looks.swing([CAR], Order(RIGID, 4, 0.0676, td), FREE) for td in (0.12, 0.25))
+    assert "engine still swings against the others" in short
+    assert not long
+
+
+def test_an_advised_switch_says_it() -> None:
+    told = run("follow", "--once", "--exit-zero", "--wait", "0.024", str(CAR)).stdout
+    (switch,) = (line for line in told.splitlines() if "  switch  " in line)
+    assert "engine still swings" in switch
