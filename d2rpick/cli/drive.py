@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.request import POSITIVE
+from d2rpick.api.request import POSITIVE, Option
 from d2rpick.cli import options
 from d2rpick.cli.output import tell
 from d2rpick.cli.progress import telling
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.cli.output import Output
     from d2rpick.running.drive import Driver
 
+CMD = ("text", "CMD")
 EXAMPLES = """\b
 Examples:
   d2rpick drive sample_data/flying_box/BOX_0000.rad --wait 0.002 -o driven --dry-run \\
@@ -33,38 +34,25 @@ Examples:
 @click.option(
     "-o", "folder", metavar="RUNDIR", required=True, type=click_type("file"), help="Folder of the run; made if missing."
 )
-@click.option(
-    "--part",
-    multiple=True,
-    metavar="IDS",
-    help="Parts to switch.  [default: those of the bodies that the deck puts off]",
+@options.option(
+    "part", Option("Parts to switch.  [default: those of the bodies that the deck puts off]", "text", "IDS", many=True)
 )
-@click.option(
-    "--wait",
-    type=click_type(POSITIVE),
-    metavar="T",
-    help="Time without force that counts as flight.  [default: half of the longest inner period known so far]",
+@options.option(
+    "wait",
+    Option("Time without force that counts as flight.  [default: half of the longest inner period known so far]",
+           POSITIVE, "T"),
+)  # fmt: skip
+@options.option(
+    "margin", Option("From td to the contact.  [default: 2 ms, or 3% of the flight if that is more]", POSITIVE, "T")
 )
-@click.option(
-    "--margin",
-    type=click_type(POSITIVE),
-    metavar="T",
-    help="From td to the contact.  [default: 2 ms, or 3% of the flight if that is more]",
+@options.option(
+    "starter", Option("Command that runs the starter on {deck}.  [default: that of OPENRADIOSS_PATH]", *CMD)
 )
+@options.option("engine", Option("Command that runs the engine on {deck}.  [default: that of OPENRADIOSS_PATH]", *CMD))
 @click.option(
-    "--starter", metavar="CMD", help="Command that runs the starter on {deck}.  [default: that of OPENRADIOSS_PATH]"
-)
-@click.option(
-    "--engine", metavar="CMD", help="Command that runs the engine on {deck}.  [default: that of OPENRADIOSS_PATH]"
-)
-@click.option(
-    "--threads",
-    type=click.IntRange(min=1),
-    default=1,
-    show_default=True,
-    metavar="N",
+    "--threads", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
     help="Threads of the solver; {threads} in a command.",
-)
+)  # fmt: skip
 @click.option("--resume", is_flag=True, help="Go on with a run that has begun in RUNDIR.")
 @click.option("--dry-run", is_flag=True, help="Print what would be started, and start nothing.")
 @options.takes(
