@@ -123,7 +123,8 @@ class Candidates(Sequence[Candidate]):
         vibration, still = situation.vibration, situation.at_rest
         tr, measured = moments.tr, np.fromiter((None if still else one for one in known), object, len(known))
         energy = vibration.whole.energies(tr)
-        level_error = measures.level_error(energy, situation.energy_td)
+        # beside nothing that vibrates the ratio of two rests of round-off is no error
+        level_error = np.zeros(tr.shape) if still else measures.level_error(energy, situation.energy_td)
         return cls(
             situation=situation,
             moments=moments,
@@ -215,7 +216,7 @@ class Candidates(Sequence[Candidate]):
             tr=tr,
             kind=found.kind,
             energy=energy,
-            energy_ratio=energy / situation.energy_td if situation.energy_td > 0 else None,
+            energy_ratio=energy / situation.energy_td if situation.energy_td > 0 and not situation.at_rest else None,
             level_error=None if np.isnan(level) else level,
             rising=found.rising,
             rigid_time=td - tr,

@@ -6,7 +6,7 @@ import os
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
-from statistics import median
+from statistics import median, median_high
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -46,6 +46,8 @@ NAMED: Final = 3
 _ROUNDED: Final = 0.001
 # Cautions about single runs that a row says otherwise, or that are about what a study does not answer.
 _NOT_REPEATED = ("no-candidate",)
+# A record that ends before this share of the time that most others last to was cut: variants of a model end together.
+_WHOLE: Final = 0.99
 # Stretches of a curve that is drawn, each with its lowest and highest energy: twice as many as an eye tells apart.
 _STRETCHES = 200
 
@@ -81,8 +83,8 @@ class StudyRow:
     is too short to choose; "failed", its process died; "internal-error", the program failed on it.  ``message`` says
     why it is not "ok"; ``warnings`` are codes.  ``td`` is that of the run; ``acceptable`` are its windows of
     acceptable tr, shape (n, 2), ``alike`` those in which the error is at most 0.05 above that of its tr, ``profile``
-    the errors, shape (2, m).  ``files`` is what was read; ``curve`` an outline of the energy, shape (2, k), where one
-    was asked for.
+    the errors, shape (2, m).  ``files`` is what was read, up to ``record_end``; ``curve`` an outline of the energy,
+    shape (2, k), where one was asked for.
     """
 
     source: str
@@ -97,6 +99,7 @@ class StudyRow:
     time_unit: str = ""
     warnings: tuple[str, ...] = ()
     td: float | None = None
+    record_end: float | None = None
     acceptable: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     alike: Samples = field(default_factory=lambda: np.zeros((0, 2)))
     profile: Samples | None = None
@@ -187,17 +190,18 @@ def ask(question: Question, source: str) -> StudyRow:
         raise D2RPickError(
             f"d2rpick {question.tool_version} asks d2rpick {__version__}; install the same version everywhere"
         )
-    files = stamps(source)
+    files, end = stamps(source), None
     try:
         reference = read([source], question.selection, question.input_format)
+        end = float(reference.history.time[-1])
         answer = suggest_of(reference, question.td, question.settings, with_better=False)
     except (D2RPickError, OSError) as error:
         status = OUT_OF_RANGE if isinstance(error, RangeError) else UNREADABLE
         text = f"{source}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)
-        return StudyRow(source, status, text, files=files)
+        return StudyRow(source, status, text, files=files, record_end=end)
     time, energy = reference.history.time, reference.history.energy
     curve = outline(time, energy, _STRETCHES) if question.curve else None
-    return replace(row_of(source, answer), files=files, curve=curve)
+    return replace(row_of(source, answer), files=files, curve=curve, record_end=end)
 
 
 def row_of(source: str, answer: Suggestion) -> StudyRow:
@@ -250,6 +254,13 @@ def summarise(td: float | tuple[float, float], rows: Sequence[StudyRow]) -> Stud
     return Study(one, window, tuple(rows), spread, agree, common, tuple(_cautions(rows, common)))
 
 
+def cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
+    """Give the runs that were cut: their files end within a state, or their record before that of most runs."""
+    read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
+    whole = median_high(end for _, end in read_to) if read_to else 0.0
+    return [row for row, end in read_to if end < _WHOLE * whole or "truncated-input" in row.warnings]
+
+
 def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     """What to be aware of: runs left out, where the others differ in kind, and what was said of single ones."""
     judged = [row for row in rows if row.judged]
@@ -257,6 +268,8 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     if left and judged:
         found = f"{len(left)} of {runs_of(len(rows))} could not be judged"
         yield Caution("runs-left-out", f"{found} and are left out: {listing(left, most=NAMED)}")
+    if cut := [f"{row.source} (at {row.record_end:g})" for row in cut_runs(rows)]:
+        yield Caution("cut-runs", f"{len(cut)} of {runs_of(len(rows))} were cut: {listing(cut, most=NAMED)}")
     if common.keeps_tolerance is False:
         found = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
         yield Caution("timing-tolerance", f"{found}: the error of a run grows by more than 0.05")
@@ -277,10 +290,11 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
 
 
 def common_tr(rows: Sequence[StudyRow]) -> Common:
-    """Choose one tr for all runs that were judged: the earliest that keeps the timing tolerance of every run.
+    """Choose one tr for all runs that were judged: their own where they agree, else the earliest that suits all.
 
-    Where none does, the earliest of those acceptable in all runs at which the run that loses most by it loses hardly
-    more than it must.  It has few digits, for at most a thousandth of the rigid time.
+    That keeps the timing tolerance of every run.  Where none does, the earliest of those acceptable in all runs at
+    which the run that loses most by it loses hardly more than it must.  Unless the runs agree it has few digits, for at
+    most a thousandth of the rigid time.
     """
     judged = [row for row in rows if row.judged]
     if not judged:
@@ -291,10 +305,23 @@ def common_tr(rows: Sequence[StudyRow]) -> Common:
     keeping = common_windows([row.alike for row in judged])
     low, high = keeping[0] if keeping.size else _least_loss(judged, shared)
     td = min(row.td for row in judged if row.td is not None)
-    tr = fewest_digits(low, min(high, low + _ROUNDED * (td - low)))
+    tr = _agreed(judged, keeping)
+    if tr is None:
+        tr = fewest_digits(low, min(high, low + _ROUNDED * (td - low)))
     (window,) = shared[(shared[:, 0] <= tr) & (tr <= shared[:, 1])].tolist()
     errors = tuple(None if row.profile is None else error_at(row.profile, tr) for row in rows)
     return Common(tr, tuple(window), None, bool(keeping.size), errors)
+
+
+def _agreed(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
+    """Give the tr of runs that agree, the middle one where they differ at all; None where they do not agree."""
+    known = [row.tr for row in judged if row.tr is not None]
+    low = max((row.tr_low for row in judged if row.tr_low is not None), default=np.inf)
+    high = min((row.tr_high for row in judged if row.tr_high is not None), default=-np.inf)
+    if len(known) < len(judged) or low > high:
+        return None
+    tr = float(np.clip(median(known), low, high))
+    return tr if _holds(keeping, tr) else None
 
 
 def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, float]:

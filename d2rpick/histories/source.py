@@ -137,7 +137,9 @@ def _databases(folder: Path) -> list[str]:
     matches = {file: re.fullmatch(_DATABASE, file.name) for file in sorted(folder.iterdir()) if file.is_file()}
     found = {file: match["root"] for file, match in matches.items() if match}
     if not found:
-        raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; give the file")
+        inner = any(re.fullmatch(_DATABASE, file.name) for file in folder.glob("*/*") if file.is_file())
+        cure = f"its folders are runs: give one, or all to `study` as '{folder}/*'" if inner else "give the file"
+        raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; {cure}")
     runs = sorted({"one of LS-DYNA" if root is None else f"{root}T01" for root in found.values()})
     if len(runs) > 1:
         raise FormatError(

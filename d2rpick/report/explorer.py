@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from statistics import median
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from d2rpick.histories.samples import outline
 from d2rpick.report.html import Markup, join, resource, tag
 from d2rpick.report.suggestion import acceptable
 from d2rpick.report.tables import measure, shell_line, short
-from d2rpick.report.view import locked_in, response, scale_of, view_of
+from d2rpick.report.view import locked_in, response, scale_in, view_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -73,7 +72,7 @@ def explorer(shown: Explorer) -> Markup:
             *_columns(flights, any("windows" in flight["texts"] for flight in flights)),
             class_="panels",
         ),
-        tag("h3", "To repeat this"),
+        tag("h3", "The command for this td"),
         tag("pre", class_="wrap", data_value="command", tabindex="0"),
     )
     found = {"flight": 0, "flights": flights, "command": [f"{before} ", f" {behind}"]}
@@ -158,7 +157,7 @@ def _flight(found: TradeOff) -> dict[str, Any]:
     first = found.asked or found.recommended or found.start or found.offers[-1]
     seen = view_of(situation, found.offers[-1].td)
     levels = [one.energy_td for one in found.offers]
-    scale = scale_of(min(seen.low, *levels), max(seen.high, *levels), median(levels))
+    scale = scale_in(situation, seen, levels)
     whole = outline(history.time, history.energy, _OVERVIEW)
     inner = history.between(seen.start, seen.end)
     time, energy = outline(*inner, stretches=_STRETCHES)

@@ -28,7 +28,7 @@ from d2rpick.report.figures import (
     with_unit,
 )
 from d2rpick.report.situation import energy_name
-from d2rpick.report.view import merged, replayed_motion, scale_of, view_of
+from d2rpick.report.view import merged, replayed_motion, scale_in, scale_of, view_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -104,9 +104,7 @@ def _draw(
 
 def _show(axes: Axes, situation: Situation, seen: View) -> None:
     """Show the flight; the level belongs to it, also where td lies beyond."""
-    level = situation.energy_td
-    scale = scale_of(min(seen.low, level), max(seen.high, level), level)
-    show_span(axes, (seen.start, seen.end), scale, seen.above)
+    show_span(axes, (seen.start, seen.end), scale_in(situation, seen, [situation.energy_td]), seen.above)
 
 
 def _draw_energy(
@@ -213,6 +211,8 @@ def draw_run(history: History, flights: Sequence[Times], windows: Sequence[Times
 
 # Of the figure in a file, and of one of its axes on a page [inch].
 _TRADE_HEIGHT, _TRADE_PANEL = 7.0, 1.9
+# Room beside the first and last td, as a share of the axes: lines and marks there are seen whole.
+_AT_EDGE: Final = 0.02
 _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
 
 
@@ -238,6 +238,7 @@ def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
             if one:
                 axes.axvline(one.td, color=colour, linewidth=1, linestyle="--", label=name)
         finish(axes, legend=False)
+        axes.margins(x=_AT_EDGE)
     if page:
         arrange(figure, panels, _TRADE_PANEL)
     else:
@@ -362,6 +363,8 @@ def _show_runs(axes: Axes, answer: Study, drawn: Sequence[StudyRow]) -> None:
     # the lowest level stays in sight beside the middle one
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
     scale = scale_of(float(inner.min()), float(inner.max()), level)
+    if drawn and all("at-rest" in row.warnings for row in drawn):
+        scale = scale_of(0.0, max(float(one[1].max()) for one in curves), 0.0)
     show_span(axes, span, scale, [("highest run", float(seen.max()))])
 
 

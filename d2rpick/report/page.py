@@ -135,7 +135,8 @@ def evidence(situation: Situation, health: Health | None, record: PageContext) -
 
 def method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
     """Tell by what method an answer was found, and how to repeat it."""
-    yield section("Method and limits", resource("method.html"))
+    folded = tag("details", tag("summary", tag("h2", "Method and limits")), resource("method.html"))
+    yield tag("section", folded)
     yield repeated(command, stdin)
 
 

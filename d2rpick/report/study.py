@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.study import runs_of
+from d2rpick.choice.study import cut_runs, runs_of
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe, one_of, row
@@ -35,6 +35,7 @@ PLAIN: Final = row(
     Field("warnings", "texts"),
     Field("time_unit", "text"),
     Field("td", "number?", "when this run is switched back"),
+    Field("record_end", "number?", "last time of its record"),
 )  # fmt: skip
 _ERROR: Final = Field(
     "common_error", "number?",
@@ -44,7 +45,7 @@ _ERROR: Final = Field(
 )  # fmt: skip
 # A run in JSON, and a row of the csv; of a run and its error at the common tr.
 RUN: Final = row(*PLAIN.of_part(lambda one: one[0]), _ERROR, **_JUDGED)
-_RUN: Final = row(*RUN.fields, name="run", later=("common_error",), **_JUDGED)
+_RUN: Final = row(*RUN.fields, name="run", later=("common_error", "record_end"), **_JUDGED)
 _SHARED: Final = row(
     keys.WARNINGS,
     Field("td", "number?", "null where each run has its own"),
@@ -53,8 +54,8 @@ _SHARED: Final = row(
           lambda answer: answer.spread or dict.fromkeys(("min", "median", "max"))),
     Field("agree", "flag?", "Whether the intervals tr_low to tr_high of these runs have a time in common."),
     Field("common_tr", "number?",
-          "The earliest tr that is acceptable in every run of status ok or none and within the timing tolerance of "
-          "each, where there is one.", lambda answer: answer.common.tr),
+          "The tr of all runs where they agree, else the earliest that is acceptable in every run of status ok or none "
+          "and within the timing tolerance of each, where there is one.", lambda answer: answer.common.tr),
     Field("common_window", "span?", "First and last tr around it that are.", lambda answer: answer.common.window),
     Field("common_reason", "text?", "Why there is no common_tr.", lambda answer: answer.common.reason),
     Field("common_keeps_timing_tolerance", "flag?",
@@ -78,7 +79,7 @@ _LINE: Final = row(
     Field("asked", "text", "Stands for the options and the version."),
     Field("curve", _CURVE, "Times and energies of an outline of the record, for a figure."),
     Field("profile", maybe(_CURVE), "Times and errors of acceptable tr, straight lines between them."),
-    name="line", later=("common_error", "curve"), **_JUDGED,
+    name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
@@ -112,6 +113,7 @@ def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
 
 def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
     """Give names of columns and cells of the runs."""
+    cut = {row.source: f"cut at {row.record_end:g}" for row in cut_runs(answer.rows)}
     columns: dict[str, Callable[[tuple[StudyRow, float | None]], tables.Cell]] = {
         "run": lambda one: one[0].source,
         "tr": lambda one: one[0].tr,
@@ -122,9 +124,13 @@ def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
         "at common": lambda one: tables.measure(one[1]),
         "basis": lambda one: one[0].basis,
         "status": lambda one: one[0].status,
-        "message": lambda one: one[0].message or ", ".join(one[0].warnings),
+        "message": lambda one: "; ".join(filter(None, (cut.get(one[0].source), _said(one[0])))),
     }
     return tables.filled(columns, with_errors(answer))
+
+
+def _said(row: StudyRow) -> str:
+    return row.message or ", ".join(code for code in row.warnings if code != "truncated-input")
 
 
 def outcome(answer: Study) -> list[tuple[str, str]]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from d2rpick.flight.internal_energy import round_off
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import Replay, State, from_mode
 
@@ -80,6 +82,13 @@ def scale_of(low: float, high: float, level: float) -> Scale:
         return Scale(max(low, level / BELOW_LEVEL), high * LOGARITHMIC**_ROOM, logarithmic=True)
     room = _ROOM * (high - low or abs(high) or 1.0)
     return Scale(low - room, high + room, logarithmic=False)
+
+
+def scale_in(situation: Situation, seen: View, levels: Sequence[float]) -> Scale:
+    """Give the scale for a flight and its levels; where nothing vibrates, beside what the whole run has [energy]."""
+    if situation.at_rest:
+        return scale_of(0.0, max(float(situation.history.energy.max()), round_off(situation.history)), 0.0)
+    return scale_of(min(seen.low, *levels), max(seen.high, *levels), median(levels))
 
 
 def view_of(situation: Situation, *times: float) -> View:

@@ -17,6 +17,7 @@ from d2rpick.choice.study import (
     Question,
     StudyRow,
     ask,
+    cut_runs,
     failed,
     fewest_digits,
     find_runs,
@@ -27,7 +28,7 @@ from d2rpick.choice.study import (
 from d2rpick.choice.verify import verify
 from d2rpick.histories.opening import Selection
 from tests import variants
-from tests.command import BOX
+from tests.command import BOX, GLSTAT
 from tests.computed import stored
 from tests.energies import sure
 from tests.reading import read_history
@@ -126,10 +127,31 @@ def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(tmp_path: Pa
     one, two = summarise(variants.TD, [found]), summarise(variants.TD, [found, found])
     assert one.agree is two.agree is True
     assert one.common._replace(errors=2 * one.common.errors) == two.common
-    assert one.common.tr is not None
-    assert found.tr is not None
-    assert one.common.tr <= found.tr
-    assert one.common.tr == pytest.approx(found.tr, abs=1e-3)
+    assert one.common.tr == found.tr
+    assert one.common.errors == (pytest.approx(found.residual, abs=1e-3),)
+
+
+@given(st.lists(st.floats(1.95, 2.05), min_size=1, max_size=7))
+def test_runs_that_agree_have_their_own_tr_in_common(times: list[float]) -> None:
+    """Times of which none differs from another by more than it may be off."""
+    rows = [row(str(i), (1, 3), tr=tr) for i, tr in enumerate(times)]
+    found = summarise(10.0, rows).common
+    assert found.tr == pytest.approx(float(np.median(times)))
+    assert found.keeps_tolerance
+    without = replace(row("none", (1, 3)), status=NONE, tr=None, tr_low=None, tr_high=None)
+    assert summarise(10.0, [*rows, without]).common.tr == 1.0
+
+
+def test_a_run_that_was_cut_is_called_so(tmp_path: Path) -> None:
+    whole = [variants.write(tmp_path / f"run{i}.csv") for i in range(3)]
+    short, late = variants.write(tmp_path / "short.csv", end=0.06), variants.write(tmp_path / "late.csv", end=0.1)
+    rows = [ask(ASKED, name) for name in (*whole, short, late)]
+    assert [one.record_end for one in rows] == pytest.approx([0.15] * 3 + [0.06, 0.1])
+    assert [one.status for one in rows] == [OK] * 3 + ["out-of-range", OK]
+    told = {caution.code: caution.message for caution in summarise(variants.TD, rows).cautions}
+    assert told["cut-runs"] == f"2 of 5 runs were cut: {short} (at 0.06), {late} (at 0.1)"
+    assert cut_runs([*rows[:3], replace(rows[0], warnings=("truncated-input",))])[0].warnings == ("truncated-input",)
+    assert "cut-runs" not in {caution.code for caution in summarise(variants.TD, rows[:3]).cautions}
 
 
 @given(st.lists(st.tuples(st.floats(0, 1), st.floats(0, 0.3)), min_size=1, max_size=6))
@@ -151,8 +173,8 @@ def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_
 
 def test_runs_that_were_not_judged_are_left_out_and_named() -> None:
     answer = summarise(10.0, [row("a", (1, 2)), failed("bad", OSError())])
-    assert answer.common.tr == 1.0
-    assert list(answer.common.errors) == [pytest.approx(0.1), None]
+    assert answer.common.tr == 2.0
+    assert list(answer.common.errors) == [pytest.approx(0.2), None]
     assert answer.objection
     (caution,) = answer.cautions
     assert (caution.code, "bad" in caution.message) == ("runs-left-out", True)
@@ -163,7 +185,7 @@ def alike(*windows: tuple[float, float]) -> np.ndarray[tuple[int, int], np.dtype
 
 
 def test_the_common_tr_is_the_earliest_within_the_timing_tolerance_of_every_run() -> None:
-    rows = [row("a", (1, 4), alike=alike((1.2, 1.4), (1.5, 3))), row("b", (0, 6), alike=alike((1.45, 5)))]
+    rows = [row("a", (1, 4), alike=alike((1.2, 1.4), (1.5, 3))), row("b", (0, 6), tr=3.0, alike=alike((1.45, 5)))]
     found = summarise(10.0, rows).common
     assert (found.tr, found.window, found.keeps_tolerance) == (1.5, (1.0, 4.0), True)
     assert found.errors == pytest.approx([0.15] * 2)
@@ -248,6 +270,19 @@ def test_the_shortest_number_lies_between(low: float, share: float) -> None:
 
 
 # Names.
+
+
+def test_a_folder_of_folders_of_runs_says_how_to_name_them(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / "var" / name).mkdir(parents=True)
+    asked = replace(ASKED, td=0.064)
+    assert sure(ask(asked, str(tmp_path / "var")).message).endswith("give the file")
+    for name in ("a", "b"):
+        (tmp_path / "var" / name / "glstat").write_bytes(Path(GLSTAT).read_bytes())
+    said = sure(ask(asked, str(tmp_path / "var")).message)
+    assert said.endswith(f"or all to `study` as '{tmp_path / 'var'}/*'")
+    names = find_runs([said.split("'")[1]])
+    assert [ask(asked, name).status for name in names] == [OK, OK]
 
 
 def test_every_match_of_a_pattern_is_a_run_and_what_matches_nothing_stays(

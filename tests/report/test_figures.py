@@ -1,5 +1,7 @@
 """Figures say one thing each: the flight, what is acceptable in it, runs told apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -10,7 +12,7 @@ from d2rpick.choice.situation import Settings
 from d2rpick.choice.study import Common, Study, StudyRow
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
-from d2rpick.report.figures_choice import draw_study, draw_suggestion
+from d2rpick.report.figures_choice import draw_study, draw_suggestion, draw_trade_off
 from tests.command import BOX, ENERGY, ROOT
 
 
@@ -88,6 +90,32 @@ def test_nothing_of_a_pages_figure_lies_outside_of_it_whatever_the_unit(scale: f
     assert box.y0 >= -0.01
     assert box.x1 <= width + 0.01
     assert box.y1 <= height + 0.01
+
+
+def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
+    """Round-off of 1e-21 J before a landing of 40 J; where nothing ever comes, beside the energy it is measured by."""
+    time = np.linspace(0, 1, 501)
+    energy = 1e-21 * (1 + np.sin(40 * time)) + 40.0 * (time > 0.9)
+    answer = suggest(History(time, energy, ("made",), "made", "E"), 0.8, Settings(after=0.01))
+    assert answer.situation.at_rest
+    for page in (False, True):
+        axes = draw_suggestion(answer, page=page).axes[0]
+        assert (axes.get_yscale(), axes.get_ylim()) == ("linear", pytest.approx((-3.2, 43.2)))
+    best = answer.chosen
+    assert best is not None
+    assert (best.level_error, best.energy_ratio) == (0.0, None)
+    resting = replace(row("run", 0.01), curve=np.stack([time, energy]), energy_td=1e-21, warnings=("at-rest",))
+    assert draw_study(study(resting)).axes[0].get_ylim()[1] == pytest.approx(43.2)
+
+
+@pytest.mark.parametrize("page", [False, True])
+def test_the_first_and_the_last_td_of_a_trade_off_stand_clear_of_the_edge(page: bool) -> None:
+    found = d2.explore(d2.read(ENERGY), td_window=(0.06, 0.0687534), replay=False)
+    offers = found.offers
+    for axes in draw_trade_off(found, page=page).axes:
+        low, high = axes.get_xlim()
+        room = 0.01 * (high - low)
+        assert low + room < offers[0].td <= offers[-1].td < high - room
 
 
 def row(name: str, tr: float, level: float = 1.0) -> StudyRow:

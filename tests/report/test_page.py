@@ -88,6 +88,21 @@ def test_it_tells_the_choice_what_was_read_and_how_to_repeat_it(paper: Page) -> 
     assert {"svg", "table", "pre"} <= paper.names
 
 
+def test_the_method_is_folded_and_how_to_repeat_it_stands_there_once(paper: Page) -> None:
+    assert paper.source.count("<details><summary><h2>Method and limits</h2></summary>") == 1
+    assert paper.source.partition("</details>")[0].count("<h3>Limits</h3>") == 1
+    assert paper.text.count("To repeat this") == 1
+
+
+def test_of_a_flight_at_rest_no_error_of_round_off_is_told(tmp_path: Path) -> None:
+    asked = ("--tr", "0.1", "--td", "0.2838", stored("drop2T01.gz"))
+    page = page_of(tmp_path, *asked, command="verify")
+    assert "<dt>level error</dt><dd>0</dd>" in page.source
+    assert "<dt>energy ratio</dt>" not in page.source
+    found = json.loads(page.data[0])["flights"][0]
+    assert (found["log"], found["heights"][1] > 40) == (False, True)
+
+
 def test_it_needs_nothing_but_itself(paper: Page) -> None:
     assert not paper.names & {"link", "img", "iframe", "object", "embed", "form", "base"}
     assert {target[0] for target in paper.targets} == {"#"}
