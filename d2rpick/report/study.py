@@ -113,7 +113,7 @@ def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
 
 def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
     """Give names of columns and cells of the runs."""
-    cut = {row.source: f"cut at {row.record_end:g}" for row in cut_runs(answer.rows)}
+    cut = {row.source: f"cut at {row.record_end:g}; " for row in cut_runs(answer.rows)}
     columns: dict[str, Callable[[tuple[StudyRow, float | None]], tables.Cell]] = {
         "run": lambda one: one[0].source,
         "tr": lambda one: one[0].tr,
@@ -124,13 +124,9 @@ def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
         "at common": lambda one: tables.measure(one[1]),
         "basis": lambda one: one[0].basis,
         "status": lambda one: one[0].status,
-        "message": lambda one: "; ".join(filter(None, (cut.get(one[0].source), _said(one[0])))),
+        "message": lambda one: cut.get(one[0].source, "") + (one[0].message or ", ".join(one[0].warnings)),
     }
     return tables.filled(columns, with_errors(answer))
-
-
-def _said(row: StudyRow) -> str:
-    return row.message or ", ".join(code for code in row.warnings if code != "truncated-input")
 
 
 def outcome(answer: Study) -> list[tuple[str, str]]:
