@@ -100,7 +100,8 @@ def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
     assert answer.situation.at_rest
     for page in (False, True):
         axes = draw_suggestion(answer, page=page).axes[0]
-        assert (axes.get_yscale(), axes.get_ylim()) == ("linear", pytest.approx((-3.2, 43.2)))
+        assert axes.get_yscale() == "linear"
+        assert axes.get_ylim() == pytest.approx((-3.2, 43.2))
     best = answer.chosen
     assert best is not None
     assert (best.level_error, best.energy_ratio) == (0.0, None)
