@@ -17,6 +17,8 @@ TYPE_CHECKING = False  # type checkers take it for theirs; importing typing is l
 if TYPE_CHECKING:
     from typing import Any
 
+    from d2rpick.api.cards import JudgedCard as JudgedCard
+    from d2rpick.api.cards import card as card
     from d2rpick.api.checking import Findings as Findings
     from d2rpick.api.checking import check as check
     from d2rpick.api.choices import Suggestion as Suggestion
@@ -64,6 +66,7 @@ _HOME = {
         "base.errors",
     ),
     **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "api.choices"),
+    **dict.fromkeys(("JudgedCard", "card"), "api.cards"),
     **dict.fromkeys(("Calibration", "PartTable", "calibrate", "parts"), "api.costs"),
     **dict.fromkeys(("Findings", "check"), "api.checking"),
     **dict.fromkeys(("Exploration", "Plan", "explore", "plan"), "api.flights"),

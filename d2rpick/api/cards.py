@@ -5,15 +5,19 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypedDict, Unpack
 
-from d2rpick.api.request import OPTIONS, POSITIVE, TIME, UNLIMITED, dashed, option, options_of
+from d2rpick.api import arguments
+from d2rpick.api.request import OPTIONS, POSITIVE, TIME, UNLIMITED, Number, Option, dashed, option, options_of
 from d2rpick.base.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from d2rpick.api.arguments import Parts
     from d2rpick.api.asked import Asked
+    from d2rpick.api.request import Request
+    from d2rpick.api.runs import Run
     from d2rpick.choice.judged_card import CardRequest
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.verify import Verdict
@@ -24,6 +28,60 @@ if TYPE_CHECKING:
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
 _MOST_IDS: Final = 100_000
 _IDS: Final = range(1, UNLIMITED)
+_ONLY_JUDGED: Final = "`parts` chooses by whose energy a card for {} is judged; give a `run` with parts"
+
+
+class CardOptions(TypedDict, total=False):
+    """How a card is printed.
+
+    ``solver``: ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"`` (default: the one that wrote the history).
+    ``step_cap``: the largest time step while rigid.  LS-DYNA: ``merge``, the lead part that all others are merged into,
+    ``swset``, ids of the two switch sets of the first window.  Radioss: ``node``, main nodes of the rigid bodies,
+    ``end`` of the run and its ``name``.
+    """
+
+    solver: str | None
+    merge: int | None
+    swset: tuple[int, int] | None
+    step_cap: float | None
+    node: Parts | None
+    end: float | None
+    name: str | None
+
+
+class Judging(CardOptions, total=False):
+    """The same, and how the windows are judged: as in ``d2rpick.api.arguments.Choosing``."""
+
+    after: float | None
+    landing: float | None
+    margin: float | None
+    tolerance: float
+
+
+def _checked(name: str, value: Any, option: Option) -> Any:
+    """Give a value in its kind."""
+    kind = option.kind
+    if option.many:
+        return arguments.part_names(name, value)
+    if option.pair:
+        if not isinstance(value, tuple | list) or len(value) != 2:
+            raise TypeError(f"{name} is {value!r}, a pair of numbers was expected")
+        return tuple(arguments.whole(name, one, _IDS.start) for one in value)
+    if isinstance(kind, range):
+        return arguments.whole(name, value, kind.start)
+    if isinstance(kind, Number):
+        found = arguments.number(name, value, *kind[:2])
+        if kind.above and not found > kind.low:
+            raise ValueError(f"{name} is {found:g}, a number above {kind.low:g} was expected")
+        return found
+    if not isinstance(value, str):
+        raise TypeError(f"{name} is {value!r}, a text was expected")
+    if kind == "solver":
+        from d2rpick.deck.printing import SOLVERS
+
+        if value not in SOLVERS:
+            raise ValueError(f"{name} is {value!r}, one of {', '.join(SOLVERS)} was expected")
+    return value
 
 
 @dataclass(frozen=True)
@@ -43,6 +101,14 @@ class Cards:
     name: str | None = option("Radioss: name of the run.  [default: Root]", metavar="NAME")
     starter: str = ""  # cards that the starter deck lacks
     sensor: int = 901  # first id of sensors that is free
+
+    @classmethod
+    def of(cls, given: CardOptions) -> Cards:
+        """Take the arguments of Python; TypeError or ValueError for one that is not of its kind."""
+        known = options_of(Cards)
+        if unknown := [name for name in given if name not in known]:
+            arguments.refuse_unknown(unknown[0], known)
+        return cls(**{name: _checked(name, one, known[name]) for name, one in given.items() if one is not None})
 
     @property
     def given(self) -> list[str]:
@@ -66,8 +132,8 @@ class Cards:
         for name in self.given:
             if name not in places[solver]:
                 owner = next(one for one, takes in places.items() if name in takes)
-                hint = "" if self.solver else f"; without --solver the card is one for {SOLVERS[solver].title}"
-                raise ArgumentError(f"--{dashed(name)} is an option of --solver {owner}{hint}")
+                hint = "" if self.solver else f"; without `solver` the card is one for {SOLVERS[solver].title}"
+                raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
     def for_bodies(self, asked: Asked) -> tuple[Cards, tuple[str, ...]]:
         """Let the deck say which rigid bodies switch the parts, with what it lacks, and notes of that.
@@ -99,9 +165,9 @@ SETTINGS: Final = (*map(dashed, (*OPTIONS, *options_of(Cards))), "fail-on")
 
 
 def needed(solver: Module) -> str:
-    """Say which option names whom the card of ``solver`` switches."""
-    what = {"part": "the parts to switch", "node": "the main nodes of the rigid bodies"}
-    return f"a card for {solver.title} needs --{solver.switches}, {what[solver.switches]}"
+    """Say which argument names whom the card of ``solver`` switches."""
+    what = {"part": "`parts`, the parts to switch", "node": "`node`, the main nodes of the rigid bodies"}
+    return f"a card for {solver.title} needs {what[solver.switches]}"
 
 
 def numbers(name: str, texts: Sequence[str]) -> list[int]:
@@ -120,10 +186,16 @@ def numbers(name: str, texts: Sequence[str]) -> list[int]:
 
 
 class JudgedCard(NamedTuple):
-    """A card, with what was found of each of its new windows as printed."""
+    """A card, with what was found of each of its new windows as printed; ``str`` gives its text.
+
+    ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
+    """
 
     card: PrintedCard
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[Verdict, ...] = ()
+
+    def __str__(self) -> str:
+        return self.card.text
 
     @property
     def verified(self) -> bool:
@@ -168,3 +240,81 @@ def _cautions(verdict: Verdict) -> Iterator[Caution]:
     yield from verdict.cautions
     if not verdict.verified:
         yield Caution("not-verified", f"the times as printed: {'; '.join(verdict.reasons)}")
+
+
+def card(
+    windows: Iterable[tuple[float, float]],
+    *,
+    run: Run | None = None,
+    parts: Parts | None = None,
+    **options: Unpack[Judging],
+) -> JudgedCard:
+    """Print solver input for switching windows, as ``d2rpick card`` does; where there is a run they are judged by it.
+
+    Parameters
+    ----------
+    windows : pairs of float
+        tr and td of each [time].
+    run : Run, optional
+        As `read` gives it, without switching.
+    parts : number or several, optional
+        The parts to be switched; with a run that has parts by title too.
+    **options
+        ``solver``, ``merge``, ``swset``, ``step_cap``, ``node``, ``end``, ``name``; with a run ``after``, ``landing``,
+        ``margin``, ``tolerance``.
+
+    Returns
+    -------
+    JudgedCard
+
+    Raises
+    ------
+    D2RPickError
+        If windows do not follow each other, or the run has no such parts or energy.
+    TypeError, ValueError
+        If an argument is not of its kind, or nobody says whom the card switches.
+
+    Examples
+    --------
+    >>> import d2rpick as d2
+    >>> d2.card([(0.02, 0.09), (0.2, 0.3)], parts=11).card.windows
+    ((0.02, 0.09), (0.2, 0.3))
+    """
+    from d2rpick.api.asked import request_of
+
+    times = [arguments.window(f"windows[{at}]", one) or (0.0, 0.0) for at, one in enumerate(windows)]
+    given: dict[str, Any] = dict(options)
+    judging: Any = {name: given.pop(name) for name in ("after", "landing", "margin", "tolerance") if name in given}
+    return card_of(times, run, request_of(run, parts, None, None, None, judging), Cards.of(given))  # type: ignore[arg-type]
+
+
+def card_of(windows: Sequence[Times], run: Run | None, request: Request, cards: Cards) -> JudgedCard:
+    """Print the card of windows, judged as printed where there is a run."""
+    from d2rpick.api.asked import ask
+    from d2rpick.deck.printing import DEFAULT, SOLVERS
+    from d2rpick.deck.printing import cards as print_cards
+
+    if run is None:
+        solver = cards.solver or DEFAULT
+        return JudgedCard(print_cards(windows, _alone(request, cards, solver), solver))
+    asked = ask(run, request, card_alone=True)
+    wanted = cards.request(asked)
+    module = SOLVERS[wanted.of(asked.reference.history)[0]]
+    if wanted.printing.part and module.switches != "part":
+        raise ArgumentError(_ONLY_JUDGED.format(module.title))
+    return judged(asked, cards, windows)
+
+
+def _alone(request: Request, cards: Cards, solver: str) -> Printing:
+    """Say what the card needs where no history says anything; ArgumentError where something is missing."""
+    from d2rpick.deck.printing import SOLVERS
+
+    cards.check_solver(solver)
+    module = SOLVERS[solver]
+    if not {"part": request.part, "node": cards.node}[module.switches]:
+        raise ArgumentError(needed(module))
+    if request.part and module.switches != "part":
+        raise ArgumentError(_ONLY_JUDGED.format(module.title))
+    if "end" in module.takes and cards.end is None:
+        raise ArgumentError(f"a card for {module.title} needs `end`, the end of the run, or a `run`")
+    return cards.printing(numbers("--part", request.part))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Unpack
 from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
 from d2rpick.api.asked import ask, request_of
+from d2rpick.api.cards import Cards
 from d2rpick.api.request import MIN_MEAN_ENERGY, time_or_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import of_run
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.asked import Asked
-    from d2rpick.api.cards import Cards, JudgedCard
+    from d2rpick.api.cards import CardOptions, JudgedCard
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.situation import Situation
@@ -101,7 +102,11 @@ class Suggestion(Judged, choice.Suggestion):
 
         return draw_suggestion(self)
 
-    def card(self, cards: Cards) -> JudgedCard | None:
+    def card(self, **options: Unpack[CardOptions]) -> JudgedCard | None:
+        """Print the card of the recommended pair, judged as printed; None without one."""
+        return self.printed(Cards.of(options))
+
+    def printed(self, cards: Cards) -> JudgedCard | None:
         """Print the card of the recommended pair, judged as printed; None without one."""
         from d2rpick.api.cards import judged as judged_card
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.asked import Asked
-    from d2rpick.api.cards import JudgedCard
+    from d2rpick.api.cards import CardOptions, JudgedCard
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.switched_run import Times
@@ -188,7 +188,11 @@ class Plan(RunAnswer, planning.Plan):
 
         return draw_plan(self)
 
-    def card(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
+    def card(self, *, every: bool = False, **options: Unpack[CardOptions]) -> JudgedCard | None:
+        """Print the card of the next run, judged as printed, with ``every`` new window or those that are supported."""
+        return self.printed(Cards.of(options), every=every)
+
+    def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
         """Print the card of the next run, its new windows judged; None where none is new."""
         new, asked = self.new_windows(every=every), self.question
         asked = replace(asked, reference=asked.reference._replace(history=self.history))
@@ -200,7 +204,7 @@ class Plan(RunAnswer, planning.Plan):
         from d2rpick.report.pages import plan_page
 
         cards = cards or Cards()
-        card = self.card(cards) if cards.request(self.question).whom(self.history) else None
+        card = self.printed(cards) if cards.request(self.question).whom(self.history) else None
         explorer = self._explorer(explored_flights(self.question.reference, self))
         return plan_page(self, self.question.reference.run, command, card.card.text if card else None, explorer)
 

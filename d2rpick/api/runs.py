@@ -171,7 +171,7 @@ def read(
 
 
 def from_frame(
-    frame: pd.DataFrame | pd.Series[Any],
+    frame: pd.DataFrame | pd.Series[float],
     *,
     time: str | int | None = None,
     energy: str | int | Iterable[str | int] | None = None,

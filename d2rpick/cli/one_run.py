@@ -59,7 +59,7 @@ def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, c
     output.notes(asked.reference.history.notes, told)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
     if card:
-        found = answer.card(cards)
+        found = answer.printed(cards)
         told = [] if found is None else [one for one in all_cautions(found.verdicts) if one not in answer.cautions]
         return output.finish(objection=not output.card(found, told), quality=answer.quality)
     output.answer(answer, limit=limit)

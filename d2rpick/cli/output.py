@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 
 import click
 
-from d2rpick.api.request import OPTIONS, dashed, option
+from d2rpick.api.cards import Cards
+from d2rpick.api.request import OPTIONS, dashed, option, options_of
 from d2rpick.base.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
 from d2rpick.base.files import write_whole
 from d2rpick.cli.progress import reading
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.answer import Answer, Paged
-    from d2rpick.api.cards import Cards, JudgedCard
+    from d2rpick.api.cards import JudgedCard
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.choice.ranking import Quality
@@ -40,6 +41,7 @@ _PRINTED: Final = (".pdf", ".doc", ".docx")
 # Arguments that messages name in backticks, and which options set them where these have other names.
 ARGUMENTS: Final = (
     *OPTIONS,
+    *options_of(Cards),
     "td",
     "td_window",
     "tr",
@@ -51,7 +53,7 @@ ARGUMENTS: Final = (
     "wait",
     "min_mean_energy",
 )
-_OTHERS: Final = {"parts": "part", "channels": "channel", "replay": "no_verify"}
+_OTHERS: Final = {"parts": "part", "channels": "channel", "replay": "no_verify", "run": "history"}
 _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 IN_WORDS: Final = {"table", "markdown"}  # forms in which the answer says itself why nothing is recommended
 

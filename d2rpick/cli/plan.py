@@ -94,7 +94,7 @@ def plan(
     answer = planned(asked, min_rigid, options.windows_in(done) if done else (), earlier)
     output.notes((*answer.history.notes, *added), answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), (), cards))
-    found = answer.card(cards, every=every) if form == "card" or write_deck else None
+    found = answer.printed(cards, every=every) if form == "card" or write_deck else None
     checked, passed = _write_and_check(found.card, answer, write_deck, output) if found and write_deck else ("", True)
     if checked and form != "table":
         click.echo(checked, err=True)

@@ -19,6 +19,7 @@ from d2rpick.api.answer import written
 from d2rpick.report.keys import MEASURES
 from d2rpick.report.plan import sentence as plan_sentence
 from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, answer, run
+from tests.command import run as run_command
 from tests.sample_deck import DECK as SAMPLE_DECK
 
 TD = "0.0687534"
@@ -335,6 +336,51 @@ def test_a_table_that_no_energy_is_known_of_is_shown_without_a_picture(tmp_path:
     shown = loose.read(file)._repr_html_()
     assert "a, b" in shown
     assert "<svg" not in shown
+
+
+def test_cards_are_those_of_the_command_line() -> None:
+    ids: Any = {"merge": 1, "swset": (11, 12), "step_cap": 1e-6}
+    run = d2.read(MATSUM)
+    chosen, plan = d2.suggest(run, 0.37, parts=1, replay=False), d2.plan(run, parts=1, replay=False)
+    options = ("--merge", "1", "--swset", "11", "12", "--step-cap", "1e-6", "-f", "card", MATSUM)
+    for one in (chosen, plan):
+        found, (name, *words) = one.card(**ids), one.command
+        assert str(found) == run_command(name, *words[:-1], *options).stdout
+        assert found is not None
+        assert found.verified
+    times = ["--tr", "0.1", "--td", "0.37", "--part", "box"]
+    alone = d2.card([(0.1, 0.37)], run=run, parts="box", margin=0.001)
+    assert str(alone) == run_command("card", *times, "--margin", "0.001", "--history", MATSUM).stdout
+    assert alone.verdicts[0].verified
+    bare = ("card", "--solver", "radioss", "--node", "7", "--end", "1", "--tr", "0.1", "--td", "0.37")
+    assert str(d2.card([(0.1, 0.37)], solver="radioss", node=7, end=1)) == run_command(*bare).stdout
+
+
+def test_no_pair_is_no_card() -> None:
+    found = d2.suggest(d2.read(MATSUM), 0.41, parts=1)
+    assert found.recommended is None
+    assert found.card() is None
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "text"),
+    [
+        ({"solver": "abaqus"}, ValueError, "solver is 'abaqus', one of ls-dyna, radioss"),
+        ({"solver": 3}, TypeError, "solver is 3, a text"),
+        ({"marge": 1}, TypeError, "no argument 'marge'; is 'margin' meant|is 'merge' meant"),
+        ({"merge": 0}, ValueError, "merge is 0, a number of at least 1"),
+        ({"swset": 5}, TypeError, "swset is 5, a pair of numbers"),
+        ({"step_cap": "x"}, TypeError, "step_cap is 'x', a number"),
+        ({"step_cap": 0}, ValueError, "step_cap is 0, a number above 0"),
+        ({"node": 5}, ValueError, "`node` is an option of `solver` radioss"),
+        ({}, ValueError, "needs `parts`, the parts to switch"),
+    ],
+)
+def test_a_wrong_option_of_a_card_is_named(options: dict[str, Any], error: type[Exception], text: str) -> None:
+    with pytest.raises(error, match=text):
+        loose.card([(0.1, 0.2)], **options)
+    with pytest.raises(TypeError, match=r"windows\[1\] is 3"):
+        loose.card([(0.1, 0.2), 3], parts=1)
 
 
 def test_a_figure_shows_itself() -> None:
