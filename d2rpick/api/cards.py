@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypedDict, Unpack
 
-from d2rpick.api import arguments
 from d2rpick.api.request import OPTIONS, POSITIVE, TIME, UNLIMITED, Number, Option, dashed, option, options_of
 from d2rpick.base.errors import ArgumentError
 
@@ -60,6 +59,8 @@ class Judging(CardOptions, total=False):
 
 def _checked(name: str, value: Any, option: Option) -> Any:
     """Give a value in its kind."""
+    from d2rpick.api import arguments
+
     kind = option.kind
     if option.many:
         return arguments.part_names(name, value)
@@ -105,6 +106,8 @@ class Cards:
     @classmethod
     def of(cls, given: CardOptions) -> Cards:
         """Take the arguments of Python; TypeError or ValueError for one that is not of its kind."""
+        from d2rpick.api import arguments
+
         known = options_of(Cards)
         if unknown := [name for name in given if name not in known]:
             arguments.refuse_unknown(unknown[0], known)
@@ -280,6 +283,7 @@ def card(
     >>> d2.card([(0.02, 0.09), (0.2, 0.3)], parts=11).card.windows
     ((0.02, 0.09), (0.2, 0.3))
     """
+    from d2rpick.api import arguments
     from d2rpick.api.asked import request_of
 
     times = [arguments.window(f"windows[{at}]", one) or (0.0, 0.0) for at, one in enumerate(windows)]
@@ -290,13 +294,14 @@ def card(
 
 def card_of(windows: Sequence[Times], run: Run | None, request: Request, cards: Cards) -> JudgedCard:
     """Print the card of windows, judged as printed where there is a run."""
-    from d2rpick.api.asked import ask
     from d2rpick.deck.printing import DEFAULT, SOLVERS
     from d2rpick.deck.printing import cards as print_cards
 
     if run is None:
         solver = cards.solver or DEFAULT
         return JudgedCard(print_cards(windows, _alone(request, cards, solver), solver))
+    from d2rpick.api.asked import ask  # not above: a card alone does without numpy
+
     asked = ask(run, request, card_alone=True)
     wanted = cards.request(asked)
     module = SOLVERS[wanted.of(asked.reference.history)[0]]
