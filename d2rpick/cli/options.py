@@ -42,8 +42,8 @@ DECK_OF_PARTS: Final = f"{DECK}; `--part recommended` stands for the set that d2
 # Sections of the help, behind the options of a command that are in none.
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Times": (
-        *("tr", "td", "td_window", "steps", "min_rigid", "after", "margin", "tolerance"),
-        *("max_kinetic_share", "max_residual", "strict"),
+        *("tr", "td", "td_window", "steps", "min_rigid", "after", "landing", "margin", "wait"),
+        *("tolerance", "max_kinetic_share", "max_residual", "min_mean_energy", "strict"),
     ),
     "What to read": ("history", "switched", "from", *READING, "done", "before"),
     "Deck and cost": ("deck", "weights", "write_deck"),
