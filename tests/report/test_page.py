@@ -306,10 +306,11 @@ def test_a_verdict_has_a_page_too(tmp_path: Path) -> None:
 def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> None:
     reference, *legs = (ROLLOVER_T01, *(stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 2, 3)))
     asked = ("--tr", "0.1", "--td", "0.37", "--no-verify", "--part", "box")
-    page = page_of(tmp_path, *asked, reference, "--switched", *legs, command="verify")
+    page = page_of(tmp_path, *asked, reference, "--switched", stored("rollover_r100_T0*.gz"), command="verify", code=1)
     for name in (reference, *legs):
         assert f"{name}: {hashlib.sha256(Path(name).read_bytes()).hexdigest()}" in page.text
-    for text in ("The switched run", "mean energy after td", "hourglass energy of box", "The window is 0.1 to 0.37"):
+    told = ("The switched run", "mean energy after td", "hourglass energy of box", "The window is 0.1 to 0.37")
+    for text in (*told, "0.66 times that of the reference"):
         assert text in page.text
 
 
