@@ -16,9 +16,8 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\b
 Examples:
-  d2rpick first run/NAME_0000.rad -o first/
-  d2rpick first --part 1-17 --wait 0.022 run/NAME_0000.rad -o first/
-  d2rpick first --part 11,12 --wait 0.02 --after 0.05 main.k -o first/
+  d2rpick first --part 1 --wait 0.02 sample_data/falling_plate/plate_0000.rad -o first/
+  d2rpick first --part 1 --wait 0.02 --after 0.05 sample_data/falling_plate/plate_0000.rad -o later/
 """
 
 

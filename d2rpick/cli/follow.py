@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 EXAMPLES: Final = """\b
 Examples:
   d2rpick follow --once --part box sample_data/rolloverT01.gz
-  d2rpick follow --for 60 -f ndjson sample_data/rolloverT01.gz
+  d2rpick follow --for 2 -f ndjson sample_data/rolloverT01.gz
 """
 
 
@@ -37,7 +37,7 @@ Examples:
     help="End after so many seconds.  [default: when the run has ended]",
 )  # fmt: skip
 @options.takes(
-    *("part", "deck", "output_format", "exit_zero"),
+    *("part", "deck", "output_format", "exit_zero", "quiet"),
     deck="Main deck of the run: tells gravity, supports, bodies, and the period of parts on springs.",
     forms=("table", "ndjson"),
 )

@@ -138,7 +138,7 @@ def _databases(folder: Path) -> list[str]:
     found = {file: match["root"] for file, match in matches.items() if match}
     if not found:
         inner = any(re.fullmatch(_DATABASE, file.name) for file in folder.glob("*/*") if file.is_file())
-        cure = f"its folders are runs: give one, or all to `study` as '{folder}/*'" if inner else "give the file"
+        cure = f"its folders are runs: give one, or all to study as '{folder}/*'" if inner else "give the file"
         raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; {cure}")
     runs = sorted({"one of LS-DYNA" if root is None else f"{root}T01" for root in found.values()})
     if len(runs) > 1:

@@ -280,7 +280,7 @@ def test_a_folder_of_folders_of_runs_says_how_to_name_them(tmp_path: Path) -> No
     for name in ("a", "b"):
         (tmp_path / "var" / name / "glstat").write_bytes(Path(GLSTAT).read_bytes())
     said = sure(ask(asked, str(tmp_path / "var")).message)
-    assert said.endswith(f"or all to `study` as '{tmp_path / 'var'}/*'")
+    assert said.endswith(f"or all to study as '{tmp_path / 'var'}/*'")
     names = find_runs([said.split("'")[1]])
     assert [ask(asked, name).status for name in names] == [OK, OK]
 

@@ -39,6 +39,7 @@ def test_every_command_shows_its_settings(command: str) -> None:
         "verify": ("--tr", "1", "--td", "2", "x"), "replay": ("--stiffness", "1", "--mass", "1", "--v0", "1", "--t-end",
         "1", "--dt", "1"), "card": ("--tr", "1", "--td", "2"), "reproduce": ("--output-dir", "x"), "rollover": (),
         "extract": ("x", "-o", "y.csv"), "study": ("--td", "1", "x"), "drive": ("x", "-o", "y"),
+        "first": ("x", "-o", "y"),
     }  # fmt: skip
     shown = run(command, *required.get(command, ("x",)), "--show-settings")
     assert shown.exit_code == 0, shown.stderr
