@@ -327,7 +327,8 @@ def test_a_name_that_promises_another_format_is_told(tmp_path: Path) -> None:
     for asked in (("-f", "json"), ("-f", "table"), ("-q",)):
         result = run("suggest", "--td", "0.0687534", "--overwrite", *asked, "-o", name, ENERGY)
         assert (result.exit_code, result.stderr) == (0, "")
-    assert run("check", "-o", str(tmp_path / "found.csv"), DECK).stderr == ""  # which has no csv
+    assert "-f csv writes what its name promises" in run("check", "-o", str(tmp_path / "found.csv"), DECK).stderr
+    assert run("info", "-o", str(tmp_path / "read.ndjson"), ENERGY).stderr == ""  # which has no ndjson
     assert run("replay", *OSCILLATOR, "--t-end", "0.1", "--dt", "0.01", "-o", str(tmp_path / "run.csv")).stderr == ""
 
 

@@ -122,4 +122,6 @@ def test_where_nothing_can_be_chosen_the_table_says_so(tmp_path: Path) -> None:
     run("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "-o", str(file))
     result = run("suggest", "--td", "0.064", "--part", "frame", str(file))
     assert result.exit_code == 1
-    assert "\nno candidates\n" in result.stdout
+    reason = "before td = 0.064 the energy neither passes its level 0 nor peaks near it"
+    assert result.stdout.startswith(f"recommended  none: {reason}\n")
+    assert "rank" not in result.stdout

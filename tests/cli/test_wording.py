@@ -8,7 +8,7 @@ import pytest
 
 from d2rpick.cli import COMMANDS
 from d2rpick.cli.output import ARGUMENTS, option_of, with_options
-from tests.command import ENERGY, ROLLOVER, ROOT, run
+from tests.command import ENERGY, ROLLOVER, ROOT, run, unwrapped
 
 # Layers whose messages name no options.
 SPEAKING = ("histories", "vibration", "flight", "choice", "models")
@@ -41,5 +41,5 @@ def test_the_command_line_names_the_option_that_cures() -> None:
     assert with_options("`after` and `unknown`") == "--after and `unknown`"
     assert "--after 9 lies outside the record" in run("suggest", "--td", "0.064", "--after", "9", ENERGY).stderr
     assert "choose with --energy: " in run("suggest", "--td", "0.37", ROLLOVER).stderr
-    assert "choose with --energy: " in run("study", "--td", "0.37", ROLLOVER).stdout
+    assert "choose with --energy: " in unwrapped(run("study", "--td", "0.37", ROLLOVER).stdout)
     assert "choose with `energy`: " in run("study", "--td", "0.37", "-f", "json", ROLLOVER).stdout
