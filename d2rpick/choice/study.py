@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePath
+from pathlib import Path
 from statistics import median, median_high
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -393,21 +393,3 @@ def outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
     reach = _FENCE * (high - low)
     far = [(row, abs(tr - middle)) for row, tr in chosen if not low - reach <= tr <= high + reach]
     return (*without, *(row for row, _ in sorted(far, key=lambda one: -one[1])))
-
-
-def short_names(sources: Sequence[str]) -> tuple[str, ...]:
-    """Give of each name what tells it from the others: folders and file names that all share are left out.
-
-    Examples
-    --------
-    >>> short_names(["runs/soft/glstat", "runs/hard/glstat"])
-    ('soft', 'hard')
-    >>> short_names(["runs/a.csv", "runs/b.csv"])
-    ('a.csv', 'b.csv')
-    """
-    paths = [PurePath(source).parts for source in sources]
-    depth = min(map(len, paths), default=0)
-    first = next((i for i in range(depth) if len({path[i] for path in paths}) > 1), max(depth - 1, 0))
-    last = next((i for i in range(1, depth + 1) if len({path[-i] for path in paths}) > 1), 1)
-    kept = (path[first : len(path) - last + 1] or path[-1:] for path in paths)
-    return tuple("/".join(part.strip("/") for part in one) or source for one, source in zip(kept, sources, strict=True))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from d2rpick.choice.study import outliers, runs_of, short_names
+from d2rpick.choice.study import outliers, runs_of
 from d2rpick.histories.samples import outline
 from d2rpick.report.figures import (
     BETTER,
@@ -28,6 +28,7 @@ from d2rpick.report.figures import (
     with_unit,
 )
 from d2rpick.report.situation import energy_name
+from d2rpick.report.study import short_names
 from d2rpick.report.view import merged, replayed_motion, scale_in, scale_of, view_of
 
 if TYPE_CHECKING:

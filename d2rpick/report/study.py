@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.choice.study import cut_runs, runs_of
@@ -10,7 +11,7 @@ from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe, one_of, row
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.choice.study import Study, StudyRow
     from d2rpick.report.formats import Shown
@@ -154,3 +155,21 @@ def td_of(answer: Study) -> str:
     if answer.td_window:
         return "of each run in {:.6g} to {:.6g}".format(*answer.td_window)
     return f"{answer.td:.6g}"
+
+
+def short_names(sources: Sequence[str]) -> tuple[str, ...]:
+    """Give of each name what tells it from the others: folders and file names that all share are left out.
+
+    Examples
+    --------
+    >>> short_names(["runs/soft/glstat", "runs/hard/glstat"])
+    ('soft', 'hard')
+    >>> short_names(["runs/a.csv", "runs/b.csv"])
+    ('a.csv', 'b.csv')
+    """
+    paths = [PurePath(source).parts for source in sources]
+    depth = min(map(len, paths), default=0)
+    first = next((i for i in range(depth) if len({path[i] for path in paths}) > 1), max(depth - 1, 0))
+    last = next((i for i in range(1, depth + 1) if len({path[-i] for path in paths}) > 1), 1)
+    kept = (path[first : len(path) - last + 1] or path[-1:] for path in paths)
+    return tuple("/".join(part.strip("/") for part in one) or source for one, source in zip(kept, sources, strict=True))

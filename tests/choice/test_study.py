@@ -22,7 +22,6 @@ from d2rpick.choice.study import (
     fewest_digits,
     find_runs,
     outliers,
-    short_names,
     summarise,
 )
 from d2rpick.choice.verify import verify
@@ -326,11 +325,3 @@ def test_runs_without_a_tr_and_far_ones_stand_out_the_farthest_first() -> None:
 def test_equal_times_let_any_other_stand_out() -> None:
     runs = [*(chosen("same", 2.0) for _ in range(9)), chosen("other", 2.1)]
     assert [one.source for one in outliers(runs)] == ["other"]
-
-
-def test_short_names_tell_runs_apart() -> None:
-    assert short_names(["a/b/soft/box/glstat", "a/b/hard/box/glstat"]) == ("soft", "hard")
-    assert short_names(["one.csv"]) == ("one.csv",)
-    assert short_names(["x/one.csv", "x/one.csv"]) == ("one.csv", "one.csv")
-    assert short_names(["one.csv", "deep/er/one.csv"]) == ("one.csv", "deep/er/one.csv")
-    assert short_names([]) == ()

@@ -13,6 +13,7 @@ from d2rpick.choice.study import Common, Study, StudyRow
 from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
 from d2rpick.report.figures_choice import draw_study, draw_suggestion, draw_trade_off
+from d2rpick.report.study import short_names
 from tests.command import BOX, ENERGY, ROOT
 
 
@@ -153,3 +154,11 @@ def test_runs_of_any_energy_can_be_drawn(page: bool) -> None:
     figure = draw_study(study(*rows), page=page)
     figure.canvas.draw()
     assert draw_study(study()).axes
+
+
+def test_short_names_tell_runs_apart() -> None:
+    assert short_names(["a/b/soft/box/glstat", "a/b/hard/box/glstat"]) == ("soft", "hard")
+    assert short_names(["one.csv"]) == ("one.csv",)
+    assert short_names(["x/one.csv", "x/one.csv"]) == ("one.csv", "one.csv")
+    assert short_names(["one.csv", "deep/er/one.csv"]) == ("one.csv", "deep/er/one.csv")
+    assert short_names([]) == ()
