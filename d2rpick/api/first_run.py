@@ -68,10 +68,10 @@ def first(
     Examples
     --------
     >>> import d2rpick as d2
-    >>> d2.first("sample_data/rollover_box.k", "first", parts=1)
+    >>> d2.first("sample_data/rollover_box.k", "first", parts=1)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    ValueError: `wait` is not given, and sample_data/rollover_box.k does not tell it: ...
+    d2rpick.base.errors.ArgumentError: `wait` is not given, and sample_data/rollover_box.k does not tell it: ...
     """
     names = arguments.part_names("parts", parts)
     least = None if wait is None else arguments.number("wait", wait, 0.0)

@@ -77,5 +77,5 @@ def test_wrong_arguments_are_named(arguments: dict[str, object], told: str) -> N
 
 
 def test_what_is_not_a_run_is_named() -> None:
-    with pytest.raises(TypeError, match=r"run is 'box\.matsum', what read"):
+    with pytest.raises(TypeError, match=r"run is 'box\.matsum'; give what d2rpick\.read\(\.\.\.\) makes of it"):
         d2.parts("box.matsum")  # type: ignore[arg-type]
