@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     from d2rpick.api.costs import PartTable as PartTable
     from d2rpick.api.costs import calibrate as calibrate
     from d2rpick.api.costs import parts as parts
-    from d2rpick.api.first_run import FirstRun as FirstRun
-    from d2rpick.api.first_run import first as first
     from d2rpick.api.flights import Exploration as Exploration
     from d2rpick.api.flights import Plan as Plan
     from d2rpick.api.flights import explore as explore
     from d2rpick.api.flights import plan as plan
-    from d2rpick.api.following import follow as follow
+    from d2rpick.api.running import FirstRun as FirstRun
+    from d2rpick.api.running import first as first
+    from d2rpick.api.running import follow as follow
     from d2rpick.api.runs import Run as Run
     from d2rpick.api.runs import from_frame as from_frame
     from d2rpick.api.runs import read as read
@@ -70,11 +70,10 @@ _HOME = {
     **dict.fromkeys(("Calibration", "PartTable", "calibrate", "parts"), "api.costs"),
     **dict.fromkeys(("Findings", "check"), "api.checking"),
     **dict.fromkeys(("Exploration", "Plan", "explore", "plan"), "api.flights"),
-    **dict.fromkeys(("FirstRun", "first"), "api.first_run"),
+    **dict.fromkeys(("FirstRun", "first", "follow"), "api.running"),
     **dict.fromkeys(("Run", "from_frame", "read"), "api.runs"),
     **dict.fromkeys(("Study", "study"), "api.studies"),
     "Event": "running.events",
-    "follow": "api.following",
     "Oscillator": "vibration.oscillator",
     "Weights": "choice.cost",
 }

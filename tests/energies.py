@@ -4,7 +4,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from d2rpick.choice.suggest import Suggestion
+from d2rpick.choice.answers import Suggestion
 from d2rpick.histories.history import History
 from tests.command import ROLLOVER
 

@@ -85,12 +85,12 @@ class Paged(Answer):
     drawn: ClassVar[bool] = True
 
     def __repr__(self) -> str:
-        from d2rpick.report.glance import sentence
+        from d2rpick.report.pages import sentence
 
         return f"{type(self).__name__}({sentence(self.kind, self)})"
 
     def _repr_html_(self) -> str:
-        from d2rpick.report.glance import glance
+        from d2rpick.report.pages import glance
 
         return glance(self.kind, self, self.plot() if self.drawn else None)
 

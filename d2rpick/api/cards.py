@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from d2rpick.api.asked import Asked
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
+    from d2rpick.choice.answers import Verdict
     from d2rpick.choice.judged_card import CardRequest
     from d2rpick.choice.switched_run import Times
-    from d2rpick.choice.verify import Verdict
     from d2rpick.choice.warnings import Caution
     from d2rpick.deck.printed_card import PrintedCard, Printing
     from d2rpick.deck.printed_card import Solver as Module

@@ -12,9 +12,7 @@ from d2rpick.api.asked import ask, request_of
 from d2rpick.api.cards import Cards
 from d2rpick.api.request import MIN_MEAN_ENERGY, time_or_window
 from d2rpick.base.errors import ArgumentError
-from d2rpick.choice import of_run
-from d2rpick.choice import suggest as choice
-from d2rpick.choice import verify as judgement
+from d2rpick.choice import answers, of_run
 from d2rpick.histories.digits import as_read
 
 if TYPE_CHECKING:
@@ -27,9 +25,9 @@ if TYPE_CHECKING:
     from d2rpick.api.asked import Asked
     from d2rpick.api.cards import CardOptions, JudgedCard
     from d2rpick.api.runs import Run
+    from d2rpick.choice.answers import Pair
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.situation import Situation
-    from d2rpick.choice.suggest import Pair
     from d2rpick.flight.flight import Flight
 
 
@@ -64,7 +62,7 @@ class Judged(RunAnswer):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Suggestion(Judged, choice.Suggestion):
+class Suggestion(Judged, answers.Suggestion):
     """Answer of `suggest`; nothing of it changes.
 
     ``candidates`` are ranked, best first; ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
@@ -125,7 +123,7 @@ class Suggestion(Judged, choice.Suggestion):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Verdict(Judged, judgement.Verdict):
+class Verdict(Judged, answers.Verdict):
     """Answer of `verify`; nothing of it changes.
 
     ``verified``: the pair is good; ``reasons``: why not, or what to know; ``tr_ok`` and ``td_ok`` are None where

@@ -34,12 +34,12 @@ class Run:
     input_format: str = "auto"
 
     def __repr__(self) -> str:
-        from d2rpick.report.glance import of_run
+        from d2rpick.report.pages import of_run
 
         return f"Run({of_run(self.files)})"
 
     def _repr_html_(self) -> str | None:
-        from d2rpick.report.glance import glance
+        from d2rpick.report.pages import glance
 
         overview = if_written(self.overview)
         history = if_written(lambda: self.files.history(self.chosen))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
 import numpy as np
 
-from d2rpick.choice.objections import objections
+from d2rpick.choice.expectation import objections
 from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures
 from d2rpick.vibration.model import measured_of, moments_of
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.choice.objections import Objection
+    from d2rpick.choice.expectation import Objection
     from d2rpick.choice.situation import Situation
     from d2rpick.flight.bodies import Off
     from d2rpick.histories.history import Samples

@@ -14,9 +14,9 @@ from d2rpick.deck.printing import SOLVERS, cards, solver_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from d2rpick.choice.answers import Verdict
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.situation import Settings, Situation
-    from d2rpick.choice.verify import Verdict
     from d2rpick.deck.printed_card import PrintedCard, Times
     from d2rpick.histories.history import History
 

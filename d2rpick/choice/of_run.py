@@ -8,10 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
+from d2rpick.choice.answers import Suggestion, Verdict, suggest_at, verify, verify_at, with_comparison
 from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_health, refuse_unsound
 from d2rpick.choice.situation import examine
-from d2rpick.choice.suggest import Suggestion, suggest_at
-from d2rpick.choice.verify import Verdict, verify, verify_at, with_comparison
 from d2rpick.choice.warnings import cautions_of_engine
 from d2rpick.histories.balance import balance_of
 from d2rpick.histories.opening import Selection, open_run

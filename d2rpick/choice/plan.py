@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice.flights import bounds, flights_of, last_td
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import Reference, check_units, suggest_of
 from d2rpick.choice.switched_run import Done, done_windows, switched_history
 from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
+from d2rpick.choice.windows import bounds, flights_of, last_td
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import Margin, margin_before_contact
 from d2rpick.vibration.measures import run_time_share
@@ -29,10 +29,10 @@ from d2rpick.vibration.span import Fits
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from d2rpick.choice.answers import Suggestion
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.ranking import Quality
     from d2rpick.choice.situation import Settings
-    from d2rpick.choice.suggest import Suggestion
     from d2rpick.choice.switched_run import Times
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History

@@ -13,7 +13,10 @@ import numpy as np
 
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, D2RPickError, RangeError, listing, one_line
 from d2rpick.base.version import __version__
-from d2rpick.choice.acceptable_windows import (
+from d2rpick.choice.of_run import read, suggest_of
+from d2rpick.choice.ranking import EQUALLY_GOOD
+from d2rpick.choice.warnings import Caution
+from d2rpick.choice.windows import (
     acceptable_windows,
     alike_windows,
     clear_of_td,
@@ -22,9 +25,6 @@ from d2rpick.choice.acceptable_windows import (
     error_at,
     error_profile,
 )
-from d2rpick.choice.of_run import read, suggest_of
-from d2rpick.choice.ranking import EQUALLY_GOOD
-from d2rpick.choice.warnings import Caution
 from d2rpick.histories.names import Selection
 from d2rpick.histories.samples import outline
 from d2rpick.histories.source import expand
@@ -32,8 +32,8 @@ from d2rpick.histories.source import expand
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from d2rpick.choice.answers import Suggestion
     from d2rpick.choice.situation import Settings
-    from d2rpick.choice.suggest import Suggestion
     from d2rpick.histories.history import Samples
 
 # A run has one of these; the first two were judged.

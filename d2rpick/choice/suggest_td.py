@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.choice.answers import Pair, Suggestion, suggest_at
 from d2rpick.choice.candidates import candidates_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
-from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, rank
 from d2rpick.choice.situation import examine
-from d2rpick.choice.suggest import Pair, Suggestion, suggest_at
+from d2rpick.choice.windows import longest_flight
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import margin_before_contact

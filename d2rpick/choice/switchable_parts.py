@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError, if_written, name_units
-from d2rpick.choice.flights import bounds, flights_of
+from d2rpick.choice.windows import bounds, flights_of
 from d2rpick.deck.geometry import masses_and_steps
 from d2rpick.deck.model import DISCRETE
 from d2rpick.deck.pieces import pieces_of

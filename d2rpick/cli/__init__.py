@@ -45,10 +45,10 @@ _EXPERIMENTS: Final = {
 COMMANDS: Final = _WORK | _EXPERIMENTS
 # Modules of those that stand in one of another name.
 _MODULES: Final = {
-    **dict.fromkeys(("suggest", "explore", "verify", "parts"), "one_run"),
-    **dict.fromkeys(("info", "extract"), "histories"),
+    **dict.fromkeys(("info", "extract", "suggest", "explore", "verify", "parts"), "one_run"),
     **dict.fromkeys(("replay", "rollover"), "models"),
-    "rule": "check",
+    **dict.fromkeys(("drive", "follow", "first"), "running"),
+    **dict.fromkeys(("card", "check", "rule"), "decks"),
     "calibrate": "study",
 }
 COULD_NOT_RUN: Final = 2

@@ -20,9 +20,9 @@ from d2rpick.report.view import locked_in, response, scale_in, view_of
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from d2rpick.choice.answers import AcceptableWindow
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.situation import Situation
-    from d2rpick.choice.suggest import AcceptableWindow
     from d2rpick.choice.trade_off import Offer, TradeOff
     from d2rpick.histories.history import Samples
     from d2rpick.report.view import View

@@ -36,14 +36,13 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
+    from d2rpick.choice.answers import Pair, Suggestion, Verdict
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.study import Study, StudyRow
-    from d2rpick.choice.suggest import Pair, Suggestion
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.trade_off import TradeOff
-    from d2rpick.choice.verify import Verdict
     from d2rpick.histories.history import History, Samples
     from d2rpick.report.view import Motion, View
 

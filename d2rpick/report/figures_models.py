@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.choice.answers import Suggestion
     from d2rpick.models.box_model import Parameters
     from d2rpick.models.box_run import Outcome, Record, RigidWindow
     from d2rpick.vibration.oscillator import Replay, Trajectory

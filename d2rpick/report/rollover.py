@@ -11,7 +11,7 @@ from d2rpick.report.fields import Document, Field, csv_of, many, row
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.suggest import Suggestion
+    from d2rpick.choice.answers import Suggestion
     from d2rpick.choice.warnings import Caution
     from d2rpick.models.box_run import Outcome, Record
     from d2rpick.report.formats import Shown

@@ -14,9 +14,9 @@ from d2rpick.report.situation import heading
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from d2rpick.choice.answers import AcceptableWindow, Pair, Suggestion
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.ranking import Quality
-    from d2rpick.choice.suggest import AcceptableWindow, Pair, Suggestion
     from d2rpick.report.formats import Shown
 
 # Windows of acceptable tr that a line names.

@@ -10,8 +10,8 @@ from d2rpick.report.fields import Document, Field, kind_of, maybe, row
 from d2rpick.report.situation import heading
 
 if TYPE_CHECKING:
+    from d2rpick.choice.answers import Verdict
     from d2rpick.choice.comparison import Comparison
-    from d2rpick.choice.verify import Verdict
     from d2rpick.report.formats import Shown
 
 # The pair that was judged, its measures and what they come to.

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError, FormatError, name_units
+from d2rpick.choice.answers import find_better_pair, suggest_at
 from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.choice.of_run import Reference, verify_of
 from d2rpick.choice.situation import examine
-from d2rpick.choice.suggest import find_better_pair, suggest_at
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, Caution, end_of_flight, end_of_load
 from d2rpick.deck import read_inventory
 from d2rpick.histories.digits import above, first_as_read, in_the_record
@@ -22,9 +22,9 @@ from d2rpick.rules.base import Fault
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
+    from d2rpick.choice.answers import Verdict
     from d2rpick.choice.situation import Settings
     from d2rpick.choice.switched_run import Times
-    from d2rpick.choice.verify import Verdict
     from d2rpick.deck import Window
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run, Selection

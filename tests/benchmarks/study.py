@@ -28,7 +28,7 @@ RUNS, STATES, FEW, ROUNDS = 1000, 10_000, 100, 3
 MOST, MOST_GROWN = 1.25, 25.0
 LOOP = f"""
 import sys
-from d2rpick.choice.suggest import suggest
+from d2rpick.choice.answers import suggest
 from d2rpick.choice.of_run import read
 from d2rpick.choice.situation import Settings
 found = [suggest(read([name]).history, {TD}, Settings()).recommended for name in sys.argv[1:]]

@@ -5,7 +5,9 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.acceptable_windows import (
+from d2rpick.choice.answers import Suggestion, suggest, verify, verify_at
+from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.windows import (
     acceptable_windows,
     alike_windows,
     clear_of_td,
@@ -14,9 +16,6 @@ from d2rpick.choice.acceptable_windows import (
     error_at,
     error_profile,
 )
-from d2rpick.choice.situation import Settings, examine
-from d2rpick.choice.suggest import Suggestion, suggest
-from d2rpick.choice.verify import verify, verify_at
 from d2rpick.histories.history import History, Samples
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.modes import Mode, Modes

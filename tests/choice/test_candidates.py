@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from d2rpick.choice.answers import suggest
 from d2rpick.choice.candidates import candidates_of, find_candidates
 from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.suggest import suggest
 from d2rpick.choice.suggest_td import looking
 from d2rpick.vibration import measures
 from tests import paper

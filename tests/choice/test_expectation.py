@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from d2rpick.choice.acceptable_windows import acceptable_windows
+from d2rpick.choice.answers import suggest_at, verify_at
 from d2rpick.choice.candidates import judge
 from d2rpick.choice.expectation import MOST_KEPT, expectation, most_energy
 from d2rpick.choice.situation import Settings, Situation, examine
-from d2rpick.choice.suggest import suggest_at
 from d2rpick.choice.trade_off import offers_of
-from d2rpick.choice.verify import verify_at
+from d2rpick.choice.windows import acceptable_windows
 from d2rpick.histories.history import History
 from d2rpick.rules.judgement import faults_of
 from tests.energies import sure

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.flights import find_flights
 from d2rpick.choice.of_run import read
+from d2rpick.choice.windows import find_flights
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.margin import SHARE, landing_spread, margin_before_contact
 from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta

@@ -5,9 +5,9 @@ from functools import partial
 
 import pytest
 
+from d2rpick.choice.answers import verify
 from d2rpick.choice.judged_card import CardRequest, judged_card
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.verify import verify
 from d2rpick.deck.printed_card import Printing
 from tests.command import ENERGY, GLSTAT
 from tests.energies import sure

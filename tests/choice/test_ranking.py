@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.choice.answers import suggest, verify
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.of_run import read
 from d2rpick.choice.ranking import (
@@ -21,8 +22,6 @@ from d2rpick.choice.ranking import (
     states_per_period,
 )
 from d2rpick.choice.situation import Settings, examine
-from d2rpick.choice.suggest import suggest
-from d2rpick.choice.verify import verify
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.report.formats import Shown

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.choice.answers import verify
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.study import (
     NONE,
@@ -24,7 +25,6 @@ from d2rpick.choice.study import (
     outliers,
     summarise,
 )
-from d2rpick.choice.verify import verify
 from d2rpick.histories.opening import Selection
 from tests import variants
 from tests.command import BOX, GLSTAT

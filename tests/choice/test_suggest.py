@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from d2rpick.choice.answers import suggest
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.suggest import suggest
 from d2rpick.vibration.oscillator import to_mode
 from tests import paper
 from tests.energies import codes, of, rollover, sure, vibration

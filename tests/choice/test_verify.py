@@ -8,11 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.base.errors import RangeError
+from d2rpick.choice.answers import Pair, suggest, verify, verify_at
 from d2rpick.choice.of_run import read
 from d2rpick.choice.situation import Settings, examine
-from d2rpick.choice.suggest import Pair, suggest
 from d2rpick.choice.suggest_td import suggest_in_window
-from d2rpick.choice.verify import verify, verify_at
 from d2rpick.histories.history import History
 from tests import paper
 from tests.computed import stored

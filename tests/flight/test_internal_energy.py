@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.answers import suggest
 from d2rpick.choice.situation import Settings, examine
-from d2rpick.choice.suggest import suggest
+from d2rpick.choice.windows import find_flights
 from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around
 from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision, Samples

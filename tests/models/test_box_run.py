@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from d2rpick.choice.answers import suggest
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.suggest import suggest
 from d2rpick.models.box_run import history_of
 from tests.faults import few
 from tests.rehearsals import SETS, rehearse

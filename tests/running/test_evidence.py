@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.flights import bounds, flights_of
 from d2rpick.choice.situation import Settings
+from d2rpick.choice.windows import bounds, flights_of
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.running.evidence import contact_after, highest_energy, quiet_times
 from d2rpick.running.wait import InnerMotion

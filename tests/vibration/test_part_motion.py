@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from d2rpick.choice.answers import suggest
 from d2rpick.choice.situation import Settings, examine
-from d2rpick.choice.suggest import suggest
 from d2rpick.histories.history import History
 from d2rpick.vibration.measures import kinetic_share, lock_in_error
 from d2rpick.vibration.part_motion import all_zeros, by_own_modes, followed

@@ -1,0 +1,218 @@
+"""The commands ``drive``, ``follow`` and ``first``: runs that switch themselves, and runs that are watched."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from d2rpick.api.request import NOT_NEGATIVE, POSITIVE, Option
+from d2rpick.base.errors import printable
+from d2rpick.cli import options
+from d2rpick.cli.output import tell, text_bytes, with_options
+from d2rpick.cli.progress import telling
+from d2rpick.cli.values import click_type
+from d2rpick.report.formats import FORMATS
+
+if TYPE_CHECKING:
+    from d2rpick.api.drives import Driving
+    from d2rpick.api.request import Request
+    from d2rpick.cli.output import Output
+    from d2rpick.running.drive import Driver
+
+
+CMD = ("text", "CMD")
+DRIVE: Final = """\b
+Examples:
+  d2rpick drive sample_data/flying_box/BOX_0000.rad --wait 0.002 -o driven --dry-run \\
+      --starter 'starter -i {deck} -np 4' --engine 'mpirun -np 4 engine -i {deck}'
+"""
+
+
+@options.command("drive", DRIVE)
+@click.argument("deck", type=click_type("file"))
+@click.option(
+    "-o", "folder", metavar="RUNDIR", required=True, type=click_type("file"), help="Folder of the run; made if missing."
+)
+@options.option(
+    "part", Option("Parts to switch.  [default: those of the bodies that the deck puts off]", "text", "IDS", many=True)
+)
+@options.option(
+    "wait",
+    Option("Time without force that counts as flight.  [default: half of the longest inner period known so far]",
+           POSITIVE, "T"),
+)  # fmt: skip
+@options.option(
+    "margin", Option("From td to the contact.  [default: 2 ms, or 3% of the flight if that is more]", POSITIVE, "T")
+)
+@options.option(
+    "starter", Option("Command that runs the starter on {deck}.  [default: that of OPENRADIOSS_PATH]", *CMD)
+)
+@options.option("engine", Option("Command that runs the engine on {deck}.  [default: that of OPENRADIOSS_PATH]", *CMD))
+@click.option(
+    "--threads", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
+    help="Threads of the solver; {threads} in a command.",
+)  # fmt: skip
+@click.option("--resume", is_flag=True, help="Go on with a run that has begun in RUNDIR.")
+@click.option("--dry-run", is_flag=True, help="Print what would be started, and start nothing.")
+@options.takes(
+    "report",
+    "output_format",
+    "overwrite",
+    "quiet",
+    report="Write windows, energy and evidence to one HTML page.",
+    forms=FORMATS["drive"],
+)
+def drive(
+    deck: str,
+    folder: str,
+    part: tuple[str, ...],
+    wait: float | None,
+    margin: float | None,
+    starter: str | None,
+    engine: str | None,
+    threads: int,
+    resume: bool,
+    dry_run: bool,
+    output: Output,
+) -> None:
+    """Compute a Radioss run that switches itself: no reference is needed.
+
+    DECK, a starter deck with one engine file, is copied into RUNDIR.  Each flight begins when no force has acted for
+    the wait; tr is the highest energy within one more.  A rigid probe finds the next contact and is thrown away.  Then
+    the run is rigid to the margin before it, and goes on deformable.  What is interrupted goes on with --resume.
+    """
+    import signal
+    from pathlib import Path
+
+    from d2rpick.api.drives import Asked, Driving
+    from d2rpick.running.drive import Commands
+
+    asked = Asked(
+        deck=deck, folder=Path(folder), part=part, wait=wait, margin=margin,
+        commands=Commands(starter, engine, threads),
+    )  # fmt: skip
+    output = output.beside(deck)
+    driving = Driving(asked, (lambda _: None) if output.quiet else tell)
+    output.notes(driving.deck.notes, driving.cautions)
+    if dry_run:
+        return click.echo("\n".join(_plan(driving)))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with (
+        driving.driver(resume=resume) as driver,
+        telling(lambda seconds: _progress(driver, seconds), quiet=output.quiet),
+    ):
+        driver.prepare()
+        driver.run()
+        answer = driving.answer(driver, click.get_current_context().meta["d2rpick.command"])
+    output.beside_answer(answer, lambda: answer.page(options.repeat()))
+    return output.answer(answer)
+
+
+def _plan(driving: Driving) -> list[str]:
+    import shlex
+
+    deck, commands = driving.deck, driving.asked.commands
+    bodies = ", ".join(map(str, deck.nodes))
+    return [
+        f"copies    {', '.join(deck.files)} to {driving.asked.folder}",
+        f"starts    {shlex.join(commands.words('starter', f'{deck.name}_0000.rad'))}",
+        f"          {shlex.join(commands.words('engine', f'{deck.name}_0001.rad'))}, and further legs",
+        f"switches  {len(deck.parts)} parts by main node {bodies}, to the end at {deck.end:g}",
+    ]
+
+
+def _progress(driver: Driver, seconds: float) -> str:
+    if driver.at is None:
+        return f"starting ... {seconds:.0f} s"
+    order, time = driver.at
+    return f"leg {order.number}, {order.kind}: {time:.6g} of {driver.limits.end:g}"
+
+
+FOLLOW: Final = """\b
+Examples:
+  d2rpick follow --once --part box sample_data/rolloverT01.gz
+  d2rpick follow --for 2 -f ndjson sample_data/rolloverT01.gz
+"""
+
+
+@options.command("follow", FOLLOW)
+@click.argument("run", metavar="RUN", type=click_type("file"))
+@click.option(
+    "--wait", type=click_type(POSITIVE), metavar="T",
+    help="Time without a force that counts as flight.  [default: half of the longest inner period that is known]",
+)  # fmt: skip
+@click.option(
+    "--once", is_flag=True, cls=options.Either, instead_of=("lasting",), help="Tell what there is now, and end."
+)
+@click.option(
+    "--for", "lasting", type=click_type(NOT_NEGATIVE), metavar="T", cls=options.Either, instead_of=("once",),
+    help="End after so many seconds.  [default: when the run has ended]",
+)  # fmt: skip
+@options.takes(
+    *("part", "deck", "output_format", "exit_zero", "quiet"),
+    deck="Main deck of the run: tells gravity, supports, bodies, and the period of parts on springs.",
+    forms=("table", "ndjson"),
+)
+def follow(run: str, wait: float | None, once: bool, lasting: float | None, request: Request, output: Output) -> None:
+    """Watch RUN, files or a folder, while it is computed: say when it flies, and when to switch.
+
+    A line for each event: load, flight with its evidence, a switch advised, contact, restart, silence, end.  RUN need
+    not have begun.  Nothing is started, stopped or changed.
+    """
+    from d2rpick.api.running import follow as events
+
+    if once and lasting is not None:
+        raise click.UsageError("--once and --for exclude each other")
+    seconds = 0.0 if once else lasting
+    failed, since = False, None
+    try:
+        for one in events(run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds):
+            failed, since = failed or one.event == "failed", one.time
+            if output.output_format == "ndjson":
+                text = json.dumps(one._asdict(), allow_nan=False)
+            else:
+                seen = "-" if one.seen is None else f"{one.seen:.6g}"
+                text = f"{seen:>10}  {one.event:<10}  {with_options(one.message)}"
+            click.echo(text_bytes(f"{text}\n"), nl=False)
+    except KeyboardInterrupt:
+        return
+    output.finish(objection=failed or (seconds is not None and since is None))
+
+
+FIRST: Final = """\b
+Examples:
+  d2rpick first --part 1 --wait 0.02 sample_data/falling_plate/plate_0000.rad -o first/
+  d2rpick first --part 1 --wait 0.02 --after 0.05 sample_data/falling_plate/plate_0000.rad -o later/
+"""
+
+
+@options.command("first", FIRST)
+@click.argument("deck", type=click_type("file"))
+@options.option(
+    "part",
+    Option(
+        "Parts to switch, by number (3,7) or range (10-19).  [default: Radioss, those of bodies that are put off]",
+        *("names", "IDS"), many=True,
+    ),
+)  # fmt: skip
+@options.option("wait", Option("Time without force that counts as flight.  [default: by the deck]", POSITIVE, "T"))
+@options.option("after", Option("Nothing becomes rigid before.", NOT_NEGATIVE, "T"))
+@options.option(
+    "output_dir", Option("Folder for the copy, made where there is none.", "file", "DIR", short=("-o",)), required=True
+)
+@options.takes("overwrite", "quiet")
+def first(
+    deck: str, part: tuple[str, ...], wait: float | None, after: float | None, output_dir: str, output: Output
+) -> None:
+    """Write a copy of DECK whose first run switches itself: no reference run is needed.
+
+    The solver makes the parts rigid when no contact has had a force for the wait, and deformable with the next force.
+    Radioss: legs that sensors end, and the rigid bodies that the deck lacks.  LS-DYNA: switches with contact codes.
+    """
+    from d2rpick.api.running import prepared
+
+    found = prepared(deck, output_dir, part, wait, after, output.overwrite)
+    output.notes(found.notes, ())
+    click.echo("\n".join(f"written  {printable(name)}" for name in found.files))
