@@ -78,6 +78,16 @@ class _Witness:
         """First state, not before ``least``, from which no force shows up to ``last``."""
         return farthest(last, least, lambda first: self.left(first, last) <= 1)
 
+    def stretches(self) -> Iterator[tuple[int, int]]:
+        """First and last states between which no force shows."""
+        first, end = 0, self.time.size - 1
+        while first + FEWEST <= self.time.size:
+            last = self.last_without(first)
+            yield first, last
+            if last == end:
+                return
+            first = self.first_without(last + 1, first)
+
     def gravity(self, first: int, last: int, balance: Balance | None) -> float | None:
         """Gravity between two states, as of `Laws.gravity`, by what was written up to then."""
         if self.momenta is None:
@@ -102,6 +112,12 @@ def quiet_times(history: History, waiting: Waiting) -> tuple[Quiet, ...]:
         if not kept or (kept[-1].end is not None and one.seen > kept[-1].end):
             kept.append(_going_on(one, reach, [other for other, _ in found]))
     return tuple(kept)
+
+
+def times_without_force(history: History) -> Iterator[tuple[float, float]]:
+    """Give from when to when no force shows, or a constant one, however short that is [time]."""
+    for one in _witnesses(history):
+        yield from ((float(one.time[first]), float(one.time[last])) for first, last in one.stretches())
 
 
 def _going_on(one: Quiet, reach: float, found: Sequence[Quiet]) -> Quiet:
@@ -135,14 +151,9 @@ def highest_energy(history: History, start: float, end: float) -> float:
 
 
 def _quiet(history: History, witness: _Witness, waiting: Waiting) -> Iterator[Quiet]:
-    first = 0
-    while first + FEWEST <= witness.time.size:
-        last = witness.last_without(first)
+    for first, last in witness.stretches():
         if found := _seen(history, witness, waiting, first, last):
             yield found
-        if last == witness.time.size - 1:
-            return
-        first = witness.first_without(last + 1, first)
 
 
 def _seen(history: History, witness: _Witness, waiting: Waiting, first: int, last: int) -> Quiet | None:

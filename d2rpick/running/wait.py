@@ -17,9 +17,10 @@ from d2rpick.deck.inner_period import inner_period
 from d2rpick.flight.momentum import believed
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import window
+from d2rpick.running.evidence import times_without_force
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Samples
@@ -163,12 +164,8 @@ class InnerMotion:
     @cached_property
     def _known(self) -> tuple[_Known, ...]:
         """Half periods in the order in which they become known, without those of a body that turns."""
-        found = sorted(
-            _Known(float(motion.time[one.known]), one.half, one.strength, motion.name)
-            for motion in self._motions
-            for one in motion.swings
-            if one.strength > 0
-        )
+        free = [*times_without_force(self._history)]
+        found = sorted(one for motion in self._motions for one in _own(motion, free))
         strongest = np.maximum.accumulate([one.strength for one in found])
         return tuple(one for one, most in zip(found, strongest, strict=True) if one.strength >= _SLOW * most)
 
@@ -193,6 +190,20 @@ def check_wait(given: float, known: Wait | None, name: str) -> None:
             f"{name}: `wait` {given:g} is below {known.time:.3g}, half of a period that is known: {known.reason}; "
             "a gap in the load would pass for flight"
         )
+
+
+def _own(motion: _Motion, free: Sequence[tuple[float, float]]) -> Iterator[_Known]:
+    """Give the half periods of a motion: where it has shown one without a force, in ``free`` times, those alone.
+
+    A push within a swing makes it longer or shorter.
+    """
+    has_own = False
+    for one in motion.swings:
+        begin, end, known = (float(motion.time[state]) for state in (one.begin, one.end, one.known))
+        own = any(start <= begin and end <= stop for start, stop in free)
+        has_own |= own and one.strength > 0
+        if one.strength > 0 and (own or not has_own):
+            yield _Known(known, one.half, one.strength, motion.name)
 
 
 def _of_parts(history: History) -> Iterator[_Motion]:

@@ -43,7 +43,7 @@ def spans(found: Sequence[Quiet]) -> NDArray[np.float64]:
     ("name", "expected"),
     [
         (CAR, [(0.0, 0.0023), (0.0384, 0.1504)]),
-        (BOX, [(0.0, 0.2858), (0.3022, 0.3386), (0.3396, 0.4196), (0.4204, 0.48), (0.502, 0.5968)]),
+        (BOX, [(0.0, 0.2858), (0.3022, 0.3386), (0.3396, 0.4196), (0.4204, 0.48), (0.4806, 0.5014), (0.502, 0.5968)]),
     ],
 )
 def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
@@ -54,6 +54,12 @@ def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
     assert spans(found)[: len(expected)] == pytest.approx(np.array(expected), abs=5e-4)
     assert all(one.seen - one.start >= one.wait and one.left <= 1e-4 for one in found)
     assert all(one.gravity == pytest.approx(9.81, rel=5e-3) for one in found)
+
+
+def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
+    """In the box the longest swing was pushed at 302 ms and took 24 ms, half of the period of the springs is 17 ms."""
+    waits = [one.wait for one in quiet_times(record(BOX), InnerMotion(record(BOX)))]
+    assert all(0.016 <= one <= 0.021 for one in waits[1:])
 
 
 @pytest.mark.parametrize("name", [CAR, BOX])
@@ -104,4 +110,6 @@ def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
     listed = np.array([bounds(history, one) for one in flights_of(history, Settings())])
     for one in quiet_times(history, InnerMotion(history)):
         found = one.start, history.time[-1] if one.end is None else one.end
+        if found[1] - one.start < 2 * one.wait:
+            continue  # info lists none that is so short beside the others
         assert np.abs(listed - found).max(axis=1).min() <= 3 * history.step
