@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.printing import EngineFile, engine_lines
 from d2rpick.deck.radioss_bodies import bodies_for
-from d2rpick.deck.radioss_deck import blocks, card_of, kept_off, keyword, numbers
-from d2rpick.deck.radioss_run import parts_off, read_run
+from d2rpick.deck.radioss_deck import Leg, blocks, card_of, kept_off, keyword, numbers
+from d2rpick.deck.radioss_run import Run, parts_off, read_run
 from d2rpick.deck.writing import copies, repeated, text_of, with_cards
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
-    from d2rpick.deck.radioss_deck import Leg
-    from d2rpick.deck.radioss_run import Run
 
 _NOT_REPEATED: Final = {"RFILE"}  # restarts are written as the driver needs them
 # Restarts of a leg that are kept, and cycles between them.  One costs as much as some five cycles; of two, one is whole

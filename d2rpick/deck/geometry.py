@@ -17,13 +17,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.deck.mesh import NO_NODE
+from d2rpick.deck.mesh import NO_NODE, Elements
 from d2rpick.deck.model import DISCRETE
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
-    from d2rpick.deck.mesh import Elements
     from d2rpick.deck.model import Inventory, Material, PartData, Places, Reals
 
 _PIECE: Final = 1 << 14

@@ -16,14 +16,13 @@ import numpy as np
 
 from d2rpick.base.errors import name_units
 from d2rpick.deck.geometry import masses_and_steps, sizes_and_lengths
-from d2rpick.deck.model import DISCRETE, SPRING
+from d2rpick.deck.model import DISCRETE, SPRING, Inventory
 from d2rpick.deck.pieces import labels_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
     from d2rpick.deck.mesh import Places, Reals
-    from d2rpick.deck.model import Inventory
 
 # What swings with a smaller share of the mass of all that hangs on springs moves the others too little.
 _HEAVY: Final = 0.05

@@ -17,7 +17,7 @@ import numpy as np
 
 from d2rpick.deck.mesh import layout, lines_of
 from d2rpick.deck.model import Boundary, Gravity, Hold, Joint, Joints, ids, plateaus
-from d2rpick.deck.parts import material_of, node_sets, read_constraints, read_welds, rigid_materials
+from d2rpick.deck.parts import Parts, material_of, node_sets, read_constraints, read_welds, rigid_materials
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card, Row
     from d2rpick.deck.mesh import Reals
     from d2rpick.deck.model import Places
-    from d2rpick.deck.parts import Parts
     from d2rpick.deck.reader import Deck
 
     Sets = Callable[[], dict[int, frozenset[int]]]

@@ -15,7 +15,7 @@ import numpy as np
 
 from d2rpick.base.errors import name_units
 from d2rpick.deck.expression import ExpressionError, number
-from d2rpick.deck.radioss_deck import number_of
+from d2rpick.deck.radioss_deck import Starter, number_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.deck.card import Card, Scope
-    from d2rpick.deck.radioss_deck import Starter
     from d2rpick.deck.source import Block
 
     Layout = Sequence[tuple[int, int]]  # first column and width of each field

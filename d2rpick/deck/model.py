@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 import numpy as np
 
 from d2rpick.base.graph import reached
-from d2rpick.deck.mesh import NO_NODE, distinct
+from d2rpick.deck.mesh import NO_NODE, Elements, NodeTable, distinct
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.deck.mesh import Elements, NodeTable
     from d2rpick.deck.radioss_run import Flaw, LeftRigid
     from d2rpick.deck.source import SourceFile
 

@@ -12,10 +12,10 @@ import numpy as np
 from d2rpick.deck import formulations, radioss_loads
 from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.mesh import KINDS, NOT_COUNTED, Mesh, elements_of, nodes_of
-from d2rpick.deck.model import Inventory, Material, PartData, Section, placed
-from d2rpick.deck.radioss_deck import SOLIDS, below_title, card_of, kept_off, number_of
+from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section, placed
+from d2rpick.deck.radioss_deck import SOLIDS, Starter, below_title, card_of, kept_off, number_of
 from d2rpick.deck.radioss_flaws import flaws_of
-from d2rpick.deck.radioss_run import find_run_windows, left_rigid
+from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid
 from d2rpick.deck.reader import cuts, holds_mesh
 
 if TYPE_CHECKING:
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Row
     from d2rpick.deck.mesh import Integers
-    from d2rpick.deck.model import Formulation
-    from d2rpick.deck.radioss_deck import Starter
-    from d2rpick.deck.radioss_run import Run
     from d2rpick.deck.switching import Window
 
 _WIDTH, _REAL = 10, 20

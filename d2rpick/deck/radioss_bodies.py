@@ -14,11 +14,11 @@ from d2rpick.base.errors import DeckError, are, name_units
 from d2rpick.deck import radioss
 from d2rpick.deck.geometry import Placement, masses_and_steps
 from d2rpick.deck.mesh import nodes_of
-from d2rpick.deck.model import DISCRETE
+from d2rpick.deck.model import DISCRETE, Inventory
 from d2rpick.deck.pieces import pieces_of
-from d2rpick.deck.radioss_deck import below_title, keyword, whole
+from d2rpick.deck.radioss_deck import Body, Starter, below_title, keyword, whole
 from d2rpick.deck.radioss_flaws import NodeGroups
-from d2rpick.deck.radioss_run import read_run, rigid_parts
+from d2rpick.deck.radioss_run import Run, read_run, rigid_parts
 from d2rpick.deck.reader import cuts
 
 if TYPE_CHECKING:
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Reals
-    from d2rpick.deck.model import Inventory
-    from d2rpick.deck.radioss_deck import Body, Starter
-    from d2rpick.deck.radioss_run import Run
 
 _PER_LINE: Final = 10
 _STAYS: Final = 1  # Ikrem: the starter leaves the nodes in rigid walls

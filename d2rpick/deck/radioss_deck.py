@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.graph import reached
 from d2rpick.deck.card import Card, Field, Row, Scope, Value
 from d2rpick.deck.expression import ExpressionError, number
-from d2rpick.deck.source import Block
+from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
-
-    from d2rpick.deck.source import SourceFile
 
 
 _INCLUDE = b"#include"

@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.deck.model import Boundary, Gravity, Hold, Joint, Joints, ids, plateaus
-from d2rpick.deck.radioss_deck import below_title, blocks, keyword, number_of, reals, whole
+from d2rpick.deck.radioss_deck import Starter, below_title, blocks, keyword, number_of, reals, whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card, Row
-    from d2rpick.deck.radioss_deck import Starter
     from d2rpick.deck.radioss_run import Run
 
 

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
-from d2rpick.deck.card import Value
-from d2rpick.deck.radioss_deck import Leg, Starter, blocks, card_of, kept_off, keyword, read_legs
+from d2rpick.deck.card import Card, Field, Value
+from d2rpick.deck.radioss_deck import Body, Leg, Starter, blocks, card_of, kept_off, keyword, read_legs
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows, follow
@@ -25,8 +25,6 @@ from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Win
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.deck.card import Card, Field
-    from d2rpick.deck.radioss_deck import Body, Leg
 
 THROUGH_WALL: Final = "body-through-wall"
 AT_REST: Final = "body-without-velocity"

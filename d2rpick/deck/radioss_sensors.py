@@ -11,14 +11,12 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.printed_card import shortest
-from d2rpick.deck.radioss_deck import below_title, blocks, card_of, keyword, reals
+from d2rpick.deck.printed_card import Times, shortest
+from d2rpick.deck.radioss_deck import Starter, below_title, blocks, card_of, keyword, reals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.deck.printed_card import Times
-    from d2rpick.deck.radioss_deck import Starter
     from d2rpick.deck.source import Block, SourceFile
 
     Spans = tuple[Times, ...]

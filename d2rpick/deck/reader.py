@@ -12,14 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.card import LONG, STANDARD, Card, Problem, Scope, Transform
+from d2rpick.deck.card import LONG, STANDARD, Card, Field, Problem, Row, Scope, Transform
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.deck.card import Field, Problem, Row
-    from d2rpick.deck.source import Block
 
 _CONTINUED = " +"
 _FACTORS, _OF_TIME = 3, 1  # of mass, time and length

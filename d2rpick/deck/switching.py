@@ -14,15 +14,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
-from d2rpick.deck.card import Value
-from d2rpick.deck.reader import SWITCHING
+from d2rpick.deck.card import Card, Field, Row, Value
+from d2rpick.deck.reader import SWITCHING, Deck
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.deck.card import Card, Field, Row
     from d2rpick.deck.parts import Parts
-    from d2rpick.deck.reader import Deck
 
 Kind = Literal["automatic", "plain", "inertia", "restart"]
 

@@ -9,22 +9,18 @@ from typing import TYPE_CHECKING
 from d2rpick.base.errors import DeckError, name_units
 from d2rpick.base.files import write_whole
 from d2rpick.deck.parts import read_parts
-from d2rpick.deck.printing import listed, off
-from d2rpick.deck.radioss_deck import Starter, blocks, kept_off, keyword, read_legs
+from d2rpick.deck.printing import EngineFile, listed, off
+from d2rpick.deck.radioss_deck import Leg, Starter, blocks, kept_off, keyword, read_legs
 from d2rpick.deck.radioss_run import read_run, run_files
 from d2rpick.deck.radioss_sensors import with_sensors
-from d2rpick.deck.reader import cure, cuts, read_deck
-from d2rpick.deck.source import SourceFile
+from d2rpick.deck.reader import Deck, cure, cuts, read_deck
+from d2rpick.deck.source import Block, SourceFile
 from d2rpick.deck.switching import find_windows, read_switching
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.deck.printed_card import PrintedCard
-    from d2rpick.deck.printing import EngineFile
-    from d2rpick.deck.radioss_deck import Leg
-    from d2rpick.deck.reader import Deck
-    from d2rpick.deck.source import Block
 
 _ONCE = {"INIV", "END"}  # engine keywords that a later leg must not repeat: velocities are set at its start again
 

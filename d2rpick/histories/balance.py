@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.history import Balance, Momenta
-from d2rpick.histories.names import is_internal_energy, normalised
+from d2rpick.histories.history import Balance, Momenta, Samples
+from d2rpick.histories.names import Part, is_internal_energy, normalised
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.database import Legs
-    from d2rpick.histories.history import Samples
-    from d2rpick.histories.names import Part
 
 # Normalised names, see `d2rpick.histories.names`: glstat and binout, Radioss, Abaqus (ALLAE is its hourglass energy),
 # tables.  Names are taken whole: "eroded hourglass energy" is another quantity.

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final, Protocol
 import numpy as np
 
 from d2rpick.base.errors import FormatError, listing
-from d2rpick.histories.history import Precision
-from d2rpick.histories.names import quantity_of, resolve, with_namesakes
+from d2rpick.histories.history import Precision, Samples
+from d2rpick.histories.names import Part, quantity_of, resolve, with_namesakes
 from d2rpick.histories.samples import newest_states
 
 if TYPE_CHECKING:
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import Samples
-    from d2rpick.histories.names import Part
 
 # A restart steps back once; times that do so in more than this share of their states are none.
 _MOST_BACK: Final = 0.1

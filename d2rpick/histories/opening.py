@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, cast
 
 from d2rpick.base.errors import FormatError, printable
 from d2rpick.histories.companions import check_companions, check_legs
-from d2rpick.histories.database import Legs
+from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.names import Selection
 from d2rpick.histories.run import Run
 from d2rpick.histories.source import Source, open_files
@@ -20,7 +20,6 @@ from d2rpick.histories.source import Source, open_files
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from d2rpick.histories.database import Database
     from d2rpick.histories.history import Samples
 
 __all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]

@@ -11,18 +11,15 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.companions import check_sum, doubts
-from d2rpick.histories.history import History, Momenta, Track
-from d2rpick.histories.names import QUANTITIES, menu, quantity_note, select_parts
-from d2rpick.histories.surroundings import UNKNOWN
+from d2rpick.histories.history import Balance, History, Momenta, Samples, Track
+from d2rpick.histories.names import QUANTITIES, Part, Selection, menu, quantity_note, select_parts
+from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.database import Legs
-    from d2rpick.histories.history import Balance, Samples
-    from d2rpick.histories.names import Part, Selection
     from d2rpick.histories.source import Source
-    from d2rpick.histories.surroundings import Surroundings
 
 _AXES = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")

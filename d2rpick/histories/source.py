@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.files import FileState, bound, unpacked_beyond
-from d2rpick.histories.content import stored
+from d2rpick.histories.content import OnDisk, stored
 from d2rpick.histories.names import in_seconds, near_miss
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from d2rpick.histories.content import OnDisk
 
 STDIN = "-"
 _GZIP = b"\x1f\x8b"

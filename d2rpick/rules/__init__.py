@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
-from d2rpick.deck import radioss_run, read_deck
+from d2rpick.deck import Deck, Window, radioss_run, read_deck
 from d2rpick.rules import reading, runs, sets, switched_parts, times
 from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, RunCase, Severity, Unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck import Deck, Window
 
 __all__ = [
     "RULES",

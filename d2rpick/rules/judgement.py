@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError, FormatError, name_units
-from d2rpick.choice.answers import find_better_pair, suggest_at
+from d2rpick.choice.answers import Verdict, find_better_pair, suggest_at
 from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.choice.of_run import Reference, verify_of
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, Caution, end_of_flight, end_of_load
-from d2rpick.deck import read_inventory
+from d2rpick.deck import Window, read_inventory
 from d2rpick.histories.digits import above, first_as_read, in_the_record
 from d2rpick.histories.surroundings import UNKNOWN
 from d2rpick.rules.base import Fault
@@ -22,10 +22,7 @@ from d2rpick.rules.base import Fault
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
-    from d2rpick.choice.answers import Verdict
-    from d2rpick.choice.situation import Settings
     from d2rpick.choice.switched_run import Times
-    from d2rpick.deck import Window
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run, Selection
 

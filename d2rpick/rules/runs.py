@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, LeftRigid, left_rigid
-from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Example, RunCase, rule
+from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Example, Objection, RunCase, rule
 from d2rpick.rules.examples import GOOD_RUN, WINDOW, engine_files, run_of, starter_deck
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.radioss_deck import Leg
-    from d2rpick.rules.base import Example, Objection
 
 _MOST_CAP = 0.01  # of the rigid window: the release comes up to a step late
 _MOST_LISTED = 8

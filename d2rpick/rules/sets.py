@@ -6,17 +6,14 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.errors import listing
-from d2rpick.deck.parts import read_entities
-from d2rpick.deck.switching import BY_TIME
-from d2rpick.rules.base import ERROR, WARNING, Example, rule
+from d2rpick.deck.parts import Entities, read_entities
+from d2rpick.deck.switching import BY_TIME, Header, SwitchSet, Unit
+from d2rpick.rules.base import ERROR, WARNING, Case, Example, Objection, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.deck.parts import Entities
-    from d2rpick.deck.switching import Header, SwitchSet, Unit
-    from d2rpick.rules.base import Case, Objection
 
 _FAMILIES: Final = ({1, 3}, {2, 4})  # rigid wall, contact
 _WITHOUT_FORCE, _WITH_FORCE = {1, 2}, {3, 4}

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.base.graph import reached
-from d2rpick.deck.parts import element_cards, read_constraints
-from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Example, grouped, rule
+from d2rpick.deck.parts import Constraint, element_cards, read_constraints
+from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Example, Objection, grouped, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 
 if TYPE_CHECKING:
@@ -15,9 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck import Parts, SwitchSet
     from d2rpick.deck.card import Field
-    from d2rpick.deck.parts import Constraint
     from d2rpick.deck.switching import Event, Header, Switched, Unit
-    from d2rpick.rules.base import Case, Objection
 
 _NEAREST = 3  # ids that are named in place of one that the deck does not have
 

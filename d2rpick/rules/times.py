@@ -6,16 +6,14 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
-from d2rpick.deck.switching import BY_SENSOR, BY_TIME
-from d2rpick.rules.base import BOTH, ERROR, WARNING, Example, grouped, rule
+from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header
+from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Example, Objection, grouped, rule
 from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, PASSES, THERE, automatic, deck, window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.deck import SwitchSet, Window
-    from d2rpick.deck.switching import Header
-    from d2rpick.rules.base import Case, Objection
 
 
 _INTERVALS = 200  # output intervals per rigid window, for crossings to be found within 0.5 %

@@ -16,7 +16,7 @@ import numpy as np
 
 from d2rpick.base.errors import listing
 from d2rpick.vibration import measures
-from d2rpick.vibration.identify import MAX_MISFIT, MIN_SAMPLES_PER_PERIOD
+from d2rpick.vibration.identify import MAX_MISFIT, MIN_SAMPLES_PER_PERIOD, Identification
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import ModalEnergy, Moments, Profile, SampledEnergy
 from d2rpick.vibration.uncertainty import residual_bound
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
-    from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.measures import Bound, Deformation, Measured
     from d2rpick.vibration.part_signs import PartMatch, SignedParts, Unsigned
     from d2rpick.vibration.span import Span

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from d2rpick.vibration.identify import identify, identify_several
+from d2rpick.vibration.identify import Identification, identify, identify_several
 from d2rpick.vibration.uncertainty import hidden_share, resolved
-from d2rpick.vibration.waves import fit_waves
+from d2rpick.vibration.waves import Waves, fit_waves
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -25,9 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.modes import Mode, Modes
-    from d2rpick.vibration.waves import Waves
 
 
 # Of the energy, what waves may leave of a deformation: a sign that is wrong at one of thirty minima leaves ten times as

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.vibration import measures
-from d2rpick.vibration.part_motion import all_zeros, by_own_modes, followed
+from d2rpick.vibration.part_motion import PartMotion, Places, all_zeros, by_own_modes, followed
 from d2rpick.vibration.swings import SOLVER_FLOOR
 from d2rpick.vibration.uncertainty import SMALLEST
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.part_motion import PartMotion, Places
 
 
 # A deformation that swings about zero is zero on average; beyond this share of its mean size it swings about

@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick.histories.history import Memory
-from d2rpick.vibration.identify import identify
+from d2rpick.histories.history import History, Memory, Samples
+from d2rpick.vibration.identify import Identification, identify
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Protocol
-
-    from d2rpick.histories.history import History, Samples
-    from d2rpick.vibration.identify import Identification
 
     class Fitter(Protocol):
         """Gives the oscillator for some samples; ``quick`` where a refusal needs no more than a few of them."""

@@ -14,14 +14,13 @@ import numpy as np
 from d2rpick.histories.samples import integral
 from d2rpick.vibration.fitting import cell_means
 from d2rpick.vibration.identify import MIN_SAMPLES_BESIDE, MIN_SAMPLES_PER_PERIOD, identify_beside, samples_per_period
-from d2rpick.vibration.modes import Mode
+from d2rpick.vibration.modes import Mode, Modes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Precision, Samples
     from d2rpick.vibration.identify import Identification
-    from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.waves import Waves
 
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import DIGITS, Branched
-from d2rpick.histories.formats.lsda import Lsda, recognises
-from d2rpick.histories.names import Part, plain_text
+from d2rpick.histories.formats.lsda import DirectoryLayout, Lsda, Variable, recognises
+from d2rpick.histories.names import Part, Selection, plain_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -28,9 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.content import Content
-    from d2rpick.histories.formats.lsda import DirectoryLayout, Variable
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
     Indices = NDArray[np.int64]

@@ -21,14 +21,13 @@ from d2rpick.histories.database import Database
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.layout import as_number
 from d2rpick.histories.formats.printed import of_one_run
-from d2rpick.histories.names import internal_energies, is_time, refuse_other_quantity, resolve, unit_of
+from d2rpick.histories.names import Selection, internal_energies, is_time, refuse_other_quantity, resolve, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.histories.formats.text import Text
     from d2rpick.histories.history import Precision, Samples
-    from d2rpick.histories.names import Selection
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"  # compiled where it is needed

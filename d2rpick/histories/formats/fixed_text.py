@@ -17,7 +17,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import content_of
-from d2rpick.histories.formats.blocks import BATCH, CHUNK, UNSURE, Ahead, Stretch, like_example
+from d2rpick.histories.formats.blocks import BATCH, CHUNK, UNSURE, Ahead, BlockLayout, Grammar, Stretch, like_example
 from d2rpick.histories.formats.printed import decode
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.content import Addresses, Bytes, Content
-    from d2rpick.histories.formats.blocks import BlockLayout, Grammar
     from d2rpick.histories.history import Samples
 
 _RECENT: Final = 4  # layouts tried before a block is taken apart

@@ -17,13 +17,12 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, overlong, release, written_head
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
-from d2rpick.histories.history import frozen
+from d2rpick.histories.history import Samples, frozen
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Mapping, Sequence
 
     from d2rpick.histories.content import Content
-    from d2rpick.histories.history import Samples
     from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 

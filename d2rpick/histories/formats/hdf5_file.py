@@ -18,16 +18,14 @@ from d2rpick.base.errors import FormatError, listing, printable
 from d2rpick.histories.database import DIGITS, Branched, Database
 from d2rpick.histories.formats.hdf5_columns import Column, check_data, check_file, columns_of, finite
 from d2rpick.histories.formats.printed import of_one_run
-from d2rpick.histories.history import Precision
-from d2rpick.histories.names import Part, near_miss, refuse_other_quantity
+from d2rpick.histories.history import Precision, Samples
+from d2rpick.histories.names import Part, Selection, near_miss, refuse_other_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     import h5py
 
-    from d2rpick.histories.history import Samples
-    from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"

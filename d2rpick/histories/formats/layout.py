@@ -9,13 +9,12 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import FormatError, listing
-from d2rpick.histories.formats.text import HEAD
+from d2rpick.histories.formats.text import HEAD, Text
 from d2rpick.histories.names import is_time, is_unit, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.histories.formats.text import Text
 
 _COMMENTS = ("#", "$", "%", "//")
 

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.history import EXACT, Precision
+from d2rpick.histories.history import EXACT, Precision, Samples
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import Samples
 
 _PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
 

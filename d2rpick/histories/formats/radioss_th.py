@@ -18,16 +18,14 @@ import numpy as np
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.radioss_records import INT, RUN, WIDTH, integers, is_binary, is_text, records_of
-from d2rpick.histories.names import Part, plain_text
+from d2rpick.histories.formats.radioss_records import INT, RUN, WIDTH, Records, integers, is_binary, is_text, records_of
+from d2rpick.histories.names import Part, Selection, plain_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.content import Addresses
-    from d2rpick.histories.formats.radioss_records import Records
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
 _TITLES: Final = (40, 80, 100)  # bytes of the other titles, by age of the format

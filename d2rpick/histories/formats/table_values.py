@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.formats.layout import as_number, is_skipped, split
+from d2rpick.histories.formats.layout import Layout, as_number, is_skipped, split
 from d2rpick.histories.names import is_time
 
 if TYPE_CHECKING:
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.formats.layout import Layout
     from d2rpick.histories.formats.text import Text
     from d2rpick.histories.history import Samples
 
