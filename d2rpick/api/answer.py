@@ -95,8 +95,11 @@ class Paged(Answer):
         return glance(self.kind, self, self.plot() if self.drawn else None)
 
     def plot(self) -> Figure:
-        """Draw the answer as a matplotlib Figure."""
-        raise NotImplementedError
+        """Draw the answer as a matplotlib Figure: the energy, and what was chosen or judged."""
+        from d2rpick.report import figures_choice
+
+        drawn: Figure = getattr(figures_choice, f"draw_{self.kind}")(self)
+        return drawn
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
         """Write the page: ``command`` repeats it, ``judging`` are the options that judge a card by the same history."""

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.asked import Asked
@@ -94,12 +93,6 @@ class Suggestion(Judged, answers.Suggestion):
         source, rows = list(self.situation.history.source), self.to_dict()["candidates"]
         return frame_of(rows, CANDIDATE.keys, td=self.td, basis=self.basis, source=source)
 
-    def plot(self) -> Figure:
-        """Draw the energy with its level at td, and the choice, as a matplotlib Figure."""
-        from d2rpick.report.figures_choice import draw_suggestion
-
-        return draw_suggestion(self)
-
     def card(self, **options: Unpack[CardOptions]) -> JudgedCard | None:
         """Print the card of the recommended pair, judged as printed; None without one."""
         return self.printed(Cards.of(options))
@@ -153,12 +146,6 @@ class Verdict(Judged, answers.Verdict):
 
         found = measures(self)
         return frame_of([found], list(found), basis=self.basis, source=list(self.situation.history.source))
-
-    def plot(self) -> Figure:
-        """Draw the energy with its level at td, and the pair, as a matplotlib Figure."""
-        from d2rpick.report.figures_choice import draw_verdict
-
-        return draw_verdict(self)
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
         """Write the page, with the card of the pair where it is good."""

@@ -170,9 +170,9 @@ class Calibration(Answer, calibration.Calibration):
 
     def save(self, path: arguments.Path) -> Path:
         """Write the TOML file that ``--weights`` reads; an existing file is replaced."""
-        from d2rpick.report.calibration import as_toml
+        from d2rpick.choice.cost import weights_as_toml
 
-        return written(path, f"{as_toml(self)}\n")
+        return written(path, f"{weights_as_toml(self.weights)}\n")
 
 
 def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.asked import Asked
@@ -60,12 +59,6 @@ class Exploration(RunAnswer, trade_off.TradeOff):
         from d2rpick.report.trade_off import COLUMNS
 
         return frame_of(self.to_dict()["offers"], COLUMNS, source=list(self.situation.history.source))
-
-    def plot(self) -> Figure:
-        """Draw energy, error and rigid time over td, as a matplotlib Figure."""
-        from d2rpick.report.figures_choice import draw_trade_off
-
-        return draw_trade_off(self)
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
         """Write the page, with the card of the recommended pair."""
@@ -181,12 +174,6 @@ class Plan(RunAnswer, planning.Plan):
         from d2rpick.report.plan import WINDOW
 
         return frame_of(self.to_dict()["windows"], WINDOW.keys, source=list(self.history.source))
-
-    def plot(self) -> Figure:
-        """Draw the energy with the flights and the rigid windows, as a matplotlib Figure."""
-        from d2rpick.report.figures_choice import draw_plan
-
-        return draw_plan(self)
 
     def card(self, *, every: bool = False, **options: Unpack[CardOptions]) -> JudgedCard | None:
         """Print the card of the next run, judged as printed, with ``every`` new window or those that are supported."""

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.cards import Cards
@@ -192,12 +191,6 @@ class Study(Paged, core.Study):
         from d2rpick.report.study import RUN
 
         return frame_of(self.to_dict()["runs"], RUN.keys, td=self.td)
-
-    def plot(self) -> Figure:
-        """Draw the energies over each other, with every tr, as a matplotlib Figure."""
-        from d2rpick.report.figures_choice import draw_study
-
-        return draw_study(self)
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
         """Write the page."""

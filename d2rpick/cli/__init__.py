@@ -46,7 +46,7 @@ COMMANDS: Final = _WORK | _EXPERIMENTS
 # Modules of those that stand in one of another name.
 _MODULES: Final = {
     **dict.fromkeys(("info", "extract", "suggest", "explore", "verify", "parts"), "one_run"),
-    **dict.fromkeys(("replay", "rollover"), "models"),
+    **dict.fromkeys(_EXPERIMENTS, "models"),
     **dict.fromkeys(("drive", "follow", "first"), "running"),
     **dict.fromkeys(("card", "check", "rule"), "decks"),
     "calibrate": "study",

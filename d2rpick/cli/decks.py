@@ -13,8 +13,7 @@ from d2rpick.base.errors import INTERNAL_ERROR, ConfigurationError, D2RPickError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
 from d2rpick.cli.output import explained, in_words, tell, text_bytes
-from d2rpick.cli.settings import CARDS
-from d2rpick.cli.values import click_type
+from d2rpick.cli.values import CARDS, click_type
 from d2rpick.report.formats import FORMATS, write
 
 if TYPE_CHECKING:

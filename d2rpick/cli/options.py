@@ -14,8 +14,7 @@ from d2rpick.api.cards import Cards
 from d2rpick.api.request import CHOOSING, JUDGING, OSCILLATOR, READING, TIME, Option, Request, dashed, options_of
 from d2rpick.base.errors import ArgumentError
 from d2rpick.cli.output import Output, tell, text_bytes, with_options
-from d2rpick.cli.settings import CARDS, settings_of, spelled, words_of
-from d2rpick.cli.values import click_type
+from d2rpick.cli.values import CARDS, click_type, settings_of, spelled, words_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence

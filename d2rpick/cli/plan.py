@@ -12,8 +12,7 @@ from d2rpick.base.errors import ArgumentError, DeckError, printable
 from d2rpick.cli import options
 from d2rpick.cli.options import DECK_OF_PARTS, HISTORY, RESULT
 from d2rpick.cli.output import opened
-from d2rpick.cli.settings import CARDS
-from d2rpick.cli.values import click_type
+from d2rpick.cli.values import CARDS, click_type
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:

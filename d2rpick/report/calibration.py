@@ -48,17 +48,17 @@ def as_table(found: Calibration, shown: Shown) -> str:
     return "\n".join(lines)
 
 
-def as_markdown(found: Calibration) -> str:
+def as_markdown(found: Calibration, _: Shown) -> str:
     """The weights and the legs as Markdown tables."""
     return "\n\n".join([tables.as_markdown(HEAD, _rows(found)), tables.as_markdown(LEG_HEAD, _legs(found))])
 
 
-def as_csv(found: Calibration) -> str:
+def as_csv(found: Calibration, _: Shown) -> str:
     """A row per formulation."""
     return tables.as_csv(COLUMNS, plain_rows(found)).rstrip("\n")
 
 
-def as_toml(found: Calibration) -> str:
+def as_toml(found: Calibration, _: Shown) -> str:
     """The file that ``--weights`` reads."""
     return weights_as_toml(found.weights)
 

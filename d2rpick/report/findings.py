@@ -87,23 +87,23 @@ def as_table(checks: Checks, _: Shown) -> str:
     return "\n".join([*map(printable, lines), "", _last_line(checks)])
 
 
-def as_ndjson(checks: Checks, command: Sequence[str]) -> str:
+def as_ndjson(checks: Checks, shown: Shown) -> str:
     """Give a line for each deck, by the same schema as the JSON of all."""
-    return "\n".join(DOCUMENT.as_line(replace(checks, results=[result]), command) for result in checks.results)
+    return "\n".join(DOCUMENT.as_line(replace(checks, results=[result]), shown.command) for result in checks.results)
 
 
-def as_csv(checks: Checks) -> str:
+def as_csv(checks: Checks, _: Shown) -> str:
     """A row per finding, a column for each key of ``findings`` in the JSON output."""
     return csv_of(FINDING.keys, map(FINDING.plain, _findings(checks)))
 
 
-def as_markdown(checks: Checks) -> str:
+def as_markdown(checks: Checks, _: Shown) -> str:
     """The findings as a Markdown table, and how many there are."""
     found = [list(FINDING.plain(one).values()) for one in _findings(checks)]
     return "\n\n".join([*([tables.as_markdown(FINDING.keys, found)] if found else []), _last_line(checks)])
 
 
-def as_github(checks: Checks) -> str:
+def as_github(checks: Checks, _: Shown) -> str:
     """Workflow commands that GitHub Actions shows beside the lines of a deck."""
     root = checks.root
     found = [
@@ -116,7 +116,7 @@ def as_github(checks: Checks) -> str:
     return "\n".join(found)
 
 
-def as_junit(checks: Checks) -> str:
+def as_junit(checks: Checks, _: Shown) -> str:
     """One suite per deck, one case per finding; those lighter than ``fail_on`` pass and only say their message."""
     from xml.etree import ElementTree as ET  # start-up
 
@@ -151,7 +151,7 @@ def as_junit(checks: Checks) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(suites, encoding="unicode")
 
 
-def as_sarif(checks: Checks) -> str:
+def as_sarif(checks: Checks, _: Shown) -> str:
     """SARIF 2.1.0 with all rules; ids are stable."""
     root = checks.root
     ids = list(RULES)

@@ -1,4 +1,4 @@
-"""One table: which result can be written in which form, and by what.
+"""One table: which result can be written in which form.
 
 A result is a module of this folder, imported when it is written: ``--help`` lists the forms without it.
 """
@@ -9,9 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    Writer = Callable[[Any, Any, "Shown"], str]
+    from collections.abc import Mapping, Sequence
 
 
 # Columns of text that are read at a glance; a terminal may have fewer.
@@ -33,60 +31,37 @@ class Shown(NamedTuple):
     width: int = WIDEST
 
 
-PLAIN: Final[Mapping[str, Writer]] = {
-    "table": lambda report, answer, shown: report.as_table(answer, shown),
-    "json": lambda report, answer, shown: report.DOCUMENT.as_json(answer, shown.command),
-    "csv": lambda report, answer, _: report.as_csv(answer),
-    "markdown": lambda report, answer, _: report.as_markdown(answer),
-}
-_LINE: Final[Mapping[str, Writer]] = {
-    "ndjson": lambda report, answer, shown: report.DOCUMENT.as_line(answer, shown.command)
-}
-
+PLAIN: Final = ("table", "json", "csv", "markdown")
 # The first form of each is the default.
-FORMATS: Final[Mapping[str, Mapping[str, Writer]]] = {
-    "suggestion": {
-        **PLAIN,
-        "markdown": lambda report, answer, shown: report.as_markdown(answer, shown),
-        **_LINE,
-        "value": lambda report, answer, _: report.as_value(answer),
-    },
-    "plan": {**PLAIN, **_LINE, "value": lambda report, answer, shown: report.as_value(answer, every=shown.every)},
-    "trade_off": {
-        **PLAIN,
-        "markdown": lambda report, answer, shown: report.as_markdown(answer, shown),
-        **_LINE,
-    },
-    "parts": {**PLAIN, "value": lambda report, answer, _: report.as_value(answer)},
-    "calibration": {**PLAIN, "toml": lambda report, answer, _: report.as_toml(answer)},
-    "drive": {form: PLAIN[form] for form in ("table", "json")},
+FORMATS: Final[Mapping[str, Sequence[str]]] = {
+    "suggestion": (*PLAIN, "ndjson", "value"),
+    "plan": (*PLAIN, "ndjson", "value"),
+    "trade_off": (*PLAIN, "ndjson"),
+    "parts": (*PLAIN, "value"),
+    "calibration": (*PLAIN, "toml"),
+    "drive": ("table", "json"),
     "verdict": PLAIN,
     "overview": PLAIN,
-    "study": {
-        **PLAIN,
-        "ndjson": lambda report, answer, shown: "\n".join([*shown.lines, report.LAST.as_line(answer, shown.command)]),
-    },
-    "rollover": {
-        **PLAIN,
-        "markdown": lambda report, answer, _: report.as_markdown(answer.outcomes),
-        "csv": lambda report, answer, _: report.as_csv(answer.outcomes),
-    },
-    "findings": {
-        **PLAIN,
-        "ndjson": lambda report, answer, shown: report.as_ndjson(answer, shown.command),
-        "github": lambda report, answer, _: report.as_github(answer),
-        "junit": lambda report, answer, _: report.as_junit(answer),
-        "sarif": lambda report, answer, _: report.as_sarif(answer),
-    },
+    "study": (*PLAIN, "ndjson"),
+    "rollover": PLAIN,
+    "findings": (*PLAIN, "ndjson", "github", "junit", "sarif"),
 }
 
 
 def write(result: str, form: str, answer: Any, shown: Shown) -> str:
-    """Write an answer in one of the forms of its result.
+    """Write an answer in one of the forms of its result: by ``as_FORM`` of its module, JSON by its ``DOCUMENT``.
 
     Examples
     --------
     >>> list(FORMATS["suggestion"])
     ['table', 'json', 'csv', 'markdown', 'ndjson', 'value']
     """
-    return FORMATS[result][form](import_module(f"d2rpick.report.{result}"), answer, shown)
+    return written_by(import_module(f"d2rpick.report.{result}"), form, answer, shown)
+
+
+def written_by(report: Any, form: str, answer: Any, shown: Shown) -> str:
+    """Write an answer in a form of the module of its result."""
+    if own := getattr(report, f"as_{form}", None):
+        return str(own(answer, shown))
+    document = report.DOCUMENT
+    return str((document.as_json if form == "json" else document.as_line)(answer, shown.command))

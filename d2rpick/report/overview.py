@@ -64,7 +64,7 @@ def as_table(overview: Overview, shown: Shown) -> str:
     return "\n".join([*lines, *(f"note: {printable(note)}" for note in overview.notes)])
 
 
-def as_markdown(overview: Overview) -> str:
+def as_markdown(overview: Overview, _: Shown) -> str:
     """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
     told = tables.as_markdown(("what", "value"), facts(overview))
     parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
@@ -73,7 +73,7 @@ def as_markdown(overview: Overview) -> str:
     return "\n\n".join([told, *parts, *health, *(f"* {tables.in_markdown(note)}" for note in overview.notes)])
 
 
-def as_csv(overview: Overview) -> str:
+def as_csv(overview: Overview, _: Shown) -> str:
     """One row, a column for each key of the JSON output, what is a list there with semicolons."""
     sampling = overview.sampling
     row: dict[str, tables.Cell] = {

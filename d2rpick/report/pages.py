@@ -34,14 +34,18 @@ _MOST_ROWS = 20
 _TOLD = ("quality", "keeps", "saves")
 
 
+def _drawn(kind: str, answer: Any, prefix: str) -> str:
+    """Draw an answer of a kind as an SVG element, whose ids begin with ``prefix``."""
+    from d2rpick.report import figures, figures_choice
+
+    return figures.svg_element(getattr(figures_choice, f"draw_{kind}")(answer, page=True), prefix)
+
+
 def _draw_suggestion(answer: Suggestion) -> dict[str, str]:
     """Draw the figure of ``suggestion_page``."""
-    from d2rpick.report.figures import svg_element
-    from d2rpick.report.figures_choice import draw_suggestion
-
     shown = "the choice, and a better pair" if answer.clearly_better else "and the choice"
     caption = f"Internal energy with its level at td, {shown}"
-    return {caption: svg_element(draw_suggestion(answer, page=True), "choice-")}
+    return {caption: _drawn("suggestion", answer, "choice-")}
 
 
 def suggestion_page(answer: Suggestion, record: page.PageContext) -> str:
@@ -95,15 +99,6 @@ def _candidates(answer: Suggestion) -> Iterator[Markup]:
         yield tag("p", f"{left} more in the csv and json results.", class_="soft")
 
 
-def _draw_verdict(answer: Verdict) -> dict[str, str]:
-    """Draw the figure of ``verdict_page``."""
-    from d2rpick.report.figures import svg_element
-    from d2rpick.report.figures_choice import draw_verdict
-
-    caption = "Internal energy with its level at td, and the pair"
-    return {caption: svg_element(draw_verdict(answer, page=True), "pair-")}
-
-
 def verdict_page(answer: Verdict, record: page.PageContext) -> str:
     """Write the page of ``verify``."""
     return page.run_page(record.run, _of_verdict(answer, record), record.explorer)
@@ -123,7 +118,8 @@ def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
         "card chosen" if answer.verified and not poor else "card refused",
     )
     yield page.front([card], remarks(answer.cautions, answer.reasons))
-    yield from page.shown(_draw_verdict(answer), record)
+    caption = "Internal energy with its level at td, and the pair"
+    yield from page.shown({caption: _drawn("verdict", answer, "pair-")}, record)
     measures = (
         (name.replace("_", " "), short(one)) for name, one in verdict.MEASURES.plain(answer).items() if one is not None
     )
@@ -144,15 +140,6 @@ def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
     return section(title, table(title, ("quantity", *verdict.COMPARED[1:]), verdict.comparison(found)), pairs(listed))
 
 
-def _draw_trade_off(found: TradeOff) -> dict[str, str]:
-    """Draw the figures of ``trade_off_page``."""
-    from d2rpick.report.figures import svg_element
-    from d2rpick.report.figures_choice import draw_trade_off
-
-    curve = svg_element(draw_trade_off(found, page=True), "explore-")
-    return {**_draw_suggestion(found.suggestion), "Error and rigid time of the best pair for each td": curve}
-
-
 def trade_off_page(found: TradeOff, record: page.PageContext) -> str:
     """Write the page of ``explore``."""
     return page.run_page(record.run, _of_trade_off(found, record), record.explorer)
@@ -162,7 +149,9 @@ def _of_trade_off(found: TradeOff, record: page.PageContext) -> Iterator[Markup]
     yield _choice(found.suggestion)
     further = [one for one in found.cautions if one not in found.suggestion.cautions]
     yield tag("section", tag("p", trade_off.answer(found)), remarks(further))
-    yield from page.shown(_draw_trade_off(found), record)
+    caption = "Error and rigid time of the best pair for each td"
+    curve = _drawn("trade_off", found, "explore-")
+    yield from page.shown({**_draw_suggestion(found.suggestion), caption: curve}, record)
     best = trade_off.some_of(found, _MOST_ROWS)
     marked = next((i for i, one in enumerate(best) if one.recommended), None)
     shown = table("Pairs", *known(*unstarred(*trade_off.table(best))), marked)
@@ -192,16 +181,13 @@ def plan_page(found: Plan, run: Run, command: Sequence[str], card: str | None, e
 def _of_plan(
     found: Plan, run: Run, command: Sequence[str], card: str | None, explored: Explorer | None
 ) -> Iterator[Markup]:
-    from d2rpick.report.figures import svg_element
-    from d2rpick.report.figures_choice import draw_plan
-
     cards = [_window(row, found) for row in found.supported]
     cards = cards or [page.refused("No window of this run can be recommended.")]
     yield page.front(cards, remarks(found.cautions), pairs([("plan", plan.sentence(found)), *plan.outlook(found)]))
     if explored:
         yield explorer(explored)
     caption = "Internal energy with the flights, and below it the rigid windows with their numbers"
-    yield drawings({caption: svg_element(draw_plan(found, page=True), "plan-")})
+    yield drawings({caption: _drawn("plan", found, "plan-")})
     yield section("Flights", table("Flights", *unstarred(*plan.table(found))), pairs(plan.reasons(found)))
     if card:
         yield section("For the solver's input", tag("pre", card, tabindex="0"))
@@ -226,12 +212,9 @@ def study_page(answer: Study, command: Sequence[str]) -> str:
 
 
 def _of_study(answer: Study, command: Sequence[str]) -> Iterator[Markup]:
-    from d2rpick.report.figures import svg_element
-    from d2rpick.report.figures_choice import draw_study
-
     yield page.front([_common(answer)], remarks(answer.cautions), pairs(study.outcome(answer)))
     caption = "Internal energies of all runs, with the tr of each, the common one and td"
-    yield drawings({caption: svg_element(draw_study(answer, page=True), "runs-")})
+    yield drawings({caption: _drawn("study", answer, "runs-")})
     head, rows = study.table(answer)
     yield section("Runs", table("Runs", *known([name.replace("+-", "±") for name in head], rows)))
     yield section("Files", tag("pre", _files(answer), class_="wrap"))

@@ -143,18 +143,18 @@ def as_table(found: Parts, shown: Shown) -> str:
     return "\n".join([*lines, "", *tables.in_line(outlook(found), 11)])
 
 
-def as_markdown(found: Parts) -> str:
+def as_markdown(found: Parts, _: Shown) -> str:
     """The parts and the sets as Markdown tables, and below them the set to take."""
     sets = [tables.as_markdown(*set_table(found))] if found.sets else []
     return "\n\n".join([tables.as_markdown(*table(found)), *sets, *tables.listed(outlook(found))])
 
 
-def as_csv(found: Parts) -> str:
+def as_csv(found: Parts, _: Shown) -> str:
     """A row per part, a column for each key of ``parts`` in the JSON output; lists separated by semicolons."""
     return csv_of(PART.keys, map(PART.plain, found.rows), ";")
 
 
-def as_value(found: Parts) -> str:
+def as_value(found: Parts, _: Shown) -> str:
     """Numbers of the recommended set as ``--part`` takes them; nothing where there is none."""
     return ",".join(map(str, found.recommended.parts)) if found.recommended else ""
 

@@ -98,7 +98,7 @@ def sentence(plan: Plan) -> str:
     return f"{found}; {more} must wait" if waiting else found
 
 
-def as_markdown(plan: Plan) -> str:
+def as_markdown(plan: Plan, _: Shown) -> str:
     """The flights as a Markdown table, and below it what is saved, and why windows are not supported."""
     below = tables.listed((*outlook(plan), *reasons(plan)))
     return "\n\n".join([tables.in_markdown(sentence(plan)), tables.as_markdown(*table(plan)), *below])
@@ -109,17 +109,17 @@ def reasons(plan: Plan) -> list[tuple[str, str]]:
     return [(f"flight {row.number}", row.reason) for row in plan.rows if row.reason]
 
 
-def as_csv(plan: Plan) -> str:
+def as_csv(plan: Plan, _: Shown) -> str:
     """A row per flight, a column for each key of ``windows`` in the JSON output."""
     return csv_of(WINDOW.keys, map(WINDOW.plain, plan.rows))
 
 
-def as_value(plan: Plan, *, every: bool = False) -> str:
+def as_value(plan: Plan, shown: Shown) -> str:
     """A line ``tr td`` for each window of the next run, in the shortest digits that read back.
 
-    Those that are done, and the supported ones, or ``every`` new one; nothing where none is new.
+    Those that are done, and the supported ones, or every new one; nothing where none is new.
     """
-    return "\n".join(f"{tr!r} {td!r}" for tr, td in plan.run_windows(every=every))
+    return "\n".join(f"{tr!r} {td!r}" for tr, td in plan.run_windows(every=shown.every))
 
 
 def heading(plan: Plan) -> str:

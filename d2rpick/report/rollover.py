@@ -71,14 +71,14 @@ def as_table(scan: Scan, shown: Shown) -> str:
     return "\n".join(lines)
 
 
-def as_markdown(outcomes: Sequence[Outcome]) -> str:
+def as_markdown(scan: Scan, _: Shown) -> str:
     """A row for each tr."""
-    return tables.as_markdown(RUN.keys, [_short(one) for one in outcomes])
+    return tables.as_markdown(RUN.keys, [_short(one) for one in scan.outcomes])
 
 
-def as_csv(outcomes: Sequence[Outcome]) -> str:
+def as_csv(scan: Scan, _: Shown) -> str:
     """A row for each tr, at full precision."""
-    return csv_of(RUN.keys, map(RUN.plain, outcomes))
+    return csv_of(RUN.keys, map(RUN.plain, scan.outcomes))
 
 
 def _recommended(answer: Suggestion) -> float | None:

@@ -96,15 +96,20 @@ def as_table(answer: Study, shown: Shown) -> str:
     return "\n".join([tables.as_text(*table(answer), shown.width), "", *tables.in_line(outcome(answer))])
 
 
-def as_markdown(answer: Study) -> str:
+def as_markdown(answer: Study, _: Shown) -> str:
     """The runs as a Markdown table, and below what they have in common."""
     below = "\n".join(f"* {line}" for line in tables.listed(outcome(answer)))
     return f"{tables.as_markdown(*table(answer))}\n\n{below}"
 
 
-def as_csv(answer: Study) -> str:
+def as_csv(answer: Study, _: Shown) -> str:
     """One row per run, a column for each key of the JSON output."""
     return csv_of(RUN.keys, map(RUN.plain, with_errors(answer)))
+
+
+def as_ndjson(answer: Study, shown: Shown) -> str:
+    """The lines of the runs, as far as they are not written yet, and what the runs have in common."""
+    return "\n".join([*shown.lines, LAST.as_line(answer, shown.command)])
 
 
 def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:

@@ -90,7 +90,7 @@ def _some(answer: Suggestion, shown: Shown) -> tuple[list[str], list[list[tables
     return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
 
 
-def as_csv(answer: Suggestion) -> str:
+def as_csv(answer: Suggestion, _: Shown) -> str:
     """All candidates, a column for each key of the JSON output but ``parts``, and the td they belong to."""
     columns = [*(key for key in keys.CANDIDATE.keys if key != "notes"), "td", "notes"]
     td = answer.situation.td
@@ -207,7 +207,7 @@ def holds(window: AcceptableWindow, tr: float | None) -> bool:
     return tr is not None and window.start <= tr <= window.end
 
 
-def as_value(answer: Suggestion) -> str:
+def as_value(answer: Suggestion, _: Shown) -> str:
     """The recommended tr, and td where it was chosen too, in the shortest digits that read back; empty without one."""
     pair = answer.recommended
     if pair is None:

@@ -90,7 +90,7 @@ def as_markdown(found: TradeOff, shown: Shown) -> str:
     return "\n\n".join([tables.as_markdown(*some), tables.in_markdown(answer(found))])
 
 
-def as_csv(found: TradeOff) -> str:
+def as_csv(found: TradeOff, _: Shown) -> str:
     """All offers, a column for each key of ``offers`` in the JSON output that is a single value."""
     return csv_of(COLUMNS, map(OFFER.plain, found.offers))
 

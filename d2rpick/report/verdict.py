@@ -64,7 +64,7 @@ def as_table(answer: Verdict, shown: Shown) -> str:
     return "\n".join([*head, *reasons, "", *heading(answer.situation, verbose=shown.verbose), "", *lines])
 
 
-def as_markdown(answer: Verdict) -> str:
+def as_markdown(answer: Verdict, _: Shown) -> str:
     """The measures as a Markdown table of two columns, and the reasons below it."""
     table = tables.as_markdown(("measure", "value"), list({**MEASURES.plain(answer), **_of_switched(answer)}.items()))
     return "\n".join([table, *(f"\n* {tables.in_markdown(reason)}" for reason in answer.reasons)])
@@ -77,7 +77,7 @@ def measures(answer: Verdict) -> dict[str, Any]:
     return {**measured, **_of_switched(answer), "reasons": "; ".join(answer.reasons)}
 
 
-def as_csv(answer: Verdict) -> str:
+def as_csv(answer: Verdict, _: Shown) -> str:
     """One row, a column for each key of `measures`."""
     found = measures(answer)
     return tables.as_csv(list(found), [list(found.values())]).rstrip("\n")

@@ -53,7 +53,7 @@ def test_json(results: list[Checked], tmp_path: Path) -> None:
 
 
 def test_github(results: list[Checked], tmp_path: Path) -> None:
-    lines = report.as_github(report.Checks(results, tmp_path)).split("\n")
+    lines = report.as_github(report.Checks(results, tmp_path), Shown()).split("\n")
     assert lines[1].startswith("::error file=main.k,line=23,col=28,title=D2R101::TIME1 is 0.5")
     assert lines[0].startswith("::notice file=main.k")
 
@@ -66,7 +66,7 @@ def junit_is_valid(text: str) -> None:
 
 
 def test_junit(results: list[Checked], tmp_path: Path) -> None:
-    text = report.as_junit(report.Checks(results, tmp_path))
+    text = report.as_junit(report.Checks(results, tmp_path), Shown())
     junit_is_valid(text)
     suites = ET.fromstring(text)
     assert [(suite.get("name"), suite.get("tests"), suite.get("failures")) for suite in suites] == [
@@ -74,7 +74,7 @@ def test_junit(results: list[Checked], tmp_path: Path) -> None:
         ("good/main.k", "1", "0"),
     ]
     assert [failure.get("type") for failure in suites.iter("failure")] == ["D2R101"]
-    strict = ET.fromstring(report.as_junit(report.Checks(results, tmp_path, fail_on=Severity.INFO)))
+    strict = ET.fromstring(report.as_junit(report.Checks(results, tmp_path, fail_on=Severity.INFO), Shown()))
     assert len(list(strict.iter("failure"))) == 2
 
 
@@ -86,7 +86,7 @@ def sarif_is_valid(text: str) -> None:
 
 
 def test_sarif(results: list[Checked], tmp_path: Path) -> None:
-    text = report.as_sarif(report.Checks(results, tmp_path))
+    text = report.as_sarif(report.Checks(results, tmp_path), Shown())
     sarif_is_valid(text)
     (run,) = json.loads(text)["runs"]
     assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == list(RULES)
@@ -98,8 +98,8 @@ def test_sarif(results: list[Checked], tmp_path: Path) -> None:
 
 def test_paths_outside_are_absolute(results: list[Checked], tmp_path: Path) -> None:
     elsewhere = tmp_path / "else where"
-    assert f"::error file={tmp_path}/main.k" in report.as_github(report.Checks(results, elsewhere))
-    assert f"file://{tmp_path}/main.k" in report.as_sarif(report.Checks(results, elsewhere))
+    assert f"::error file={tmp_path}/main.k" in report.as_github(report.Checks(results, elsewhere), Shown())
+    assert f"file://{tmp_path}/main.k" in report.as_sarif(report.Checks(results, elsewhere), Shown())
 
 
 @given(st.text(), st.text(st.characters(exclude_characters="\0"), min_size=1))
@@ -108,13 +108,13 @@ def test_any_text_makes_a_valid_report(message: str, name: str) -> None:
     finding = Finding("D2R001", Severity.ERROR, message, name, name, 1, 1)
     result = [Checked(name, (), (finding,))]
     root = Path("/some folder")
-    ET.fromstring(report.as_junit(report.Checks(result, root)).encode("utf-8", "replace"))
-    sarif_is_valid(report.as_sarif(report.Checks(result, root)))
-    assert report.as_github(report.Checks(result, root)).count("\n") == 0
+    ET.fromstring(report.as_junit(report.Checks(result, root), Shown()).encode("utf-8", "replace"))
+    sarif_is_valid(report.as_sarif(report.Checks(result, root), Shown()))
+    assert report.as_github(report.Checks(result, root), Shown()).count("\n") == 0
     json.loads(report.DOCUMENT.as_json(report.Checks(result, root), []))
 
 
 def test_nothing_found_is_a_report_too(tmp_path: Path) -> None:
-    sarif_is_valid(report.as_sarif(report.Checks([], tmp_path)))
-    junit_is_valid(report.as_junit(report.Checks([], tmp_path)))
-    assert report.as_github(report.Checks([], tmp_path)) == ""
+    sarif_is_valid(report.as_sarif(report.Checks([], tmp_path), Shown()))
+    junit_is_valid(report.as_junit(report.Checks([], tmp_path), Shown()))
+    assert report.as_github(report.Checks([], tmp_path), Shown()) == ""

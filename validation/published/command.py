@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import D2RPickError, FormatError
 from d2rpick.cli import options
-from d2rpick.cli.reproduce import SECTIONS, SOLVER
+from d2rpick.cli.models import SECTIONS, SOLVER
 from d2rpick.histories.formats import csv_table
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.report import figures
-from d2rpick.report.formats import PLAIN
+from d2rpick.report.formats import Shown, written_by
 from validation.published import box, exhibits, reproduction, saving
 from validation.published.drawing import draw_exhibit
 from validation.published.values import table
@@ -38,7 +38,7 @@ def reproduce(output_dir: str, section: Sequence[str], solver: Sequence[str], ou
     if output.report:
         output.write(output.report, reproduction.as_page(answer, options.repeat()).encode())
     answer = answer._replace(files=files)
-    output.result(PLAIN[output.output_format](reproduction, answer, output.shown()))
+    output.result(written_by(reproduction, output.output_format, answer, output.shown()))
     output.notes([f"{len(files)} files in {output_dir}"], ())
     output.finish(objection=not all(row.agrees for row in answer.rows))
 
@@ -76,8 +76,8 @@ def _made(folder: str) -> Path:
 
 def _write(output: Output, place: Path, answer: Reproduction) -> list[str]:
     """Write all files, or none where one may not be written; give their names."""
-    index = reproduction.as_markdown(answer, pictures=True)
-    contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{reproduction.as_csv(answer)}\n".encode()}
+    index, values = reproduction.as_markdown(answer, Shown(), pictures=True), reproduction.as_csv(answer, Shown())
+    contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{values}\n".encode()}
     for one in answer.exhibits:
         figure = draw_exhibit(one)
         contents |= {f"{one.name}.{form}": figures.render(figure, f"x.{form}") for form in PICTURES}

@@ -78,9 +78,9 @@ def as_table(answer: Reproduction, _: Shown) -> str:
     return "\n".join([*lines, "", "misprints in the paper", *(f"  {misprint}" for misprint in MISPRINTS)])
 
 
-def as_markdown(answer: Reproduction, *, pictures: bool = False) -> str:
+def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> str:
     """Give the same as Markdown, with the figures where ``pictures`` lie beside it."""
-    rows, exhibits, _ = answer
+    rows, exhibits = answer[:2]
     blocks = ["# Analysis of switched-rigid floating oscillator, reproduced", f"{MODEL}; d2rpick {__version__}."]
     for one in exhibits:
         shown = [f"![{one.title}]({one.name}.svg)"] if pictures else []
@@ -96,7 +96,7 @@ def as_markdown(answer: Reproduction, *, pictures: bool = False) -> str:
     return "\n\n".join(blocks)
 
 
-def as_csv(answer: Reproduction) -> str:
+def as_csv(answer: Reproduction, _: Shown) -> str:
     """Give the rows at full precision."""
     rows = answer.rows
     body: list[list[tables.Cell]]
