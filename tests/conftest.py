@@ -2,13 +2,15 @@
 
 import gc
 import os
+import sys
 import time
 from collections.abc import Iterator
 
 # As on the command line: the systems here are small, and threads of several test processes would fight over cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# The program is started again and again: that it is compiled each time is no part of any test.
+# Program and tests are started again and again: that they are compiled each time is no part of any test.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 import pytest
 from hypothesis import settings

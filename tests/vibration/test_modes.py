@@ -189,7 +189,7 @@ def test_the_residual_is_predicted_from_the_total_energy(count: int, noise: floa
     rng = np.random.default_rng(20261)
     errors: list[float] = []
     tried, tr, td = 0, np.array([1.3]), 4.0
-    while tried < 25:
+    while tried < 12:
         modes = random_modes(rng, count)
         amplitudes = [float(mode.vibration_energy(0.0)) for mode in modes.modes]
         if min(amplitudes) < 0.05 * max(amplitudes) or modes.apart * TIME[-1] < np.pi:
@@ -199,7 +199,7 @@ def test_the_residual_is_predicted_from_the_total_energy(count: int, noise: floa
         assert found.mode is not None
         if found.describes_record:
             errors.append(abs(float((replayed_residual(found.mode, tr, td) - replayed_residual(modes, tr, td))[0])))
-    assert len(errors) >= 24
+    assert len(errors) >= 11
     assert np.median(errors) <= median
     assert max(errors) <= worst
 
@@ -207,7 +207,7 @@ def test_the_residual_is_predicted_from_the_total_energy(count: int, noise: floa
 @pytest.mark.parametrize("count", [5, 12])
 def test_more_modes_are_refused(count: int) -> None:
     rng = np.random.default_rng(count)
-    for _ in range(10):
+    for _ in range(4):
         energy = random_modes(rng, count).energy(TIME)
         for found in (identify(TIME, energy), identify_several(TIME, energy)):
             assert not found.describes_record

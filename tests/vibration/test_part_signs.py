@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from d2rpick.choice.answers import suggest
@@ -49,7 +49,7 @@ def of(deformation: np.ndarray, time: np.ndarray) -> History:
 # ---- signs
 
 
-@pytest.mark.parametrize("samples_per_period", [20, 50, 150, 1000])
+@pytest.mark.parametrize("samples_per_period", [20, 150, 1000])
 def test_signs_are_followed_through_every_zero(samples_per_period: int) -> None:
     time = np.arange(0, 12, 2 * np.pi / 8.3 / samples_per_period)
     true = two_springs(time)
@@ -63,7 +63,6 @@ def test_signs_are_followed_through_every_zero(samples_per_period: int) -> None:
     assert np.mean(known) > 0.85
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.floats(0.3, 3), st.floats(0, 3), st.floats(0, 0.3), st.sampled_from([20, 60]), st.floats(0, 6))
 def test_one_spring_is_compared_as_its_oscillator_tells(
     rate: float, phase: float, damping: float, per_period: int, tr: float
@@ -132,16 +131,16 @@ def predicted(situation: Situation, tr: float) -> float:
 
 @pytest.mark.parametrize("estimated", [False, True], ids=["oscillator", "parts alone"])
 def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
-    errors = []
+    errors, some = [], chain.scan()[::3]
     for td in (chain.TD_PEAK, chain.TD_LATE):
         situation = examine(chain.history(), td, PLAIN)
         assert situation.basis == "parts"
         if estimated:
             situation = replace(situation, evidence=situation.evidence._replace(fit=None, span=None))
             assert situation.vibration.estimated
-        runs = [run for run in chain.scan() if abs(run["td_s"] - td) < 1e-3]  # a step of the solver late
+        runs = [run for run in some if abs(run["td_s"] - td) < 1e-3]  # a step of the solver late
         errors += [abs(predicted(situation.at(run["td_s"]), run["tr_s"]) - run["R_sim"]) for run in runs]
-    assert len(errors) == len(chain.scan())
+    assert len(errors) == len(some)
     assert max(errors) < 0.025  # what is reached
 
 

@@ -53,11 +53,10 @@ def covered(samples_per_period: int, digits: int, *, jitter: float, runs: int) -
 WIDEST = {8: np.inf, 12: 1.2, 20: 0.66, 50: 0.204, 200: 0.042}
 
 
-@pytest.mark.parametrize("jitter", [0.0, 0.4])
-@pytest.mark.parametrize("digits", [5, 6])
+@pytest.mark.parametrize(("digits", "jitter"), [(5, 0.0), (6, 0.4)])
 @pytest.mark.parametrize("samples_per_period", WIDEST)
 def test_intervals_from_samples_hold_the_true_crossing(samples_per_period: int, digits: int, jitter: float) -> None:
-    share, width = covered(samples_per_period, digits, jitter=jitter, runs=150)
+    share, width = covered(samples_per_period, digits, jitter=jitter, runs=40)
     assert share >= 0.99
     assert width <= WIDEST[samples_per_period]
 
@@ -84,7 +83,7 @@ def test_intervals_of_a_fit_hold_the_true_crossing() -> None:
     assert np.mean(inside) >= 0.99
 
 
-@pytest.mark.parametrize(("samples_per_period", "runs"), [(40, 25), (200, 15)])
+@pytest.mark.parametrize(("samples_per_period", "runs"), [(40, 10), (200, 5)])
 def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(samples_per_period: int, runs: int) -> None:
     rng = np.random.default_rng(11)
     inside = []
@@ -157,7 +156,7 @@ def test_a_small_second_mode_is_told_from_one(share: float, noise: float, rate: 
     assert (two.hidden_share < share / 2) == (rate < 2)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("noise", [1e-4, 0.03])
 def test_white_noise_is_no_second_mode(noise: float, seed: int) -> None:
     energy = noisy(MAIN.energy(TIMES), noise, seed)
@@ -174,7 +173,7 @@ def test_a_clean_or_printed_record_hides_nothing() -> None:
 
 def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
     tr, td = np.array([0.3, 1.1, 2.6]), 5.3
-    for seed in range(20):
+    for seed in range(0, 20, 3):
         truth = beside(0.005, rate=1.5 + seed / 10)
         energy = noisy(truth.energy(TIMES), 0.03, seed)
         found = resolved(TIMES, energy, identify(TIMES, energy))
@@ -197,7 +196,7 @@ def test_candidates_state_how_large_their_residual_may_be() -> None:
 
 @pytest.mark.parametrize("kind", ["one", "small", "large"])
 def test_of_random_records_95_percent_are_within_their_bounds(kind: str) -> None:
-    found = small_second_modes(kind, range(6))
-    assert len(found) >= 3
+    found = small_second_modes(kind, range(3))
+    assert len(found) >= 2
     off = [max(one.stated - one.true, one.true - one.highest, 0.0) for one in found]
     assert np.percentile(off, 95) <= 0.05
