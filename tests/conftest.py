@@ -17,8 +17,8 @@ from hypothesis import settings
 
 from d2rpick.base.workers import cores
 
-# A busy machine is no finding.  Each run asks other examples: half of the usual hundred each time are as good as all.
-settings.register_profile("d2rpick", deadline=None, max_examples=50)
+# A busy machine is no finding.  Each run asks other examples: a third of the usual hundred each time are as good as all.
+settings.register_profile("d2rpick", deadline=None, max_examples=30)
 settings.load_profile("d2rpick")
 
 

@@ -21,18 +21,19 @@ def cases(count: int) -> settings:
 
 
 def inputs(count: int) -> int:
-    """So many inputs in a thorough run of twenty, in proportion in others; the usual run has a thousandth of them."""
-    return count * _MORE // 20 if _MORE > 1 else count // 1000
+    """So many inputs in a thorough run of twenty, in proportion in others; the usual run has few of them."""
+    return count * _MORE // 20 if _MORE > 1 else count // 3000
 
 
-def some(items: Sequence[Item]) -> Sequence[Item]:
-    """Each item in a thorough run, else every twentieth."""
-    return items[:: max(1, 20 // _MORE)]
+def some(items: Sequence[Item], step: int = 97) -> Sequence[Item]:
+    """Each item in a thorough run, else one of ``step``: no multiple of what repeats in a file."""
+    return items if _MORE > 1 else items[::step]
 
 
-def few(items: Sequence[Item]) -> Sequence[Item]:
-    """Each item in a thorough run, else every seventh: for computed runs that take seconds each."""
-    return items if _MORE > 1 else items[::7]
+def cuts(text: bytes) -> list[int]:
+    """Where to cut a text: next to all ends of its lines and at some places between, everywhere in a thorough run."""
+    ends = {found.end() + shift for found in re.finditer(rb"\n|$", text) for shift in (-2, -1, 0, 1)}
+    return sorted({*some(range(len(text)), 7), *ends} & {*range(len(text) + 1)})
 
 
 # A fault: what is done, where it begins (as a share of the file), how much of it, and with which byte.

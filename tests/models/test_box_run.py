@@ -8,14 +8,14 @@ import pytest
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.situation import Settings
 from d2rpick.models.box_run import history_of
-from tests.faults import few
+from tests.faults import some
 from tests.rehearsals import SETS, rehearse
 
 # The suite takes coarse boxes; tests/benchmarks/rollover.py runs the sets as they are.
 MESH, INTERVAL, EVERY = 4, 3e-4, 18
 
 
-@pytest.mark.parametrize("number", few(range(len(SETS))))
+@pytest.mark.parametrize("number", some(range(len(SETS)), 7))
 def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_announced(
     number: int, tmp_path: Path
 ) -> None:

@@ -64,14 +64,14 @@ def check_matsum(faults: list[Fault], lines: int) -> bool:
     return readable > 0
 
 
-@cases(100)
+@cases(40)
 @given(FAULTS)
 def test_glstat(faults: list[Fault]) -> None:
     check_glstat(faults)
 
 
 @pytest.mark.parametrize("lines", MATSUM)
-@cases(100)
+@cases(40)
 @given(faults=FAULTS)
 def test_matsum(lines: int, faults: list[Fault]) -> None:
     check_matsum(faults, lines)

@@ -168,7 +168,7 @@ def check(layout: str, faults: list[Fault]) -> None:
         return
 
 
-@cases(25)
+@cases(10)
 @given(FAULTS)
 def test_damaged_files(faults: list[Fault]) -> None:
     for layout in SMALL:

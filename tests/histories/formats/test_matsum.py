@@ -5,6 +5,7 @@ import pytest
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import matsum
+from tests.faults import cuts
 from tests.text_files import HEAD, matsum_head, matsum_part, matsum_state, matsum_text
 
 TIMES = [0.0, 0.1, 0.25, 0.3]
@@ -185,14 +186,14 @@ def test_something_else_is_no_matsum(text: bytes) -> None:
 
 
 @pytest.mark.parametrize(("lines", "legend"), [(3, True), (4, False)])
-def test_cut_at_every_byte_gives_whole_states_only(lines: int, legend: bool) -> None:
+def test_cut_anywhere_gives_whole_states_only(lines: int, legend: bool) -> None:
     text = matsum_text(TIMES[:3], IDS, ENERGIES[:3], lines)
     first = text.index(b" time =")
     if not legend:
         text = HEAD + b"\n\n" + text[first:]
         first = text.index(b" time =")
     starts = [at for at in range(len(text)) if text.startswith(b" time =", at)]
-    for end in range(len(HEAD), len(text)):
+    for end in (place for place in cuts(text) if place >= len(HEAD)):
         run = read(text[:end])
         n = run.part_time.size
         assert run.part_time.tolist() == TIMES[:n]
