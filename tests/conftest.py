@@ -8,18 +8,20 @@ from collections.abc import Iterator
 
 # As on the command line: the systems here are small, and threads of several test processes would fight over cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# Program and tests are started again and again: that they are compiled each time is no part of any test.
+# The program is started again and again: that it is compiled each time is no part of any test.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-sys.dont_write_bytecode = False
 
 import pytest
 from hypothesis import settings
 
 from d2rpick.base.workers import cores
 
-# A busy machine is no finding.  Each run asks other examples: a third of the usual hundred each time are as good as all.
+# A busy machine is no finding.  Each run asks other examples: a third of the usual hundred are as good as all.
 settings.register_profile("d2rpick", deadline=None, max_examples=30)
 settings.load_profile("d2rpick")
+
+# Nor is it that each process of the tests compiles them anew.
+sys.dont_write_bytecode = False
 
 
 _now = time.time_ns
