@@ -11,7 +11,7 @@ What is named here is imported when it is first used: the package itself imports
 
 from __future__ import annotations
 
-from d2rpick.base.version import __version__ as __version__
+from d2rpick.base import __version__ as __version__
 
 TYPE_CHECKING = False  # type checkers take it for theirs; importing typing is left to those who need it
 if TYPE_CHECKING:

@@ -4,7 +4,9 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from d2rpick.deck import Deck, Windows, find_windows, read_deck, read_parts, read_switching
+from d2rpick.deck.parts import read_parts
+from d2rpick.deck.reader import Deck, read_deck
+from d2rpick.deck.switching import Windows, find_windows, read_switching
 from d2rpick.rules import check_deck
 
 MAIN = "main.k"

@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing
     from d2rpick.api.runs import Run
-    from d2rpick.deck import Window
-    from d2rpick.rules import Checked, Finding
+    from d2rpick.deck.switching import Window
+    from d2rpick.rules import Checked
+    from d2rpick.rules.base import Finding
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

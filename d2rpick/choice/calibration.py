@@ -21,9 +21,11 @@ import numpy as np
 from d2rpick.base.errors import ConfigurationError, DeckError, FormatError
 from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weights
 from d2rpick.choice.warnings import Caution
-from d2rpick.deck import find_windows, ls_dyna, radioss, read_deck, read_parts, read_switching
-from d2rpick.deck.folder import main_decks
+from d2rpick.deck import ls_dyna, main_decks, radioss
+from d2rpick.deck.parts import read_parts
 from d2rpick.deck.radioss_run import find_run_windows, read_run, run_files
+from d2rpick.deck.reader import read_deck
+from d2rpick.deck.switching import find_windows, read_switching
 from d2rpick.histories.listings import is_glstat, read_timing, read_zone_times
 
 if TYPE_CHECKING:
@@ -31,8 +33,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.deck import Deck
     from d2rpick.deck.model import Inventory
+    from d2rpick.deck.reader import Deck
     from d2rpick.histories.history import Samples
     from d2rpick.histories.listings import Timing, ZoneTimes
 

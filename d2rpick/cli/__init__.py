@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import click
 
+from d2rpick.base import __version__
 from d2rpick.base.errors import one_line, printable
-from d2rpick.base.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

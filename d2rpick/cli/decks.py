@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.warnings import Caution
     from d2rpick.cli.output import Output
-    from d2rpick.rules import Checked, Configuration, Unreadable
+    from d2rpick.rules import Checked, Configuration
+    from d2rpick.rules.base import Unreadable
     from d2rpick.rules.judgement import HistoryJudge
 
 
@@ -122,7 +123,8 @@ def check(
     line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) silences one for it.
     """
     from d2rpick.report.findings import Checks
-    from d2rpick.rules import Configuration, Severity
+    from d2rpick.rules import Configuration
+    from d2rpick.rules.base import Severity
 
     judge = _judge(request)
     output = output.beside(*deck, *(judge.run.sources if judge else ()))
@@ -160,7 +162,8 @@ def _checked(
     A deck that cannot be read, or whose configuration cannot, does not hide the others; nor does an internal error.
     """
     from d2rpick.deck.source import STDIN
-    from d2rpick.rules import RULES, Unreadable, check_deck, configuration_for
+    from d2rpick.rules import RULES, check_deck, configuration_for
+    from d2rpick.rules.base import Unreadable
 
     asked.verify(RULES)
     results, inputs = [], []
@@ -185,8 +188,8 @@ def _checked(
 
 def _main_decks(named: Sequence[str]) -> tuple[list[str], list[Unreadable]]:
     """Replace folders by their main decks; those without any are told."""
-    from d2rpick.deck.folder import main_decks
-    from d2rpick.rules import Unreadable
+    from d2rpick.deck import main_decks
+    from d2rpick.rules.base import Unreadable
 
     decks: list[str] = []
     failed: list[Unreadable] = []

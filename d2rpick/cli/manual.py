@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.base.version import __version__
+from d2rpick.base import __version__
 from d2rpick.cli import d2rpick
 
 if TYPE_CHECKING:

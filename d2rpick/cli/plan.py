@@ -148,7 +148,8 @@ def _write_and_check(card: PrintedCard, plan: Plan, folder: str, output: Output)
     from d2rpick.api.cards import SETTINGS
     from d2rpick.deck.writing import write_deck
     from d2rpick.report.findings import Checks, as_table
-    from d2rpick.rules import Configuration, Severity, check_deck, configuration_for
+    from d2rpick.rules import Configuration, check_deck, configuration_for
+    from d2rpick.rules.base import Severity
     from d2rpick.rules.judgement import HistoryJudge
 
     request = plan.question.request

@@ -1,28 +1,20 @@
-"""Decks of LS-DYNA and runs of Radioss: cards with file, line and column, switching windows, parts and elements."""
+"""Decks of LS-DYNA and runs of Radioss: cards with file, line and column, switching windows, parts and elements.
+
+Here is what begins with a name: what a deck says about its parts, and which files of a folder are main decks.
+"""
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from d2rpick.deck.parts import Parts, read_parts
-from d2rpick.deck.reader import Deck, read_deck
-from d2rpick.deck.switching import SwitchSet, Window, Windows, find_windows, read_switching
+from d2rpick.base.errors import DeckError
 
 if TYPE_CHECKING:
-    from d2rpick.deck.model import Inventory
+    from collections.abc import Iterator
 
-__all__ = [
-    "Deck",
-    "Parts",
-    "SwitchSet",
-    "Window",
-    "Windows",
-    "find_windows",
-    "read_deck",
-    "read_inventory",
-    "read_parts",
-    "read_switching",
-]
+    from d2rpick.deck.model import Inventory
 
 
 def read_inventory(path: str) -> Inventory:
@@ -38,12 +30,76 @@ def read_inventory(path: str) -> Inventory:
     DeckError
         If the deck cannot be read, or has no parts.
     """
-    from d2rpick.base.errors import DeckError
-    from d2rpick.deck import ls_dyna, radioss, radioss_run
+    from d2rpick.deck import ls_dyna, radioss, radioss_run, reader  # not above: they load numpy
 
     is_run = radioss_run.run_files(path)
-    found = radioss.read(radioss_run.read_run(path)) if is_run else ls_dyna.read(read_deck(path))
+    found = radioss.read(radioss_run.read_run(path)) if is_run else ls_dyna.read(reader.read_deck(path))
     if not found.parts:
         why = f" ({found.notes[0]})" if found.notes else ""
         raise DeckError(f"{path}: no parts were found{why}; name the main deck of the run")
     return found
+
+
+_HEAD = 64 * 1024  # bytes in which a deck shows what it is: titles and comments come before
+
+
+def main_decks(folder: str) -> list[str]:
+    """Find the main decks in a folder and below it.
+
+    A main deck holds ``*KEYWORD`` (LS-DYNA) or ``/BEGIN`` (Radioss) near its beginning, and no other deck of the
+    folder includes it.  Hidden files and folders are passed over.
+
+    Raises
+    ------
+    DeckError
+        If there is none, with what to do.
+    """
+    from d2rpick.deck import radioss_run, reader  # not above: start-up
+
+    decks = [path for path in _files(folder) if _begins(path)]
+    included: set[str] = set()
+    for path in decks:
+        if radioss_run.run_files(path):
+            continue  # its includes have no /BEGIN
+        try:
+            included.update(map(os.path.realpath, reader.read_deck(path).files[1:]))
+        except DeckError:
+            continue  # said when it is checked
+    found = [path for path in decks if os.path.realpath(path) not in included]
+    if not found:
+        what = "every one is included by another" if decks else "no file with *KEYWORD or /BEGIN"
+        raise DeckError(f"{folder}: no main deck in this folder ({what}); give the deck itself")
+    return found
+
+
+def _files(folder: str) -> Iterator[str]:
+    for root, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        yield from (str(Path(root) / name) for name in sorted(names) if not name.startswith("."))
+
+
+def _begins(path: str) -> bool:
+    """Whether a file says near its beginning that it is a main deck."""
+    try:
+        head = _head(path) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe gives it once
+    except OSError:
+        return False
+    lines = (line.strip().upper() for line in head.removeprefix(b"\xef\xbb\xbf").splitlines())
+    first = next((line for line in lines if line[:1] in {b"*", b"/"}), b"")
+    return first.startswith((b"*KEYWORD", b"/BEGIN")) and b"\0" not in head
+
+
+def _head(path: str) -> bytes:
+    """Read the beginning of a file.
+
+    A small file may just be saved, and is waited for.  That of a large one is there, however long a solver goes on
+    writing to it.
+    """
+    from d2rpick.deck.source import SourceFile
+
+    with Path(path).open("rb", buffering=0) as file:
+        head = file.read(_HEAD)
+    try:
+        return head if len(head) == _HEAD else SourceFile(path).read(0, _HEAD)
+    except DeckError:
+        return head  # what is wrong is said when it is checked

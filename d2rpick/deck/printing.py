@@ -13,8 +13,8 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base import __version__
 from d2rpick.base.errors import DeckError
-from d2rpick.base.version import __version__
 from d2rpick.deck.printed_card import (
     LONGEST,
     PHYSICS,

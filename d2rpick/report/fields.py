@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final, Literal, NamedTuple
 
-from d2rpick.base.version import __version__
+from d2rpick.base import __version__
 from d2rpick.report import tables
 
 

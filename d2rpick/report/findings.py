@@ -11,20 +11,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
 
+from d2rpick.base import __version__
 from d2rpick.base.errors import name_units, printable
-from d2rpick.base.version import __version__
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.source import STDIN
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
-from d2rpick.rules import RULES, Example, Severity
+from d2rpick.rules import RULES
+from d2rpick.rules.base import Example, Severity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.deck import Window
+    from d2rpick.deck.switching import Window
     from d2rpick.report.formats import Shown
-    from d2rpick.rules import Checked, Rule, Unreadable
+    from d2rpick.rules import Checked
+    from d2rpick.rules.base import Rule, Unreadable
 
 
 SARIF_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"

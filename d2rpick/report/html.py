@@ -8,7 +8,7 @@ from html import escape
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from d2rpick.base.version import __version__
+from d2rpick.base import __version__
 from d2rpick.report.tables import short
 
 if TYPE_CHECKING:

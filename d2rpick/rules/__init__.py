@@ -12,30 +12,16 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
-from d2rpick.deck import Deck, Window, radioss_run, read_deck
+from d2rpick.deck import radioss_run
+from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.rules import reading, runs, sets, switched_parts, times
-from d2rpick.rules.base import Case, Example, Finding, Judge, Rule, RunCase, Severity, Unreadable
+from d2rpick.rules.base import Case, Finding, Judge, Rule, RunCase, Severity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from d2rpick.deck.switching import Window
 
-__all__ = [
-    "RULES",
-    "Case",
-    "Checked",
-    "Configuration",
-    "Example",
-    "Finding",
-    "Judge",
-    "Rule",
-    "Severity",
-    "Unreadable",
-    "check_deck",
-    "configuration_for",
-    "find_rules",
-    "read_configuration",
-]
 
 _SEVERITIES: Final = ("error", "warning", "info")
 _MODULES = (reading, sets, times, switched_parts, runs)

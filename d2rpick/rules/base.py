@@ -7,16 +7,15 @@ from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
-from d2rpick.deck import Deck, Parts, SwitchSet, Window, Windows, find_windows, read_parts, read_switching
-from d2rpick.deck.parts import read_sections
+from d2rpick.deck.parts import Parts, read_parts, read_sections
 from d2rpick.deck.radioss_run import Flaw, Run, RunWindows, find_run_windows
+from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, find_windows, read_switching
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from d2rpick.deck.card import Card, Field, Value
-    from d2rpick.deck.reader import Unread
-    from d2rpick.deck.switching import Event, Header
+    from d2rpick.deck.reader import Deck, Unread
 
 
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"

@@ -14,7 +14,7 @@ from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.choice.of_run import Reference, verify_of
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, Caution, end_of_flight, end_of_load
-from d2rpick.deck import Window, read_inventory
+from d2rpick.deck import read_inventory
 from d2rpick.histories.digits import above, first_as_read, in_the_record
 from d2rpick.histories.surroundings import UNKNOWN
 from d2rpick.rules.base import Fault
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
     from d2rpick.choice.switched_run import Times
+    from d2rpick.deck.switching import Window
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run, Selection
 

@@ -8,14 +8,12 @@ from d2rpick.deck.card import Card, Field, Problem
 from d2rpick.deck.parts import element_cards
 from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
 from d2rpick.deck.source import STDIN
-from d2rpick.deck.switching import misspelt
+from d2rpick.deck.switching import SwitchSet, misspelt
 from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Case, Example, Objection, rule
 from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, PASSES, THERE, automatic, deck
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from d2rpick.deck import SwitchSet
 
 
 _CURES: Final = {"no such file": "add the file or its *INCLUDE_PATH", UNKNOWN_KIND: "check that file separately"}

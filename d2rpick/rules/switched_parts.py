@@ -6,16 +6,15 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.base.graph import reached
-from d2rpick.deck.parts import Constraint, element_cards, read_constraints
+from d2rpick.deck.parts import Constraint, Parts, element_cards, read_constraints
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Example, Objection, grouped, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
-    from d2rpick.deck import Parts, SwitchSet
     from d2rpick.deck.card import Field
-    from d2rpick.deck.switching import Event, Header, Switched, Unit
+    from d2rpick.deck.switching import Event, Header, Switched, SwitchSet, Unit
 
 _NEAREST = 3  # ids that are named in place of one that the deck does not have
 

@@ -6,14 +6,12 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
-from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header
+from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header, SwitchSet, Window
 from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Example, Objection, grouped, rule
 from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, PASSES, THERE, automatic, deck, window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-
-    from d2rpick.deck import SwitchSet, Window
 
 
 _INTERVALS = 200  # output intervals per rigid window, for crossings to be found within 0.5 %

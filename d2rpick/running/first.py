@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ArgumentError, DeckError, name_units
-from d2rpick.deck import read_deck, read_inventory
+from d2rpick.deck import read_inventory
 from d2rpick.deck.inner_period import inner_period
 from d2rpick.deck.parts import read_entities
 from d2rpick.deck.pieces import supports_of
@@ -18,6 +18,7 @@ from d2rpick.deck.printing import Waiting, capped, header, listed, off, to_defor
 from d2rpick.deck.radioss_bodies import bodies_for
 from d2rpick.deck.radioss_deck import kept_off, number_of
 from d2rpick.deck.radioss_run import parts_off, read_run
+from d2rpick.deck.reader import read_deck
 from d2rpick.running.wait import Wait, check_wait, wait_of_deck
 
 if TYPE_CHECKING:

@@ -9,7 +9,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from d2rpick.deck import find_windows, read_deck, read_parts, read_switching
+from d2rpick.deck.parts import read_parts
+from d2rpick.deck.reader import read_deck
+from d2rpick.deck.switching import find_windows, read_switching
 from d2rpick.rules import check_deck
 from d2rpick.rules.examples import BACK, HEAD, PARTS, THERE
 from tests.benchmarks.timing import ratio

@@ -20,7 +20,8 @@ from d2rpick.flight.momentum import flight_around
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.surroundings import Support, Surroundings
-from d2rpick.rules import RULES, Example, check_deck
+from d2rpick.rules import RULES, check_deck
+from d2rpick.rules.base import Example
 from tests import made_car
 from tests.command import ENERGY, OSCILLATOR, ROOT, answer, codes, run
 from tests.decks import write

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.base.version import __version__
+from d2rpick.base import __version__
 from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.manual import manual
 from d2rpick.rules import RULES

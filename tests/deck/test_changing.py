@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 
 from d2rpick.base.errors import DeckError
-from d2rpick.deck import read_deck, read_inventory
-from d2rpick.deck.folder import main_decks
+from d2rpick.deck import main_decks, read_inventory
 from d2rpick.deck.printed_card import Printing
 from d2rpick.deck.printing import cards
+from d2rpick.deck.reader import read_deck
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import RULES, check_deck
 from d2rpick.rules.examples import BACK, GOOD, PARTS, THERE

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from d2rpick.deck import read_parts
 from d2rpick.deck.ls_dyna import first_shared_nodes
-from d2rpick.deck.parts import element_cards
+from d2rpick.deck.parts import element_cards, read_parts
 from d2rpick.rules.examples import PARTS, automatic
 from tests.decks import read, spans, wide, windows
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from d2rpick.report import findings as report
 from d2rpick.report.formats import Shown
-from d2rpick.rules import RULES, Checked, Finding, Severity, check_deck
+from d2rpick.rules import RULES, Checked, check_deck
+from d2rpick.rules.base import Finding, Severity
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, automatic
 from tests.deck.test_radioss_run import place
 from tests.decks import write

@@ -10,16 +10,8 @@ from typing import Any
 import pytest
 
 from d2rpick.base.errors import ConfigurationError, DeckError
-from d2rpick.rules import (
-    RULES,
-    Configuration,
-    Example,
-    Rule,
-    Severity,
-    check_deck,
-    configuration_for,
-    read_configuration,
-)
+from d2rpick.rules import RULES, Configuration, check_deck, configuration_for, read_configuration
+from d2rpick.rules.base import Example, Rule, Severity
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import answer, run
 from tests.decks import found, write

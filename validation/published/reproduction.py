@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.version import __version__
+from d2rpick.base import __version__
 from d2rpick.report import keys, page, tables
 from d2rpick.report.fields import Document, Field, Kind, kind_of, many, row
 from d2rpick.report.figures import svg_element

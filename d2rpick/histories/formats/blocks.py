@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.version import __version__
+from d2rpick.base import __version__
 from d2rpick.histories.formats.printed import decode
 
 if TYPE_CHECKING:

@@ -1,3 +1,0 @@
-"""The version of d2rpick, written down once."""
-
-__version__ = "0.15.0"
