@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, frame_of
 from d2rpick.api.asked import request_of
 from d2rpick.api.cards import SETTINGS
+from d2rpick.report.findings import FINDING, Checks
 from d2rpick.report.tables import positional
+from d2rpick.rules import Configuration, check_deck, configuration_for
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -19,32 +21,35 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Choosing
     from d2rpick.api.runs import Run
     from d2rpick.deck.switching import Window
-    from d2rpick.rules import Checked
     from d2rpick.rules.base import Finding
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Findings(Answer):
+class Findings(Answer, Checks):
     """Answer of `check`; nothing of it changes.
 
     ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``; ``windows`` are those in
     which parts are rigid.
     """
 
-    decks: tuple[str, ...]
-    findings: tuple[Finding, ...]
-    windows: tuple[Window, ...] = field(repr=False)
-    command: tuple[str, ...] = field(repr=False)
-    _checked: tuple[Checked, ...] = field(repr=False)
-    _history: tuple[str, ...] | None = field(repr=False)
+    command: tuple[str, ...]
     kind = "findings"
     said = ("decks", "findings")
 
-    def to_json(self) -> str:
-        """Give the JSON document of ``d2rpick check``, schema d2rpick/check/1; paths relative to the working folder."""
-        from d2rpick.report.findings import DOCUMENT, Checks
+    @property
+    def decks(self) -> tuple[str, ...]:
+        """Names of the main decks."""
+        return tuple(one.deck for one in self.results)
 
-        return DOCUMENT.as_json(Checks(self._checked, cautions=self.warnings, history=self._history), self.command)
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the rules have against the cards of all decks."""
+        return tuple(finding for one in self.results for finding in one.findings)
+
+    @property
+    def windows(self) -> tuple[Window, ...]:
+        """Windows in which parts are rigid, of all decks."""
+        return tuple(window for one in self.results for window in one.windows)
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per finding, a column per key of ``findings`` in the JSON.
@@ -56,8 +61,6 @@ class Findings(Answer):
         >>> d2.check("sample_data/switching.k", history=history).to_frame()["rule"].tolist()
         ['D2R202', 'D2R203']
         """
-        from d2rpick.report.findings import FINDING
-
         return frame_of(self.to_dict()["findings"], FINDING.keys, decks=list(self.decks))
 
 
@@ -102,8 +105,6 @@ def check(
     >>> [(window.part, window.td) for window in found.windows]
     [(11, 0.0687534), (12, 0.064)]
     """
-    from d2rpick.rules import Configuration, check_deck, configuration_for
-
     names = arguments.paths("decks", decks)
     if history is not None:
         arguments.check_run("history", history)
@@ -123,11 +124,8 @@ def check(
     rules = [text for name in ("select", "ignore") for one in getattr(asked, name) for text in (f"--{name}", one)]
     judging = request.asking() if history else ()
     return Findings(
-        decks=names,
-        findings=tuple(finding for one in checked for finding in one.findings),
-        windows=tuple(window for one in checked for window in one.windows),
+        results=tuple(checked),
         cautions=tuple(judge.cautions) if judge else (),
+        history=history.sources if history else None,
         command=("check", *files, *judging, *rules, *positional(names)),
-        _checked=tuple(checked),
-        _history=history.sources if history else None,
     )

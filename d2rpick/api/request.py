@@ -201,20 +201,8 @@ class Request:
             from d2rpick.vibration.oscillator import to_mode  # not above: mostly none is given
 
             mode = to_mode(oscillator, self.v0)
-        return Settings(
-            after=self.after,
-            landing=self.landing,
-            margin=self.margin,
-            tolerance=self.tolerance,
-            max_kinetic_share=self.max_kinetic_share,
-            max_residual=self.max_residual,
-            oscillator=mode,
-            fit_window=self.fit_window,
-            replay=not self.no_verify,
-            strict=self.strict,
-            cost_share=self.cost_share,
-            step_ratio=self.step_ratio or 1.0,
-        )
+        same = {one.name: getattr(self, one.name) for one in fields(Settings) if one.name in OPTIONS}
+        return Settings(**{**same, "step_ratio": self.step_ratio or 1.0}, oscillator=mode, replay=not self.no_verify)
 
     def selection(self, *, parts: bool = True) -> Selection:
         """What of a run is meant, without ``parts`` the columns alone; ArgumentError for energies in two ways."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -85,16 +85,6 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
 def _in_order(tr: float, td: float) -> None:
     if not tr < td:
         raise RangeError(f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td")
-
-
-def with_comparison(verdict: Verdict, comparison: Comparison) -> Verdict:
-    """Add what a finished switched run shows; a wrong motion of it overrules the verdict."""
-    return replace(
-        verdict,
-        switched=comparison,
-        verified=verdict.verified and not comparison.objections,
-        reasons=verdict.reasons + comparison.objections,
-    )
 
 
 # Pairs at other peaks that may turn out not to verify when the record is examined there, before it is given up.

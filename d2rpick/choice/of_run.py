@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from d2rpick.choice.answers import Suggestion, Verdict, suggest_at, verify, verify_at, with_comparison
+from d2rpick.choice.answers import Suggestion, Verdict, suggest_at, verify, verify_at
 from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_health, refuse_unsound
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import cautions_of_engine
@@ -18,7 +18,6 @@ from d2rpick.histories.opening import Selection, open_run
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.situation import Settings, Situation
     from d2rpick.histories.history import History, Track
     from d2rpick.histories.names import Part
@@ -124,8 +123,33 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference, mi
     RangeError
         If one of the two runs does not go on after td.
     """
-    verdict = replace(verdict, cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)))
-    return with_comparison(verdict, _comparison(verdict, reference.run, switched, min_mean))
+    from d2rpick.choice.comparison import compare_runs
+    from d2rpick.choice.judged_parts import judged_parts
+
+    situation, run = verdict.situation, reference.run
+    flight, parts = situation.flight, situation.history.parts
+    together = flight.parts if flight.source == "momentum" else flight.parts or parts
+    pair = verdict.candidate.tr, situation.td
+    judged = judged_parts((run, switched.run), (situation.history, switched.history), pair)
+    found = compare_runs(
+        judged.reference,
+        judged.switched,
+        pair,
+        situation.latest_td if situation.latest_td > situation.td else float("inf"),
+        situation.settings.tolerance,
+        momenta=(run.momentum(together), _momentum(switched.run, together)),
+        centres=(run.centre(parts), switched.run.centre(parts)) if parts else (None, None),
+        known=judged.known,
+        min_mean=min_mean,
+    )
+    objections = (*judged.objections, *found.objections)
+    return replace(
+        verdict,
+        switched=replace(found, objections=objections, notes=(*judged.notes, *found.notes)),
+        verified=verdict.verified and not objections,  # a wrong motion overrules the verdict
+        reasons=verdict.reasons + objections,
+        cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)),
+    )
 
 
 def _check(
@@ -175,30 +199,6 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
     ):
         cautions = tuple(one for one in cautions if one.code not in OF_THE_MODEL)
     return replace(answer, health=health, cautions=answer.cautions + cautions)
-
-
-def _comparison(verdict: Verdict, run: Run, switched: Reference, min_mean: float) -> Comparison:
-    from d2rpick.choice.comparison import compare_runs
-    from d2rpick.choice.judged_parts import judged_parts
-
-    situation = verdict.situation
-    flight, parts = situation.flight, situation.history.parts
-    together = flight.parts if flight.source == "momentum" else flight.parts or parts
-    pair = verdict.candidate.tr, situation.td
-    judged = judged_parts((run, switched.run), (situation.history, switched.history), pair)
-    found = compare_runs(
-        judged.reference,
-        judged.switched,
-        pair,
-        situation.latest_td if situation.latest_td > situation.td else float("inf"),
-        situation.settings.tolerance,
-        momenta=(run.momentum(together), _momentum(switched.run, together)),
-        centres=(run.centre(parts), switched.run.centre(parts)) if parts else (None, None),
-        known=judged.known,
-        min_mean=min_mean,
-    )
-    objections, notes = (*judged.objections, *found.objections), (*judged.notes, *found.notes)
-    return replace(found, objections=objections, notes=notes)
 
 
 def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:
