@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn, TypedDict
 
 from d2rpick.api.request import OPTIONS, Number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from d2rpick.vibration.oscillator import Oscillator
 
     Path = str | os.PathLike[str]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypedDict, Unpack
 
-from d2rpick.api.request import OPTIONS, POSITIVE, TIME, UNLIMITED, Number, Option, dashed, option, options_of
+from d2rpick.api.request import OPTIONS, POSITIVE, TIME, UNLIMITED, Number, Option, Request, dashed, option, options_of
 from d2rpick.base.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Parts
     from d2rpick.api.asked import Asked
-    from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.choice.answers import Verdict
     from d2rpick.choice.judged_card import CardRequest

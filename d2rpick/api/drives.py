@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from d2rpick.api.answer import Paged
-from d2rpick.api.cards import numbers
+from d2rpick.api.cards import Cards, numbers
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.cost import CostModel
 from d2rpick.choice.deck_of_run import doubts_of_solver
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from d2rpick.api.cards import Cards
     from d2rpick.choice.warnings import Caution
 
 # Of a second: where nothing vibrates so long without a force is flight, and so long before a contact td lies at least.

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
-from d2rpick.api.asked import ask, request_of
-from d2rpick.api.cards import Cards, judged
+from d2rpick.api.asked import Asked, ask, request_of
+from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged
 from d2rpick.api.request import check_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import plan as planning
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from d2rpick.api.arguments import Choosing, Parts
-    from d2rpick.api.asked import Asked
-    from d2rpick.api.cards import CardOptions, JudgedCard
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.switched_run import Times

@@ -18,12 +18,12 @@ import numpy as np
 from d2rpick.api import arguments
 from d2rpick.api.answer import Paged, frame_of
 from d2rpick.api.asked import request_of
-from d2rpick.api.request import needed_time, time_or_window
+from d2rpick.api.request import Request, needed_time, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
 from d2rpick.base.files import record_of, signed
-from d2rpick.base.workers import answers, on_cores
+from d2rpick.base.workers import Farm, answers, on_cores
 from d2rpick.choice import study as core
-from d2rpick.choice.study import FAILED, UNREADABLE, Stamp, StudyRow, stamps
+from d2rpick.choice.study import FAILED, UNREADABLE, Question, Stamp, StudyRow, stamps
 from d2rpick.report.study import PLAIN
 from d2rpick.report.tables import positional
 
@@ -34,9 +34,6 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.cards import Cards
-    from d2rpick.api.request import Request
-    from d2rpick.base.workers import Farm
-    from d2rpick.choice.study import Question
 
 
 _FIRST: Final = b'{"source": '

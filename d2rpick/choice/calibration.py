@@ -24,9 +24,9 @@ from d2rpick.choice.warnings import Caution
 from d2rpick.deck import ls_dyna, main_decks, radioss
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.radioss_run import find_run_windows, read_run, run_files
-from d2rpick.deck.reader import read_deck
+from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.switching import find_windows, read_switching
-from d2rpick.histories.listings import is_glstat, read_timing, read_zone_times
+from d2rpick.histories.listings import Timing, ZoneTimes, is_glstat, read_timing, read_zone_times
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -34,9 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.deck.model import Inventory
-    from d2rpick.deck.reader import Deck
     from d2rpick.histories.history import Samples
-    from d2rpick.histories.listings import Timing, ZoneTimes
 
 # Times of a leg are right within some 5 %, measured ratios of weights within a half: one over the other.
 _DOUBT: Final = 0.1

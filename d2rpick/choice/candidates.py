@@ -5,25 +5,22 @@ They are judged as columns; a `Candidate` is made only where one is looked at.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
 import numpy as np
 
-from d2rpick.choice.expectation import objections
+from d2rpick.choice.expectation import Objection, objections
 from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures
 from d2rpick.vibration.model import measured_of, moments_of
 from d2rpick.vibration.moments import Moments
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
     from numpy.typing import NDArray
 
-    from d2rpick.choice.expectation import Objection
     from d2rpick.choice.situation import Situation
     from d2rpick.flight.bodies import Off
     from d2rpick.histories.history import Samples

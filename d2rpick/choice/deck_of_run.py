@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from d2rpick.base.errors import are, if_written, name_units
-from d2rpick.choice.cost import ByDeck, Share
+from d2rpick.choice.cost import ByDeck, CostModel, Share
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.geometry import Placement
 from d2rpick.deck.pieces import pieces_of, supports_of
@@ -23,7 +23,6 @@ from d2rpick.histories.surroundings import Support, Surroundings
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
 
-    from d2rpick.choice.cost import CostModel
     from d2rpick.choice.of_run import Reference
     from d2rpick.choice.situation import Settings
     from d2rpick.deck.model import Gravity, Hold, Inventory

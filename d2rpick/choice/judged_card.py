@@ -7,17 +7,15 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.choice.of_run import judge_of
-from d2rpick.deck.printed_card import Printing
+from d2rpick.choice.of_run import Reference, judge_of
+from d2rpick.deck.printed_card import PrintedCard, Printing, Times
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.choice.answers import Verdict
-    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.situation import Settings, Situation
-    from d2rpick.deck.printed_card import PrintedCard, Times
     from d2rpick.histories.history import History
 
 

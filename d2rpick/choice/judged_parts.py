@@ -13,7 +13,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError, if_written, listing
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.histories.names import Selection
+from d2rpick.histories.names import Part, Selection
 from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
-    from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from d2rpick.choice.answers import Suggestion, Verdict, suggest_at, verify, verify_at
 from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_health, refuse_unsound
-from d2rpick.choice.situation import examine
+from d2rpick.choice.situation import Settings, Situation, examine
 from d2rpick.choice.warnings import cautions_of_engine
 from d2rpick.histories.balance import balance_of
 from d2rpick.histories.opening import Selection, open_run
@@ -18,7 +18,6 @@ from d2rpick.histories.opening import Selection, open_run
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from d2rpick.choice.situation import Settings, Situation
     from d2rpick.histories.history import History, Track
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run

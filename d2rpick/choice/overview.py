@@ -11,23 +11,20 @@ from d2rpick.base.errors import FormatError, RangeError, if_written, listing
 from d2rpick.choice.health import Health, assess, cautions_of_health, refuse_unsound, unsound
 from d2rpick.choice.of_run import Reference
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.switched_run import by_the_model, rigid_times
+from d2rpick.choice.switched_run import Times, by_the_model, rigid_times
 from d2rpick.choice.warnings import Caution, cautions_of_engine
 from d2rpick.choice.windows import bounds, flights_of
 from d2rpick.flight.momentum import with_parts_by_number
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance import balance_of
 from d2rpick.histories.companions import doubts
-from d2rpick.histories.history import rows_of
-from d2rpick.histories.names import select_parts
+from d2rpick.histories.history import History, rows_of
+from d2rpick.histories.names import Part, Selection, select_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.choice.switched_run import Times
     from d2rpick.histories.database import Legs
-    from d2rpick.histories.history import History
-    from d2rpick.histories.names import Part, Selection
     from d2rpick.histories.run import Run
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import Reference, check_units, suggest_of
-from d2rpick.choice.switched_run import Done, done_windows, switched_history
+from d2rpick.choice.switched_run import Done, Times, done_windows, switched_history
 from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
 from d2rpick.choice.windows import bounds, flights_of, last_td
 from d2rpick.flight.internal_energy import round_off
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.ranking import Quality
     from d2rpick.choice.situation import Settings
-    from d2rpick.choice.switched_run import Times
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError, RangeError, are, name_units
 from d2rpick.choice.candidates import ONE_BODY
-from d2rpick.choice.cost import CostModel, Share
+from d2rpick.choice.cost import CostModel, Share, Weights
 from d2rpick.choice.deck_of_run import (
     bodies_of,
     doubts_of,
@@ -22,23 +22,20 @@ from d2rpick.choice.deck_of_run import (
     of_another_model,
 )
 from d2rpick.choice.of_run import Reference, suggest_of, verify_of
-from d2rpick.choice.switchable_parts import facts_of, rows_of, step_growth
+from d2rpick.choice.switchable_parts import PartRow, RunFacts, facts_of, rows_of, step_growth
 from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.deck.geometry import Placement
 from d2rpick.flight.momentum import asks_for_recommended, with_parts_by_number
 from d2rpick.histories.listings import printed_steps
-from d2rpick.histories.names import Selection, select_parts
+from d2rpick.histories.names import Part, Selection, select_parts
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.choice.cost import Weights
     from d2rpick.choice.situation import Settings, Situation
-    from d2rpick.choice.switchable_parts import PartRow, RunFacts
     from d2rpick.choice.switched_run import Times
     from d2rpick.deck.model import Inventory
-    from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
 
 # Savings that differ by less cannot be told apart: the cost model is right within some points.

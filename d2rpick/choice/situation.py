@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.flight.flight import find_flight, seen_flight
+from d2rpick.flight.flight import Flight, Seen, find_flight, seen_flight
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.histories.samples import window
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, identify_several, judge_given
-from d2rpick.vibration.model import Evidence, describing, doubtful, energy_at, model_at
+from d2rpick.vibration.model import Evidence, Vibration, describing, doubtful, energy_at, model_at
 from d2rpick.vibration.span import Fits, Span, described_span, span_of
 from d2rpick.vibration.uncertainty import resolved
 
@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.cost import ByDeck
     from d2rpick.deck.geometry import Placement
     from d2rpick.flight.bodies import Bodies, RigidBody
-    from d2rpick.flight.flight import Flight, Seen
     from d2rpick.histories.history import History, Samples
-    from d2rpick.vibration.model import Vibration
     from d2rpick.vibration.modes import Mode
     from d2rpick.vibration.swings import Swings
 

@@ -12,7 +12,7 @@ import numpy as np
 from d2rpick.base.errors import FormatError, if_written, name_units
 from d2rpick.choice.windows import bounds, flights_of
 from d2rpick.deck.geometry import masses_and_steps
-from d2rpick.deck.model import DISCRETE
+from d2rpick.deck.model import DISCRETE, Inventory, PartData
 from d2rpick.deck.pieces import pieces_of
 from d2rpick.flight.momentum import deformable_parts, flying_together
 from d2rpick.histories.opening import Selection
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.cost import CostModel
     from d2rpick.choice.situation import Settings
-    from d2rpick.deck.model import Inventory, PartData
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part

@@ -13,14 +13,13 @@ from d2rpick.choice.judged_parts import rigid_parts, with_energy
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import believed
-from d2rpick.histories.history import Given
+from d2rpick.histories.history import Given, History
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.of_run import Reference
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History
     from d2rpick.histories.names import Part
 
     Times = tuple[float, float]

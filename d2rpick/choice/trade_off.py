@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.answers import suggest_at
-from d2rpick.choice.candidates import candidates_of
+from d2rpick.choice.answers import AcceptableWindow, Suggestion, suggest_at
+from d2rpick.choice.candidates import Candidate, Candidates, candidates_of
 from d2rpick.choice.health import refuse_unsound
-from d2rpick.choice.of_run import check_units, suggest_of
-from d2rpick.choice.ranking import EQUALLY_GOOD
+from d2rpick.choice.of_run import Reference, check_units, suggest_of
+from d2rpick.choice.ranking import EQUALLY_GOOD, Quality
 from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, looking, offered_times, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
 from d2rpick.choice.windows import bounds, longest_flight
@@ -21,12 +21,8 @@ from d2rpick.vibration.span import Fits
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
 
-    from d2rpick.choice.answers import AcceptableWindow, Suggestion
-    from d2rpick.choice.candidates import Candidate, Candidates
     from d2rpick.choice.expectation import Expectation
-    from d2rpick.choice.of_run import Reference
     from d2rpick.choice.plan import Plan
-    from d2rpick.choice.ranking import Quality
     from d2rpick.choice.situation import Settings, Situation
 
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.candidates import judge
+from d2rpick.choice.candidates import Candidate, Candidates, judge
 from d2rpick.choice.expectation import most_energy
-from d2rpick.choice.situation import Settings, examine, landed
+from d2rpick.choice.situation import Settings, Situation, examine, landed
 from d2rpick.flight.flight import Flight, all_seen, witnesses
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.flight.window import moments
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.choice.candidates import Candidate, Candidates
-    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History, Samples
 
 

@@ -8,22 +8,20 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from d2rpick.api.cards import SETTINGS
+from d2rpick.api.cards import SETTINGS, Cards
 from d2rpick.base.errors import INTERNAL_ERROR, ConfigurationError, D2RPickError, DeckError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
-from d2rpick.cli.output import explained, in_words, tell, text_bytes
+from d2rpick.cli.output import Output, explained, in_words, tell, text_bytes
 from d2rpick.cli.values import CARDS, click_type
 from d2rpick.report.formats import FORMATS, write
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.api.cards import Cards
     from d2rpick.api.request import Request
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.warnings import Caution
-    from d2rpick.cli.output import Output
     from d2rpick.rules import Checked, Configuration
     from d2rpick.rules.base import Unreadable
     from d2rpick.rules.judgement import HistoryJudge

@@ -6,18 +6,25 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from d2rpick.api.request import FRACTION, LIMITS, MIN_MEAN_ENERGY, READING, Option, check_window, time_or_window
+from d2rpick.api.request import (
+    FRACTION,
+    LIMITS,
+    MIN_MEAN_ENERGY,
+    READING,
+    Option,
+    Request,
+    check_window,
+    time_or_window,
+)
 from d2rpick.base.errors import ArgumentError
 from d2rpick.cli import options
 from d2rpick.cli.options import ANSWER, DECK, DECK_OF_PARTS, FILES, HISTORY, ONE_RUN, RESULT, WINDOW
-from d2rpick.cli.output import IN_WORDS, in_words, opened
+from d2rpick.cli.output import IN_WORDS, Output, in_words, opened
 from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS, write
 
 if TYPE_CHECKING:
     from d2rpick.api.cards import Cards
-    from d2rpick.api.request import Request
-    from d2rpick.cli.output import Output
 
 
 INFO: Final = """\b

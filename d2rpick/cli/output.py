@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 
 import click
 
-from d2rpick.api.cards import Cards
-from d2rpick.api.request import OPTIONS, dashed, option, options_of
+from d2rpick.api.cards import Cards, JudgedCard
+from d2rpick.api.request import OPTIONS, Request, dashed, option, options_of
 from d2rpick.base.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
 from d2rpick.base.files import write_whole
 from d2rpick.cli.progress import reading
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.answer import Answer, Paged
-    from d2rpick.api.cards import JudgedCard
-    from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.choice.ranking import Quality
     from d2rpick.choice.warnings import Caution

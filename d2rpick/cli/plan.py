@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING
+from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING, Request
 from d2rpick.base.errors import ArgumentError, DeckError, printable
 from d2rpick.cli import options
 from d2rpick.cli.options import DECK_OF_PARTS, HISTORY, RESULT
-from d2rpick.cli.output import opened
+from d2rpick.cli.output import Output, opened
 from d2rpick.cli.values import CARDS, click_type
 from d2rpick.report.formats import FORMATS
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from d2rpick.api.asked import Asked
     from d2rpick.api.cards import Cards
     from d2rpick.api.flights import Plan
-    from d2rpick.api.request import Request
-    from d2rpick.cli.output import Output
     from d2rpick.deck.printed_card import PrintedCard
 
 EXAMPLES = """\b

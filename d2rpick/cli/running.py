@@ -7,18 +7,16 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from d2rpick.api.request import NOT_NEGATIVE, POSITIVE, Option
+from d2rpick.api.request import NOT_NEGATIVE, POSITIVE, Option, Request
 from d2rpick.base.errors import printable
 from d2rpick.cli import options
-from d2rpick.cli.output import tell, text_bytes, with_options
+from d2rpick.cli.output import Output, tell, text_bytes, with_options
 from d2rpick.cli.progress import telling
 from d2rpick.cli.values import click_type
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
     from d2rpick.api.drives import Driving
-    from d2rpick.api.request import Request
-    from d2rpick.cli.output import Output
     from d2rpick.running.drive import Driver
 
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.request import LIMITS, READING, needed_time, time_or_window
+from d2rpick.api.request import LIMITS, READING, Request, needed_time, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, D2RPickError, FormatError
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
-from d2rpick.cli.output import tell
+from d2rpick.cli.output import Output, tell
 from d2rpick.cli.progress import counting
 from d2rpick.cli.values import click_type
 from d2rpick.report.formats import FORMATS
@@ -20,10 +20,8 @@ from d2rpick.report.formats import FORMATS
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.api.request import Request
     from d2rpick.api.studies import Ledger
     from d2rpick.base.workers import Farm
-    from d2rpick.cli.output import Output
 
 
 EXAMPLES = """\b

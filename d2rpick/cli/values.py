@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -17,8 +17,6 @@ from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
 from d2rpick.cli import COMMANDS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
     from click.shell_completion import CompletionItem
 
     from d2rpick.histories.run import Run

@@ -9,16 +9,12 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.models.box_model import GRAVITY, Bars, build, stiffest_rate
-
-if TYPE_CHECKING:
-    from d2rpick.models.box_model import Ends, Parameters, Plane, Structure, Values
-
+from d2rpick.models.box_model import GRAVITY, Bars, Ends, Parameters, Plane, Structure, Values, build, stiffest_rate
 
 # Of floor and curb at one point [N/m]: softer than the box, so that contact does not set the time step; the weight of
 # the box sinks in by half a millimetre.

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.histories.formats import csv_table, glstat, hdf5_file, matsum
-from d2rpick.models.box_run import PARTS
+from d2rpick.models.box_run import PARTS, Record
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from d2rpick.histories.opening import Table
-    from d2rpick.models.box_run import Record
     from d2rpick.vibration.oscillator import Oscillator, Trajectory
 
 

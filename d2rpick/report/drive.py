@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.report import keys, page, tables
 from d2rpick.report.fields import Document, Field, many, row
-from d2rpick.report.html import document, drawings, pairs, remarks, section, table, tag
+from d2rpick.report.html import Markup, document, drawings, pairs, remarks, section, table, tag
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.report.formats import Shown
-    from d2rpick.report.html import Markup
     from d2rpick.running.drive import Driven
 
 _WINDOW: Final = row(

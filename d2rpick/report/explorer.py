@@ -15,7 +15,7 @@ from d2rpick.histories.samples import outline
 from d2rpick.report.html import Markup, join, resource, tag
 from d2rpick.report.suggestion import acceptable
 from d2rpick.report.tables import measure, shell_line, short
-from d2rpick.report.view import locked_in, response, scale_in, view_of
+from d2rpick.report.view import View, locked_in, response, scale_in, view_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.trade_off import Offer, TradeOff
     from d2rpick.histories.history import Samples
-    from d2rpick.report.view import View
 
 
 # Stretches of the energy in sight, each with its lowest and highest value, and of the whole record in the overview.

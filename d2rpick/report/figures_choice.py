@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from d2rpick.choice.study import outliers, runs_of
+from d2rpick.choice.study import Study, StudyRow, outliers, runs_of
 from d2rpick.histories.samples import outline
 from d2rpick.report.figures import (
     BETTER,
@@ -29,7 +29,7 @@ from d2rpick.report.figures import (
 )
 from d2rpick.report.situation import energy_name
 from d2rpick.report.study import short_names
-from d2rpick.report.view import merged, replayed_motion, scale_in, scale_of, view_of
+from d2rpick.report.view import Motion, View, merged, replayed_motion, scale_in, scale_of, view_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -40,11 +40,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.situation import Situation
-    from d2rpick.choice.study import Study, StudyRow
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.histories.history import History, Samples
-    from d2rpick.report.view import Motion, View
 
 
 # Height of a file's figure of the energy alone, and with the motion; on a page, that of a panel [inch].

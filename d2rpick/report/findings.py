@@ -17,16 +17,14 @@ from d2rpick.choice.warnings import Caution
 from d2rpick.deck.source import STDIN
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
-from d2rpick.rules import RULES
-from d2rpick.rules.base import Example, Severity
+from d2rpick.rules import RULES, Checked
+from d2rpick.rules.base import Example, Rule, Severity, Unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.deck.switching import Window
     from d2rpick.report.formats import Shown
-    from d2rpick.rules import Checked
-    from d2rpick.rules.base import Rule, Unreadable
 
 
 SARIF_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"

@@ -9,13 +9,12 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from d2rpick.base import __version__
-from d2rpick.report.tables import short
+from d2rpick.report.tables import Cell, short
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from d2rpick.choice.warnings import Caution
-    from d2rpick.report.tables import Cell
 
 # More columns than this do not fit on a narrow screen.
 _FIT = 3

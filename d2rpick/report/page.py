@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.deck.printing import DEFAULT, SOLVERS
-from d2rpick.report.explorer import explorer, scripts, styles
+from d2rpick.report.explorer import Explorer, explorer, scripts, styles
 from d2rpick.report.html import Markup, document, drawings, join, pairs, resource, section, table, tag
 from d2rpick.report.situation import heading, measures_of
 from d2rpick.report.tables import shell_line, short
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Settings, Situation
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
-    from d2rpick.report.explorer import Explorer
     from d2rpick.report.keys import Read
 
 

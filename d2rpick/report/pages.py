@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import if_written
-from d2rpick.choice.study import runs_of
+from d2rpick.choice.study import Study, runs_of
 from d2rpick.report import overview, page, parts, plan, study, suggestion, trade_off, verdict
-from d2rpick.report.explorer import explorer
+from d2rpick.report.explorer import Explorer, explorer
 from d2rpick.report.html import Markup, document, drawings, grid, pairs, remarks, section, table, tag
-from d2rpick.report.tables import known, measure, short, unstarred
+from d2rpick.report.tables import Cell, known, measure, short, unstarred
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -20,12 +20,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.plan import Plan, Planned
     from d2rpick.choice.sets_of_parts import Parts, PartSet
-    from d2rpick.choice.study import Study
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.histories.run import Run
     from d2rpick.histories.source import Source
-    from d2rpick.report.explorer import Explorer
-    from d2rpick.report.tables import Cell
 
 
 # More rows than one compares by eye; csv and json hold all.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.models.box_run import BOX
+from d2rpick.models.box_run import BOX, Outcome, Record
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, many, row
 
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.answers import Suggestion
     from d2rpick.choice.warnings import Caution
-    from d2rpick.models.box_run import Outcome, Record
     from d2rpick.report.formats import Shown
 
 # Of each run, in JSON and as columns.

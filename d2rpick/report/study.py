@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.choice.study import cut_runs, runs_of
+from d2rpick.choice.study import Study, StudyRow, cut_runs, runs_of
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe, one_of, row
@@ -13,7 +13,6 @@ from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe,
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from d2rpick.choice.study import Study, StudyRow
     from d2rpick.report.formats import Shown
 
 STATUS: Final = one_of("ok", "none", "unreadable", "out-of-range", "failed", "internal-error")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import name_units
-from d2rpick.choice.candidates import MUCH_HIGHER
+from d2rpick.choice.candidates import MUCH_HIGHER, Candidate
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from d2rpick.choice.answers import AcceptableWindow, Pair, Suggestion
-    from d2rpick.choice.candidates import Candidate
     from d2rpick.choice.ranking import Quality
     from d2rpick.report.formats import Shown
 
