@@ -8,7 +8,8 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from typing import TYPE_CHECKING, Any, Final, NoReturn
+from inspect import cleandoc
+from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
 import click
 
@@ -16,7 +17,7 @@ from d2rpick.base import __version__
 from d2rpick.base.errors import one_line, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
 # Each command in a line, for the help, which does without the modules behind them: those of a run, of many runs and of
 # decks; and what computes runs of its own.
@@ -53,14 +54,8 @@ _MODULES: Final = {
 }
 COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended
+_Made = TypeVar("_Made", bound=click.Command)
 _LIBRARIES: Final = ("click", "numpy", "scipy", "pandas", "h5py", "matplotlib")
-EXAMPLES: Final = """\b
-Examples:
-  d2rpick plan --part flying sample_data/rollover_box.matsum
-  d2rpick suggest --td 0.064 sample_data/energy.csv
-  d2rpick check sample_data/switching.k --history sample_data/energy.glstat
-  d2rpick plan --help
-"""
 
 
 class _PipeClosed(Exception):  # noqa: N818  not an error: the reader of the pipe has seen enough
@@ -157,11 +152,29 @@ def _versions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     ctx.exit()
 
 
-@click.group(
-    cls=_Group,
-    epilog=EXAMPLES,
+def documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
+    """Make a command of a function, whose docstring is the help, with the examples at its end."""
+
+    def made(function: Any) -> _Made:
+        told, _, examples = cleandoc(function.__doc__).partition("\n\nExamples\n--------\n")
+        epilog = "\n".join(["\b", "Examples:", *(f"  {line}" for line in examples.split("\n"))])
+        return click.command(function.__name__, cls=cls, help=told, epilog=epilog, **settings)(function)
+
+    return made
+
+
+@documented(
+    _Group,
     context_settings={"auto_envvar_prefix": "D2RPICK", "help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_versions, help=_VERSIONS)
 def d2rpick() -> None:
-    """Choose the times of deformable-to-rigid switching from the internal energy of one reference run."""
+    """Choose the times of deformable-to-rigid switching from the internal energy of one reference run.
+
+    Examples
+    --------
+    d2rpick plan --part flying sample_data/rollover_box.matsum
+    d2rpick suggest --td 0.064 sample_data/energy.csv
+    d2rpick check sample_data/switching.k --history sample_data/energy.glstat
+    d2rpick plan --help
+    """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import click
 
@@ -27,16 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.rules.judgement import HistoryJudge
 
 
-CARD: Final = """\b
-Examples:
-  d2rpick card --tr 0.0135867 --td 0.0687534 --part 11,12 --merge 11
-  d2rpick card --tr 0.0135867 --td 0.0687534 --part 1 --history sample_data/energy.csv
-  d2rpick card --tr 0.02 --td 0.09 --tr 0.2 --td 0.3 --part 11
-  d2rpick card --solver radioss --tr 0.0135867 --td 0.0687534 --node 1001 --end 0.15
-"""
-
-
-@options.command("card", CARD)
+@options.command
 @options.time("--tr", "Switch to rigid at this time; repeatable.", many=True)
 @options.time("--td", "Switch back at this time, one for each --tr.", many=True)
 @options.file("--windows", "Instead of both: a file with lines 'tr td'.")
@@ -54,6 +45,13 @@ def card(
     """Print solver input for switching windows, ready to be pasted.
 
     With a history, the times are judged again as printed, and the verdict is added as a comment.
+
+    Examples
+    --------
+    d2rpick card --tr 0.0135867 --td 0.0687534 --part 11,12 --merge 11
+    d2rpick card --tr 0.0135867 --td 0.0687534 --part 1 --history sample_data/energy.csv
+    d2rpick card --tr 0.02 --td 0.09 --tr 0.2 --td 0.3 --part 11
+    d2rpick card --solver radioss --tr 0.0135867 --td 0.0687534 --node 1001 --end 0.15
     """
     from d2rpick.api.cards import all_cautions, card_of
 
@@ -83,15 +81,7 @@ def _windows(tr: Sequence[float], td: Sequence[float], file: str | None) -> Sequ
     return list(zip(tr, td, strict=True))
 
 
-CHECK: Final = """\b
-Examples:
-  d2rpick check sample_data/switching.k
-  d2rpick check sample_data/switching.k --history sample_data/energy.glstat
-  d2rpick check -f json --select D2R0,D2R1 --fail-on warning sample_data/switching.k
-"""
-
-
-@options.command("check", CHECK)
+@options.command
 @click.argument("deck", metavar="DECK...", nargs=-1, required=True, type=click_type("file"))
 @options.takes(*REFERENCE)
 @click.option(
@@ -119,6 +109,12 @@ def check(
     Each DECK is read with its includes; a folder stands for its main decks, `-` for standard input.  The starter deck
     and the engine files of a Radioss run are one DECK, whichever is named.  `d2rpick rule` lists the rules; a comment
     line `$ d2rpick: ignore D2R104` before a card (Radioss: `#`) silences one for it.
+
+    Examples
+    --------
+    d2rpick check sample_data/switching.k
+    d2rpick check sample_data/switching.k --history sample_data/energy.glstat
+    d2rpick check -f json --select D2R0,D2R1 --fail-on warning sample_data/switching.k
     """
     from d2rpick.report.findings import Checks
     from d2rpick.rules import Configuration
@@ -222,18 +218,17 @@ def _ids(texts: Sequence[str]) -> tuple[str, ...]:
     return tuple(name.strip().upper() for text in texts for name in text.split(",") if name.strip())
 
 
-RULE: Final = """\b
-Examples:
-  d2rpick rule
-  d2rpick rule D2R105
-"""
-
-
-@options.command("rule", RULE)
+@options.command
 @click.argument("id", metavar="[ID]...", nargs=-1, type=click_type("rules"))
 @options.takes(*FILES)
 def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name is that of the argument in usage
-    """Explain a rule of `d2rpick check`, with decks that pass and fail; without ID, list all rules."""
+    """Explain a rule of `d2rpick check`, with decks that pass and fail; without ID, list all rules.
+
+    Examples
+    --------
+    d2rpick rule
+    d2rpick rule D2R105
+    """
     from d2rpick.report import findings as report
     from d2rpick.rules import find_rules
 

@@ -28,14 +28,6 @@ if TYPE_CHECKING:
 MOST_REPLAYED = 10_000_000  # their text takes some gigabytes
 HISTORIES = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.models.files, which --help does without
 
-REPLAYS = """\b
-Examples:
-  d2rpick replay --stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.01 --dt 0.001
-  d2rpick replay --stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --tr 0.006 --td 0.08 \\
-      --t-end 0.15 --dt 1e-4 -o switched.csv
-  d2rpick replay --stiffness 660e3 --mass 31.4 --beta 2 --y0 0.02 --vy0 -1.5 --t-end 0.01 --dt 0.001
-"""
-
 
 def _same(name: str, **changes: Any) -> Any:
     """Take an option of a request."""
@@ -80,17 +72,24 @@ class Motion:
 _NEEDED: Final = {"required": True}
 
 
-@options.command("replay", REPLAYS)
+@options.command
 @options.takes_all(
     *(Motion, "motion"), stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED
 )
 @options.takes("plot", *FILES, plot="Draw displacements and energies to FILE (png, svg, pdf).")
 def replay(motion: Motion, output: Output) -> None:
-    """Compute the floating oscillator in closed form, with or without switching.
+    r"""Compute the floating oscillator in closed form, with or without switching.
 
     It starts from any displacements and velocities of both masses; what is not given is 0.  Columns: time,
     displacement and velocity of frame (z) and suspended mass (y), internal and kinetic energy; at tr itself the state
     after the switch.
+
+    Examples
+    --------
+    d2rpick replay --stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.01 --dt 0.001
+    d2rpick replay --stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --tr 0.006 --td 0.08 \
+        --t-end 0.15 --dt 1e-4 -o switched.csv
+    d2rpick replay --stiffness 660e3 --mass 31.4 --beta 2 --y0 0.02 --vy0 -1.5 --t-end 0.01 --dt 0.001
     """
     from d2rpick.histories.opening import format_of
     from d2rpick.models import files
@@ -126,14 +125,6 @@ TD = 0.37  # of the published study, 10 ms before the ground comes
 TILT = 30.0  # of a box that falls: on an edge, so that it tumbles
 T_END = {False: 0.42, True: 1.2}  # with a drop: some bounces
 BALANCED = 0.01  # so well the energy of a run must be balanced [-]
-
-ROLLOVER = """\b
-Examples:
-  d2rpick rollover --t-end 0.05 -o rollover.matsum
-  d2rpick rollover --mesh 8 --tr 0.09 --td 0.37 -o switched.csv --plot switched.png
-  d2rpick rollover --scan --mesh 4 --td 0.15 --t-end 0.16 --plot scan.png
-  d2rpick rollover --drop 0.4 --tilt 30 --mesh 4 --tr 0 --td 0.27 --tr 0.4 --td 0.5 -o tumbling.matsum
-"""
 
 
 @dataclass(frozen=True)
@@ -178,7 +169,7 @@ class Box:
         return Parameters(**({"speed": 0.0, "tilt": TILT, **given} if self.drop is not None else given))
 
 
-@options.command("rollover", ROLLOVER)
+@options.command
 @options.takes_all(Box, "box")
 @options.takes(
     *("output_format", "plot", *FILES, "exit_zero"),
@@ -195,6 +186,13 @@ def rollover(box: Box, output: Output) -> None:
     It is deformable throughout, or rigid from each tr to its td; the step that meets the curb stays deformable.
     Columns: time, place, roll and velocities of the box, its energies, the momentum of box and step, and the energy
     balance of the model.  glstat holds the energies of both, matsum those of each.
+
+    Examples
+    --------
+    d2rpick rollover --t-end 0.05 -o rollover.matsum
+    d2rpick rollover --mesh 8 --tr 0.09 --td 0.37 -o switched.csv --plot switched.png
+    d2rpick rollover --scan --mesh 4 --td 0.15 --t-end 0.16 --plot scan.png
+    d2rpick rollover --drop 0.4 --tilt 30 --mesh 4 --tr 0 --td 0.27 --tr 0.4 --td 0.5 -o tumbling.matsum
     """
     _check(box, output)
     (_scan if box.scan else _run)(box, output)
@@ -304,12 +302,6 @@ def _unbalanced(record: Record) -> tuple[Caution, ...]:
     return (Caution("energy-balance", f"{found}; these parameters are beyond what the model can do"),)
 
 
-REPRODUCE = """\b
-Examples:
-  d2rpick reproduce --output-dir paper --section 2
-  d2rpick reproduce --output-dir paper --overwrite --section 3 --solver sample_data/oscillator_solver_6_80.csv
-  d2rpick reproduce --output-dir paper --overwrite --section 5 --report paper.html -f markdown
-"""
 # Columns of a solver's table beside time_s, by what it is.
 SOLVER = {
     "pairs": ("reference_m", "published_m", "better_m"),
@@ -322,7 +314,7 @@ _ABSENT = (
 )
 
 
-@options.command("reproduce", REPRODUCE)
+@options.command
 @click.option(
     "--output-dir",
     metavar="DIR",
@@ -353,6 +345,12 @@ def reproduce(output_dir: str, section: Sequence[str], solver: Sequence[str], ou
     Each figure stands with what the paper shows there, what is found here, and whether the two agree; the table puts
     published numbers and reference values beside those found here.  The figures of the box (sections 1 and 4) take
     about half a minute.  It runs from a clone of the repository, whose folder validation holds the study.
+
+    Examples
+    --------
+    d2rpick reproduce --output-dir paper --section 2
+    d2rpick reproduce --output-dir paper --overwrite --section 3 --solver sample_data/oscillator_solver_6_80.csv
+    d2rpick reproduce --output-dir paper --overwrite --section 5 --report paper.html -f markdown
     """
     try:
         from validation.published import command

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import click
 
@@ -27,21 +27,20 @@ if TYPE_CHECKING:
     from d2rpick.api.cards import Cards
 
 
-INFO: Final = """\b
-Examples:
-  d2rpick info sample_data/energy.glstat
-  d2rpick info -f json sample_data/rollover.csv
-"""
-
-
-@options.command("info", INFO)
+@options.command
 @options.takes(
     *("deck", HISTORY, *READING, *RESULT),
     deck="Main deck of the run: tells gravity, supports and imposed motion, without which flights are found.",
     forms=FORMATS["overview"],
 )
 def info(request: Request, output: Output) -> None:
-    """Show what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health."""
+    """Show what is in the HISTORY of a run: format, states, sampling, channels, parts, flights, health.
+
+    Examples
+    --------
+    d2rpick info sample_data/energy.glstat
+    d2rpick info -f json sample_data/rollover.csv
+    """
     from d2rpick.choice.overview import survey
 
     selection = request.selection()
@@ -53,14 +52,7 @@ def info(request: Request, output: Output) -> None:
     output.result(in_words(write("overview", form, overview, shown), form, shown.width))
 
 
-EXTRACT: Final = """\b
-Examples:
-  d2rpick extract sample_data/energy.glstat
-  d2rpick extract --energy boxIE_J sample_data/rollover.csv -o box.h5
-"""
-
-
-@options.command("extract", EXTRACT)
+@options.command
 @options.takes(HISTORY, *READING)
 @click.option(
     "--write-as",
@@ -74,6 +66,11 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     With more than one part a column part_<id> for each follows, then what else is known at these times of the whole
     model: total internal energy, kinetic energy, external work, contact energy, momentum, ... Where the files have the
     momenta of parts, those that fly together with the chosen ones count.
+
+    Examples
+    --------
+    d2rpick extract sample_data/energy.glstat
+    d2rpick extract --energy boxIE_J sample_data/rollover.csv -o box.h5
     """
     from d2rpick.api.runs import extracted
     from d2rpick.histories.opening import TABLES, format_of, write_table
@@ -86,19 +83,7 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     output.content(write_table(form, table))
 
 
-SUGGEST: Final = """\b
-Examples:
-  d2rpick suggest --part box sample_data/rolloverT01.gz
-  d2rpick suggest --td 0.064 sample_data/energy.csv
-  d2rpick suggest --td-window 0.06 0.07 sample_data/energy.csv
-  d2rpick suggest --td 0.37 --energy boxIE_J sample_data/rollover.csv
-  d2rpick suggest --td 0.064 -f json sample_data/energy.glstat
-  d2rpick suggest --td 0.37 --part box -f card --node 1001 sample_data/rolloverT01.gz
-  d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
-"""
-
-
-@options.command("suggest", SUGGEST)
+@options.command
 @options.time("--td", "Switch back to deformable at this time.", instead_of=("td_window",))
 @options.time("--td-window", "Choose the time to switch back within this window.", instead_of=("td",), pair=True)
 @options.LIMIT
@@ -110,6 +95,16 @@ def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, c
 
     A candidate is a time before td at which the internal energy had the level it has at td.  Each is verified by
     replaying the floating oscillator behind the record; the best one, and a better td, are named.
+
+    Examples
+    --------
+    d2rpick suggest --part box sample_data/rolloverT01.gz
+    d2rpick suggest --td 0.064 sample_data/energy.csv
+    d2rpick suggest --td-window 0.06 0.07 sample_data/energy.csv
+    d2rpick suggest --td 0.37 --energy boxIE_J sample_data/rollover.csv
+    d2rpick suggest --td 0.064 -f json sample_data/energy.glstat
+    d2rpick suggest --td 0.37 --part box -f card --node 1001 sample_data/rolloverT01.gz
+    d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
     """
     from d2rpick.api.asked import ask
     from d2rpick.api.cards import all_cautions
@@ -133,17 +128,7 @@ def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, c
     return output.finish(objection=answer.recommended is None, quality=answer.quality)
 
 
-EXPLORE: Final = """\b
-Examples:
-  d2rpick explore --td-window 0.06 0.07 sample_data/energy.csv
-  d2rpick explore --td 0.064 --td-window 0.06 0.07 sample_data/energy.csv
-  d2rpick explore --part box -f csv sample_data/rollover_box.matsum
-  d2rpick explore --part recommended --deck sample_data/rollover_box.k sample_data/rollover_box.matsum
-  d2rpick explore --part box --plot explore.png --report explore.html sample_data/rollover_box.matsum
-"""
-
-
-@options.command("explore", EXPLORE)
+@options.command
 @options.time("--td", "A time to switch back that others are compared with.")
 @options.time(
     "--td-window", "Explore the times to switch back within this window.  [default: the longest flight]", pair=True
@@ -164,6 +149,14 @@ def explore(
 
     A grid of td over --td-window or the longest flight, and every peak of the energy, each as `suggest --td` answers
     it.  Named are those that no other beats in both error and rigid time, and the nearest td with half the error.
+
+    Examples
+    --------
+    d2rpick explore --td-window 0.06 0.07 sample_data/energy.csv
+    d2rpick explore --td 0.064 --td-window 0.06 0.07 sample_data/energy.csv
+    d2rpick explore --part box -f csv sample_data/rollover_box.matsum
+    d2rpick explore --part recommended --deck sample_data/rollover_box.k sample_data/rollover_box.matsum
+    d2rpick explore --part box --plot explore.png --report explore.html sample_data/rollover_box.matsum
     """
     from d2rpick.api.asked import ask
     from d2rpick.api.flights import explored
@@ -180,15 +173,7 @@ def explore(
     output.finish(objection=chosen is None, quality=chosen.quality if chosen else None)
 
 
-VERIFY: Final = """\b
-Examples:
-  d2rpick verify --tr 0.0135867 --td 0.0687534 sample_data/energy.csv
-  d2rpick verify --tr 0.1 --td 0.37 --energy boxIE_J -f json sample_data/rollover.csv
-  d2rpick verify --tr 0.0135867 --td 0.0687534 --report report.html sample_data/energy.csv
-"""
-
-
-@options.command("verify", VERIFY)
+@options.command
 @options.time("--tr", "Switch to rigid at this time.  [with --switched: read off that run]")
 @options.time("--td", "Switch back to deformable at this time.  [with --switched: read off that run]")
 @options.files(
@@ -209,7 +194,14 @@ def verify(
     cards: Cards,
     output: Output,
 ) -> None:
-    """Judge one pair of switch times against the HISTORY of a run without switching."""
+    """Judge one pair of switch times against the HISTORY of a run without switching.
+
+    Examples
+    --------
+    d2rpick verify --tr 0.0135867 --td 0.0687534 sample_data/energy.csv
+    d2rpick verify --tr 0.1 --td 0.37 --energy boxIE_J -f json sample_data/rollover.csv
+    d2rpick verify --tr 0.0135867 --td 0.0687534 --report report.html sample_data/energy.csv
+    """
     from d2rpick.api.asked import ask, open_run
     from d2rpick.api.choices import check_pair, judged
 
@@ -229,16 +221,7 @@ def verify(
     output.finish(objection=not answer.verified, quality=answer.quality)
 
 
-PARTS: Final = """\b
-Examples:
-  d2rpick parts sample_data/rollover_box.matsum
-  d2rpick parts --deck sample_data/rollover_box.k sample_data/rollover_box.matsum
-  d2rpick parts --deck sample_data/rollover_box.k -f json sample_data/rollover_box.matsum
-  d2rpick parts --deck sample_data/rollover_box.k --report parts.html sample_data/rollover_box.matsum
-"""
-
-
-@options.command("parts", PARTS)
+@options.command
 @options.time("--tr", "With --td: compare the sets in this window.")
 @options.time("--td", "Compare the sets in a window that ends here.  [default: at the end of the longest flight]")
 @options.takes(
@@ -253,6 +236,13 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 
     Each part with its elements, material, mass and energy, and a verdict with its reasons; then sets of parts with the
     run time that they save, and the one to take.  A set that --part names is compared too.
+
+    Examples
+    --------
+    d2rpick parts sample_data/rollover_box.matsum
+    d2rpick parts --deck sample_data/rollover_box.k sample_data/rollover_box.matsum
+    d2rpick parts --deck sample_data/rollover_box.k -f json sample_data/rollover_box.matsum
+    d2rpick parts --deck sample_data/rollover_box.k --report parts.html sample_data/rollover_box.matsum
     """
     from d2rpick.api.costs import check_times, tabled
 

@@ -13,6 +13,7 @@ from click.core import ParameterSource
 from d2rpick.api.cards import Cards
 from d2rpick.api.request import CHOOSING, JUDGING, OSCILLATOR, READING, TIME, Option, Request, dashed, options_of
 from d2rpick.base.errors import ArgumentError
+from d2rpick.cli import documented
 from d2rpick.cli.output import Output, tell, text_bytes, with_options
 from d2rpick.cli.values import CARDS, click_type, settings_of, spelled, words_of
 
@@ -111,9 +112,9 @@ class Either(click.Option):
         return value, source
 
 
-def command(name: str, examples: str, cls: type[Command] = Command) -> Callable[[Decorated], click.Command]:
+def command(function: Decorated) -> click.Command:
     """Make a command of a function."""
-    return click.command(name, cls=cls, epilog=examples)
+    return documented(Command)(function)
 
 
 def takes(*names: str, forms: Iterable[str] = (), **other: Any) -> Callable[[Decorated], Decorated]:

@@ -21,16 +21,8 @@ if TYPE_CHECKING:
     from d2rpick.api.flights import Plan
     from d2rpick.deck.printed_card import PrintedCard
 
-EXAMPLES = """\b
-Examples:
-  d2rpick plan --part box sample_data/rollover_box.matsum
-  d2rpick plan --part box -f value sample_data/rollover_box.matsum
-  d2rpick plan --part box -f card sample_data/rollover_box.matsum
-  d2rpick plan --part box --plot plan.png --report plan.html sample_data/rollover_box.matsum
-"""
 
-
-@options.command("plan", EXAMPLES)
+@options.command
 @click.option(
     "--min-rigid", type=click_type(NOT_NEGATIVE), metavar="T",
     help="Leave shorter windows out.  [default: 5% of the record; one gives way to a later one twice as long]",
@@ -71,6 +63,13 @@ def plan(
 
     Windows are supported up to and with the first that locks in energy: it moves the landings after it.  Run with
     these, then plan the next from the switched run, with --done.
+
+    Examples
+    --------
+    d2rpick plan --part box sample_data/rollover_box.matsum
+    d2rpick plan --part box -f value sample_data/rollover_box.matsum
+    d2rpick plan --part box -f card sample_data/rollover_box.matsum
+    d2rpick plan --part box --plot plan.png --report plan.html sample_data/rollover_box.matsum
     """
     from d2rpick.api.asked import ask, open_run
     from d2rpick.api.cards import all_cautions

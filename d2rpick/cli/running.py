@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import click
 
@@ -21,14 +21,9 @@ if TYPE_CHECKING:
 
 
 CMD = ("text", "CMD")
-DRIVE: Final = """\b
-Examples:
-  d2rpick drive sample_data/flying_box/BOX_0000.rad --wait 0.002 -o driven --dry-run \\
-      --starter 'starter -i {deck} -np 4' --engine 'mpirun -np 4 engine -i {deck}'
-"""
 
 
-@options.command("drive", DRIVE)
+@options.command
 @click.argument("deck", type=click_type("file"))
 @click.option(
     "-o", "folder", metavar="RUNDIR", required=True, type=click_type("file"), help="Folder of the run; made if missing."
@@ -75,11 +70,16 @@ def drive(
     dry_run: bool,
     output: Output,
 ) -> None:
-    """Compute a Radioss run that switches itself: no reference is needed.
+    r"""Compute a Radioss run that switches itself: no reference is needed.
 
     DECK, a starter deck with one engine file, is copied into RUNDIR.  Each flight begins when no force has acted for
     the wait; tr is the highest energy within one more.  A rigid probe finds the next contact and is thrown away.  Then
     the run is rigid to the margin before it, and goes on deformable.  What is interrupted goes on with --resume.
+
+    Examples
+    --------
+    d2rpick drive sample_data/flying_box/BOX_0000.rad --wait 0.002 -o driven --dry-run \
+        --starter 'starter -i {deck} -np 4' --engine 'mpirun -np 4 engine -i {deck}'
     """
     import signal
     from pathlib import Path
@@ -128,14 +128,7 @@ def _progress(driver: Driver, seconds: float) -> str:
     return f"leg {order.number}, {order.kind}: {time:.6g} of {driver.limits.end:g}"
 
 
-FOLLOW: Final = """\b
-Examples:
-  d2rpick follow --once --part box sample_data/rolloverT01.gz
-  d2rpick follow --for 2 -f ndjson sample_data/rolloverT01.gz
-"""
-
-
-@options.command("follow", FOLLOW)
+@options.command
 @click.argument("run", metavar="RUN", type=click_type("file"))
 @click.option(
     "--wait", type=click_type(POSITIVE), metavar="T",
@@ -158,6 +151,11 @@ def follow(run: str, wait: float | None, once: bool, lasting: float | None, requ
 
     A line for each event: load, flight with its evidence, a switch advised, contact, restart, silence, end.  RUN need
     not have begun.  Nothing is started, stopped or changed.
+
+    Examples
+    --------
+    d2rpick follow --once --part box sample_data/rolloverT01.gz
+    d2rpick follow --for 2 -f ndjson sample_data/rolloverT01.gz
     """
     from d2rpick.api.running import follow as events
 
@@ -179,14 +177,7 @@ def follow(run: str, wait: float | None, once: bool, lasting: float | None, requ
     output.finish(objection=failed or (seconds is not None and since is None))
 
 
-FIRST: Final = """\b
-Examples:
-  d2rpick first --part 1 --wait 0.02 sample_data/falling_plate/plate_0000.rad -o first/
-  d2rpick first --part 1 --wait 0.02 --after 0.05 sample_data/falling_plate/plate_0000.rad -o later/
-"""
-
-
-@options.command("first", FIRST)
+@options.command
 @click.argument("deck", type=click_type("file"))
 @options.option(
     "part",
@@ -208,6 +199,11 @@ def first(
 
     The solver makes the parts rigid when no contact has had a force for the wait, and deformable with the next force.
     Radioss: legs that sensors end, and the rigid bodies that the deck lacks.  LS-DYNA: switches with contact codes.
+
+    Examples
+    --------
+    d2rpick first --part 1 --wait 0.02 sample_data/falling_plate/plate_0000.rad -o first/
+    d2rpick first --part 1 --wait 0.02 --after 0.05 sample_data/falling_plate/plate_0000.rad -o later/
     """
     from d2rpick.api.running import prepared
 

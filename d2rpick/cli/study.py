@@ -24,16 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.base.workers import Farm
 
 
-EXAMPLES = """\b
-Examples:
-  d2rpick study --td 0.064 sample_data/energy.csv sample_data/energy.glstat
-  d2rpick study --td 0.064 --plot runs.png 'sample_data/energy.*'
-  d2rpick study --td 0.37 --part box --resume runs.ndjson -f json sample_data/rolloverT01.gz
-  d2rpick study --td 0.064 --tolerance 0.1 -f ndjson sample_data/energy.csv sample_data/energy.glstat
-"""
-
-
-@options.command("study", EXAMPLES)
+@options.command
 @click.argument("run", metavar="RUN...", nargs=-1, type=click_type("file"))
 @options.time("--td", "Switch back to deformable at this time.", instead_of=("td_window",))
 @options.time(
@@ -76,6 +67,13 @@ def study(
 
     Each RUN is a file, a folder with the files of one run, or a pattern whose matches are runs.  One that cannot be
     read is listed in its row and does not stop the others.
+
+    Examples
+    --------
+    d2rpick study --td 0.064 sample_data/energy.csv sample_data/energy.glstat
+    d2rpick study --td 0.064 --plot runs.png 'sample_data/energy.*'
+    d2rpick study --td 0.37 --part box --resume runs.ndjson -f json sample_data/rolloverT01.gz
+    d2rpick study --td 0.064 --tolerance 0.1 -f ndjson sample_data/energy.csv sample_data/energy.glstat
     """
     from d2rpick.api.studies import Ledger, fingerprint, line, rows_of, summary
     from d2rpick.choice.study import Question
@@ -177,14 +175,7 @@ def _farm(jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool) -
     return workers.on_cores(min(jobs or workers.cores(), calls), "d2rpick.choice.study")
 
 
-CALIBRATIONS = """\b
-Examples:
-  d2rpick calibrate sample_data/flying_box
-  d2rpick calibrate -f toml -o site.toml sample_data/flying_box
-"""
-
-
-@options.command("calibrate", CALIBRATIONS)
+@options.command
 @click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=click_type("file"))
 @options.takes(*RESULT, forms=FORMATS["calibration"])
 def calibrate(folders: tuple[str, ...], output: Output) -> None:
@@ -193,6 +184,11 @@ def calibrate(folders: tuple[str, ...], output: Output) -> None:
     Each RUN is the folder of one run, with its deck and what its solver printed: listings of Radioss (NAME_0001.out,
     with /MON/ON), d3hsp or glstat of LS-DYNA.  Give runs with and without switching of the same model: what they do
     not tell apart keeps the ratio that was measured.  A run that is named twice counts once.
+
+    Examples
+    --------
+    d2rpick calibrate sample_data/flying_box
+    d2rpick calibrate -f toml -o site.toml sample_data/flying_box
     """
     from d2rpick.api.costs import fitted
 
