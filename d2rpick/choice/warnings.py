@@ -55,7 +55,8 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
     td, mode, share = situation.td, situation.vibration.whole.mode, situation.kinetic_share
     if situation.at_rest:
         found = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
-        yield Caution("at-rest", f"{found}: any tr there is right, and the first one saves the most")
+        right = "" if situation.flight.unknown_load else "any tr there is right, and "
+        yield Caution("at-rest", f"{found}: {right}the first one saves the most")
         return
     if situation.energy_td <= 0:
         found = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"

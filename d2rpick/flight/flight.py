@@ -75,7 +75,7 @@ class Flight(NamedTuple):
         on tells a flight from a crash into it.
         """
         if self.source in _BY_ENERGIES:
-            return self.described
+            return self.described and not self.unknown_load
         return self.source in _SURE and not isnan(self.gravity)
 
 

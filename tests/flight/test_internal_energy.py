@@ -7,7 +7,9 @@ import pytest
 
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.warnings import cautions_of
 from d2rpick.choice.windows import find_flights
+from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around
 from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision, Samples
@@ -197,6 +199,15 @@ def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor() -> No
     assert found.quality
     assert found.quality.grade == "poor"
     assert "by gravity or by another load" in found.quality.told
+
+
+def test_no_flight_is_certain_in_which_energies_show_a_load() -> None:
+    """A stiff body that is pulled may have an energy that one oscillator describes."""
+    assert not Flight(0.1, 0.9, "energy-balance", gravity=np.inf, described=True).certain
+    assert Flight(0.1, 0.9, "energy-balance", described=True).certain
+    found = suggest(totals(1e-9 * (1.5 + np.sin(300 * TIME)), 50 + 20 * TIME), 0.8, PLAIN)
+    assert found.situation.flight.unknown_load
+    assert not any("any tr there is right" in caution.message for caution in cautions_of(found.situation))
 
 
 def test_the_landing_is_found_where_the_end_of_the_load_is_given() -> None:
