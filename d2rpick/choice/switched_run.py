@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.names import Part
 
-    Times = tuple[float, float]
-
+Times = tuple[float, float]
 # Evidence that tells the start of a flight to some states; the energy alone gives time away there.
 _SHARP: Final = ("momentum", "contact-energy", "energy-balance")
 # Parts that have no more of the momentum of a model than this share are not what moves in it.
